@@ -1,0 +1,95 @@
+"""Reading the user's files: every way in which that can go wrong ends in one sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pydantic
+
+from tolalloc.exceptions import InputError, UnknownNameError
+
+Model = TypeVar("Model", bound=pydantic.BaseModel)
+
+
+class Record(pydantic.BaseModel):
+    """Base of everything that is read from a file: no unknown fields, no silent conversion, finite numbers."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Raises
+    ------
+    InputError
+        The file is missing, not text, or not complete TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file.") from None
+    except (IsADirectoryError, PermissionError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a text file ({error}).") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not complete TOML; is the file truncated? ({error}).") from None
+
+
+def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) -> Model:
+    """Return the record, or the first thing wrong with it as one sentence.
+
+    Raises
+    ------
+    InputError
+        A field is missing or its value is not allowed.
+    UnknownNameError
+        A field that the record does not have.
+    """
+    try:
+        return model.model_validate(data)
+    except pydantic.ValidationError as error:
+        # The check of a whole record can say more than the check of one field, so unknown fields come first.
+        problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+        problem = problems[0]
+        field = ".".join(str(part) for part in problem["loc"]) or "the whole record"
+        if problem["type"] == "extra_forbidden":
+            known = _known_fields(model, problem["loc"])
+            raise UnknownNameError.among(place, "field", field, known) from None
+        if problem["type"] == "missing":
+            raise InputError(f"{place}: {field} is missing.") from None
+        message = problem["msg"].removeprefix("Value error, ")
+        message = message[0].lower() + message[1:]
+        raise InputError(f"{place}: {field} is {problem['input']!r}; {message}.") from None
+
+
+def _known_fields(model: type[pydantic.BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Return the dotted names of the fields beside an unknown one."""
+    prefix = ""
+    for part in location[:-1]:
+        inner = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
+        if not (isinstance(inner, type) and issubclass(inner, pydantic.BaseModel)):
+            break
+        model, prefix = inner, f"{prefix}{part}."
+    return [prefix + name for name in model.model_fields]
+
+
+def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> Path:
+    """Return the file for a shipped name, or the user's own path.
+
+    Raises
+    ------
+    UnknownNameError
+        Neither a shipped name nor an existing file.
+    """
+    shipped = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
+    if str(name) in shipped:
+        return shipped[str(name)]
+    path = Path(name)
+    if path.suffix or path.exists():
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
+        return path
+    raise UnknownNameError.among(f"{what} {str(name)!r}", "name", str(name), shipped)
