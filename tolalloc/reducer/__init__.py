@@ -1,0 +1,1 @@
+"""The nominal reducer: geometry, stiffness formulas, load, and the files that hold them."""

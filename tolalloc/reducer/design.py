@@ -1,0 +1,119 @@
+"""The nominal design of an RV reducer: what the drawing would say if nothing had an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import cos
+
+from tolalloc.reducer.stiffness import Stiffness
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstStage:
+    """Sun gear and planet gears, an involute pair.
+
+    Parameters
+    ----------
+    sun_teeth, planet_teeth
+        Numbers of teeth Z1 and Z2 [-].
+    module
+        Module m [m].
+    pressure_angle
+        Pressure angle α [rad].
+    """
+
+    sun_teeth: int
+    planet_teeth: int
+    module: float
+    pressure_angle: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycloidStage:
+    """Cycloid discs against the ring of pins.
+
+    Parameters
+    ----------
+    pin_count, disc_teeth
+        Numbers zp and zc [-]; the pair has one tooth difference.
+    pin_circle_radius
+        Radius Rp of the circle of pin centres [m].
+    pin_radius
+        Radius r_rp of a pin [m].
+    eccentricity
+        Crank eccentricity e [m].
+    face_width
+        Loaded width b of a disc [m].
+    """
+
+    pin_count: int
+    disc_teeth: int
+    pin_circle_radius: float
+    pin_radius: float
+    eccentricity: float
+    face_width: float
+
+    @property
+    def shortening(self) -> float:
+        """Ratio K1 = e·zp/Rp [-]."""
+        return self.eccentricity * self.pin_count / self.pin_circle_radius
+
+    @property
+    def disc_pitch_radius(self) -> float:
+        """Lever r_d = e·zc of the pin forces about the disc centre [m]."""
+        return self.eccentricity * self.disc_teeth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modification:
+    """Tooth modification of the disc, in the sign convention of the theory page.
+
+    Parameters
+    ----------
+    equidistant
+        Δr_rp: the grinding pin radius is r_rp + Δr_rp [m].
+    shift
+        Δr_p: the pin circle radius at grinding is Rp + Δr_p [m].
+    """
+
+    equidistant: float
+    shift: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """Torques on the carrier [N·m]; negative resists the positive direction of rotation."""
+
+    test_torque: float
+    rated_torque: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reducer:
+    """Nominal design, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
+
+    name: str
+    source: str
+    crank_count: int
+    disc_count: int
+    first_stage: FirstStage
+    cycloid_stage: CycloidStage
+    stiffness: Stiffness
+    modification: Modification
+    load: Load
+    assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def crank_circle_radius(self) -> float:
+        """Radius a_sp of the circle of crank axes, m(Z1+Z2)/2 [m]."""
+        return self.first_stage.module * (self.first_stage.sun_teeth + self.first_stage.planet_teeth) / 2
+
+    @property
+    def planet_base_radius(self) -> float:
+        """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
+        return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+
+    @property
+    def ratio(self) -> float:
+        """Sun turns per carrier turn, 1 + (Z2/Z1)·zp, with the pin housing fixed [-]."""
+        return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count

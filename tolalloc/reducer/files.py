@@ -1,0 +1,193 @@
+"""Reducers and identified stiffnesses as TOML files: presets by name and the user's own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from tolalloc.exceptions import InputError
+from tolalloc.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.reducer.design import CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.reducer.stiffness import IdentifiedStiffness, Stiffness, line_contact
+from tolalloc.units import DEGREE, GIGAPASCAL, MICROMETRE, MILLIMETRE
+
+PRESETS = Path(__file__).parent / "presets"
+
+Teeth = Annotated[int, Field(ge=5, le=1000)]
+NewtonPerMetre = Annotated[float, Field(ge=1e4, le=1e13)]
+
+
+class FirstStageRecord(Record):
+    """Table ``[first_stage]``."""
+
+    sun_teeth: Teeth
+    planet_teeth: Teeth
+    module_mm: Annotated[float, Field(ge=0.1, le=20)]
+    pressure_angle_deg: Annotated[float, Field(ge=5, le=45)]
+
+
+class CycloidStageRecord(Record):
+    """Table ``[cycloid_stage]``."""
+
+    pin_count: Teeth
+    disc_teeth: Teeth
+    pin_circle_radius_mm: Annotated[float, Field(ge=5, le=1000)]
+    pin_radius_mm: Annotated[float, Field(ge=0.1, le=50)]
+    eccentricity_mm: Annotated[float, Field(ge=0.05, le=10)]
+    face_width_mm: Annotated[float, Field(ge=0.5, le=200)]
+
+    @model_validator(mode="after")
+    def _is_a_cycloid(self) -> CycloidStageRecord:
+        if self.disc_teeth != self.pin_count - 1:
+            raise ValueError(f"disc_teeth must be pin_count − 1 = {self.pin_count - 1} (one-tooth difference)")
+        shortening = self.eccentricity_mm * self.pin_count / self.pin_circle_radius_mm
+        if not shortening < 1:
+            raise ValueError(f"K1 = eccentricity·pin_count/pin_circle_radius must be below 1 and is {shortening:.3g}")
+        half_pitch = self.pin_circle_radius_mm * pi / self.pin_count
+        if self.pin_radius_mm >= half_pitch:
+            raise ValueError(f"pin_radius_mm must be below {half_pitch:.3g}, where neighbouring pins overlap")
+        return self
+
+
+class MaterialRecord(Record):
+    """Table ``[material]``."""
+
+    elastic_modulus_gpa: Annotated[float, Field(ge=10, le=1000)]
+    poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
+
+
+class StiffnessRecord(Record):
+    """Table ``[stiffness]``, N/m; without ``pin_contact`` it is πbE/(4(1−µ²))."""
+
+    sun_support: NewtonPerMetre
+    gear_mesh: NewtonPerMetre
+    crank_disc_bearing: NewtonPerMetre
+    crank_carrier_bearing: NewtonPerMetre
+    carrier_bearing: NewtonPerMetre
+    pin_contact: NewtonPerMetre | None = None
+    pin_contact_law: Literal["constant", "table2"] = "constant"
+
+
+class ModificationRecord(Record):
+    """Table ``[modification]``."""
+
+    equidistant_um: Annotated[float, Field(ge=-200, le=200)]
+    shift_um: Annotated[float, Field(ge=-200, le=200)]
+
+
+class LoadRecord(Record):
+    """Table ``[load]``; torques resist the positive direction of rotation when negative."""
+
+    test_torque_nm: Annotated[float, Field(ge=-1e5, le=1e5)]
+    rated_torque_nm: Annotated[float, Field(gt=0, le=1e5)]
+
+
+class ReducerRecord(Record):
+    """A whole reducer file."""
+
+    name: str
+    source: str
+    crank_count: Annotated[int, Field(ge=2, le=6)]
+    disc_count: Annotated[int, Field(ge=1, le=3)]
+    first_stage: FirstStageRecord
+    cycloid_stage: CycloidStageRecord
+    material: MaterialRecord
+    stiffness: StiffnessRecord
+    modification: ModificationRecord
+    load: LoadRecord
+    assumptions: tuple[str, ...] = ()
+
+    def reducer(self) -> Reducer:
+        """Return the reducer in SI units."""
+        first, cycloid, stiffness = self.first_stage, self.cycloid_stage, self.stiffness
+        width = cycloid.face_width_mm * MILLIMETRE
+        given = stiffness.model_dump()
+        given["pin_contact"] = stiffness.pin_contact or line_contact(
+            width, self.material.elastic_modulus_gpa * GIGAPASCAL, self.material.poisson_ratio
+        )
+        return Reducer(
+            name=self.name,
+            source=self.source,
+            crank_count=self.crank_count,
+            disc_count=self.disc_count,
+            first_stage=FirstStage(
+                sun_teeth=first.sun_teeth,
+                planet_teeth=first.planet_teeth,
+                module=first.module_mm * MILLIMETRE,
+                pressure_angle=first.pressure_angle_deg * DEGREE,
+            ),
+            cycloid_stage=CycloidStage(
+                pin_count=cycloid.pin_count,
+                disc_teeth=cycloid.disc_teeth,
+                pin_circle_radius=cycloid.pin_circle_radius_mm * MILLIMETRE,
+                pin_radius=cycloid.pin_radius_mm * MILLIMETRE,
+                eccentricity=cycloid.eccentricity_mm * MILLIMETRE,
+                face_width=width,
+            ),
+            stiffness=Stiffness(**given),
+            modification=Modification(
+                equidistant=self.modification.equidistant_um * MICROMETRE,
+                shift=self.modification.shift_um * MICROMETRE,
+            ),
+            load=Load(test_torque=self.load.test_torque_nm, rated_torque=self.load.rated_torque_nm),
+            assumptions=self.assumptions,
+        )
+
+
+class IdentifiedValue(Record):
+    """One stiffness and its standard uncertainty."""
+
+    value: NewtonPerMetre
+    standard_uncertainty: Annotated[float, Field(ge=0)]
+
+
+class IdentifiedStiffnessRecord(Record):
+    """A stiffness file."""
+
+    source: str
+    stiffness: dict[str, IdentifiedValue]
+    notes: tuple[str, ...] = ()
+
+
+def load_reducer(name: str | Path) -> Reducer:
+    """Return a reducer by preset name or from the user's TOML file.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, field and value that are not allowed.
+    """
+    path = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
+    return validated(ReducerRecord, read_toml(path), path).reducer()
+
+
+def load_identified_stiffness(name: str | Path) -> IdentifiedStiffness:
+    """Return identified stiffnesses by shipped name or from the user's TOML file.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, field and value that are not allowed.
+    """
+    path = shipped_or_path(name, PRESETS, ".stiffness.toml", "stiffness")
+    record = validated(IdentifiedStiffnessRecord, read_toml(path), path)
+    allowed = [field for field in StiffnessRecord.model_fields if field != "pin_contact_law"]
+    for field in record.stiffness:
+        if field not in allowed:
+            raise InputError.at(path, "stiffness", field, "one of " + ", ".join(allowed))
+    return IdentifiedStiffness(
+        source=record.source,
+        values={field: item.value for field, item in record.stiffness.items()},
+        standard_uncertainty={field: item.standard_uncertainty for field, item in record.stiffness.items()},
+        notes=record.notes,
+    )
+
+
+def with_stiffness(reducer: Reducer, identified: IdentifiedStiffness) -> Reducer:
+    """Return the reducer with the identified stiffnesses in place of its own."""
+    values: dict[str, Any] = dict(identified.values)
+    return replace(reducer, stiffness=replace(reducer.stiffness, **values))
