@@ -1,0 +1,158 @@
+"""Error sources: what stands on the drawing, and the columns of the model that it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.uncertainty.zones import (
+    Distribution,
+    Feature,
+    Spectrum,
+    standard_deviation_per_zone,
+    standard_values,
+)
+from tolalloc.units import MICROMETRE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """One tolerance on a drawing: one source of error, one or more columns of the model.
+
+    Parameters
+    ----------
+    name
+        Identifier; a column is this name, or this name and a component.
+    part
+        Part that carries the feature.
+    feature
+        Kind of callout.
+    zone
+        Width, diameter, total pitch deviation or indicator reading of the zone [m].
+    minimum, maximum
+        Smallest and largest zone that may be asked for [m].
+    cost
+        Cost of the feature at its zone; it falls as 1/zone [cost units].
+    middle
+        Middle of the zone as a deviation from the nominal size, for sizes only [m].
+    nominal
+        Nominal size, for the drawing only [m].
+    distribution
+        Shape of the deviation inside the zone.
+    cp
+        Process capability; at 1, 99.73 % of parts lie in the zone [-].
+    shift
+        Mean shift over half the zone, for sizes only [-].
+    spectrum
+        Order → relative amplitude of pitch and run-out deviations [-].
+    group
+        Sources of one group keep the ratios of their zones, for example both discs of one drawing.
+    locked
+        Whether allocation must leave the zone as it is.
+    grade
+        Tolerance grade as written on the drawing, carried through.
+    note
+        Where the numbers come from.
+    """
+
+    name: str
+    part: str
+    feature: Feature
+    zone: float
+    minimum: float
+    maximum: float
+    cost: float
+    middle: float = 0.0
+    nominal: float = 0.0
+    distribution: Distribution = Distribution.NORMAL
+    cp: float = 1.0
+    shift: float = 0.0
+    spectrum: Spectrum = ()
+    group: str = ""
+    locked: bool = False
+    grade: str = ""
+    note: str = ""
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the model's columns that this source moves."""
+        if self.feature is Feature.SIZE:
+            return (self.name,)
+        if self.feature is Feature.POSITION:
+            return (f"{self.name}.x", f"{self.name}.y")
+        return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
+
+    @property
+    def mapping(self) -> str:
+        """Sentence that says how the zone became a distribution."""
+        zone = self.zone / MICROMETRE
+        reading = f"{zone:.3g} µm, {self.feature.zone_meaning}"
+        if self.distribution is Distribution.UNIFORM:
+            return f"{reading}: uniform magnitude up to the zone, any phase"
+        deviation = standard_deviation_per_zone(self.feature, self.cp, self.spectrum) * zone
+        shift = f", mean shifted by {self.shift * zone / 2:.3g} µm" if self.shift else ""
+        if self.spectrum:
+            waves = ", ".join(f"{deviation * amplitude:.3g} (order {order})" for order, amplitude in self.spectrum)
+            return f"{reading}: normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
+        axes = " on each axis" if self.feature is Feature.POSITION else ""
+        return f"{reading}: normal, σ = {deviation:.3g} µm{axes} at Cp {self.cp:g}{shift}"
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """All sources of a reducer: each random column is its zone times a standard value.
+
+    Parameters
+    ----------
+    sources
+        The rows of the tolerance table.
+    """
+
+    sources: tuple[Source, ...]
+
+    @cached_property
+    def active(self) -> tuple[Source, ...]:
+        """Sources with a zone above zero, the ones that vary."""
+        return tuple(source for source in self.sources if source.zone > 0.0)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the active sources."""
+        return tuple(column for source in self.active for column in source.columns)
+
+    @cached_property
+    def still(self) -> dict[str, float]:
+        """Columns of the sources with zone zero, which stay in the middle of it [m]."""
+        return {column: source.middle for source in self.sources if source.zone == 0.0 for column in source.columns}
+
+    @cached_property
+    def source_of_column(self) -> tuple[str, ...]:
+        """Name of the source of each column."""
+        return tuple(source.name for source in self.active for _ in source.columns)
+
+    @cached_property
+    def zones(self) -> Float[np.ndarray, " source"]:
+        """Zones of the active sources [m]."""
+        return np.array([source.zone for source in self.active])
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return all deviations per unit of zone for independent uniform numbers in (0, 1)."""
+        parts, start = [], 0
+        for source in self.active:
+            own = uniform[:, start : start + len(source.columns)]
+            parts.append(
+                standard_values(source.feature, source.distribution, source.cp, source.shift, source.spectrum, own)
+            )
+            start += len(source.columns)
+        return np.concatenate(parts, axis=1)
+
+    def deviations(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns [m] that the standard values give at the zones [m]."""
+        counts = [len(source.columns) for source in self.active]
+        middle = np.repeat([source.middle for source in self.active], counts)
+        return np.asarray(standard * np.repeat(zones, counts) + middle)

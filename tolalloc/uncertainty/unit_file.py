@@ -1,0 +1,101 @@
+"""Unit files: the actual errors of one built reducer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import cos, radians, sin
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import Field
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.units import MICROMETRE
+
+DATA = Path(__file__).parent / "data"
+
+Micrometres = Annotated[float, Field(ge=-200, le=200)]
+Magnitude = Annotated[float, Field(ge=0, le=200)]
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+Order = Annotated[int, Field(ge=1, le=100)]
+
+
+class UnitRecord(Record):
+    """A unit file; see the shipped ``table4.unit.toml``."""
+
+    name: str
+    source: str
+    neglected: tuple[str, ...] = ()
+    lengths: dict[str, Micrometres] = Field(default_factory=dict)
+    vectors: dict[str, tuple[Magnitude, Degrees]] = Field(default_factory=dict)
+    harmonics: dict[str, tuple[tuple[Order, Magnitude, Degrees], ...]] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BuiltUnit:
+    """Errors of one reducer, by column.
+
+    Parameters
+    ----------
+    name, source
+        Which reducer, and where its errors were read.
+    deviations
+        Column → deviation [m].
+    neglected
+        Names of sources that the unit leaves out, taken as zero.
+    """
+
+    name: str
+    source: str
+    deviations: dict[str, float]
+    neglected: tuple[str, ...] = ()
+
+    def errors(self, columns: Iterable[str]) -> Float[np.ndarray, "1 column"]:
+        """Return the unit as one row of errors in the order of the model's columns [m].
+
+        Raises
+        ------
+        UnknownNameError
+            The unit has an error that the model does not know.
+        InputError
+            The model has a column that the unit neither states nor neglects.
+        """
+        names = tuple(columns)
+        for column in self.deviations:
+            if column not in names:
+                raise UnknownNameError.among(f"unit {self.name}", "error", column, names)
+        for source in self.neglected:
+            if not any(column == source or column.startswith(f"{source}.") for column in names):
+                raise UnknownNameError.among(f"unit {self.name}", "neglected error", source, names)
+        for column in names:
+            left_out = any(column == source or column.startswith(f"{source}.") for source in self.neglected)
+            if column not in self.deviations and not left_out:
+                raise InputError(
+                    f"unit {self.name}: {column} is not stated; give its value or list its source under neglected."
+                )
+        return np.array([[self.deviations.get(column, 0.0) for column in names]])
+
+
+def load_unit(name: str | Path) -> BuiltUnit:
+    """Return a built unit by shipped name or from the user's TOML file.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, field and value that are not allowed.
+    """
+    path = shipped_or_path(name, DATA, ".unit.toml", "unit")
+    record = validated(UnitRecord, read_toml(path), path)
+    deviations = {column: value * MICROMETRE for column, value in record.lengths.items()}
+    for source, (magnitude, direction) in record.vectors.items():
+        deviations[f"{source}.x"] = magnitude * MICROMETRE * cos(radians(direction))
+        deviations[f"{source}.y"] = magnitude * MICROMETRE * sin(radians(direction))
+    for source, waves in record.harmonics.items():
+        for order, amplitude, phase in waves:
+            deviations[f"{source}.cos{order}"] = amplitude * MICROMETRE * sin(radians(phase))
+            deviations[f"{source}.sin{order}"] = amplitude * MICROMETRE * cos(radians(phase))
+    return BuiltUnit(name=record.name, source=record.source, deviations=deviations, neglected=record.neglected)
