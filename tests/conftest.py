@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.reducer.files import load_reducer
+from tolalloc.uncertainty.unit_file import load_unit
+
+
+@pytest.fixture(scope="session")
+def rv20e() -> EquivalentModel:
+    """The RV-20E preset; its tables are made once for all tests."""
+    return EquivalentModel(load_reducer("rv20e"))
+
+
+@pytest.fixture(scope="session")
+def table4(rv20e: EquivalentModel) -> np.ndarray:
+    """The measured unit of liu2020, one row of errors [m]."""
+    return load_unit("table4").errors(rv20e.columns)
+
+
+@pytest.fixture
+def generator() -> np.random.Generator:
+    return np.random.default_rng(20201121)

@@ -1,0 +1,1 @@
+"""The equivalent model: rows of springs, their equilibrium against the pins, and the transmission error."""
