@@ -1,0 +1,1 @@
+"""Tables, figures, Excel and HTML from the results of a study."""

@@ -1,0 +1,1 @@
+"""A study, its stages and its run folder."""
