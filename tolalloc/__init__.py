@@ -1,1 +1,1 @@
-"""Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances meet a limit cheapest."""
+"""Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are the cheapest."""

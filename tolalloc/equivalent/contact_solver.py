@@ -27,7 +27,7 @@ jit = nb.njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit
-def _direction(tangent, gradient, step):
+def solve_tangent(tangent, gradient, step):
     """Solve tangent·step = −gradient by Cholesky in place; return whether a pivot was replaced."""
     size = gradient.size
     largest = 0.0
@@ -148,7 +148,7 @@ def _equilibrium(stiffness, force, by_disc, contact, undisturbed, q, work):
         ratio = residual / largest if largest > 0.0 else 0.0
         if residual <= max(_TOLERANCE * largest, _ROUNDING * cancelling):
             return CONVERGED, ratio, touching
-        replaced = _direction(tangent, gradient, step)
+        replaced = solve_tangent(tangent, gradient, step)
         _along(by_disc, step, rate)
         changed = 0
         for k in range(compression.size):
@@ -216,13 +216,8 @@ def _solve_at_node(at, tables, bilateral_values, contact_values, q, buffers):
 
 
 @jit
-def _solve_between(position, tables, bilateral_values, contact_values, q, buffers):
-    """Solve one sample between tabulated angles, all tables interpolated by a cubic through four nodes."""
-    stiffness, _, carrier_by_disc, _, by_disc, _, contact = tables
-    node_force, node_undisturbed, work, blended = buffers
-    s, f, c, d, k, u = blended
-    s[:], f[:], c[:], d[:], k[:], u[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    first = int(np.floor(position)) - 1
+def interpolation(position):
+    """Return the first of four nodes around a position, and the weights of the cubic through them."""
     x = position - np.floor(position)
     weights = (
         -x * (x - 1.0) * (x - 2.0) / 6.0,
@@ -230,6 +225,17 @@ def _solve_between(position, tables, bilateral_values, contact_values, q, buffer
         -(x + 1.0) * x * (x - 2.0) / 2.0,
         (x + 1.0) * x * (x - 1.0) / 6.0,
     )
+    return int(np.floor(position)) - 1, weights
+
+
+@jit
+def solve_between(position, tables, bilateral_values, contact_values, q, buffers):
+    """Solve one sample between tabulated angles, all tables interpolated by a cubic through four nodes."""
+    stiffness, _, carrier_by_disc, _, by_disc, _, contact = tables
+    node_force, node_undisturbed, work, blended = buffers
+    s, f, c, d, k, u = blended
+    s[:], f[:], c[:], d[:], k[:], u[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    first, weights = interpolation(position)
     rotation = 0.0
     for node in range(4):
         at, weight = first + node, weights[node]
@@ -252,7 +258,7 @@ def solve_anywhere(position, tables, bilateral_values, contact_values, q, buffer
     node = int(np.floor(position))
     if node == position:
         return _solve_at_node(node, tables, bilateral_values, contact_values, q, buffers)
-    return _solve_between(position, tables, bilateral_values, contact_values, q, buffers)
+    return solve_between(position, tables, bilateral_values, contact_values, q, buffers)
 
 
 @jit

@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
+from tolalloc.equivalent.adjoint import solve_derivatives
 from tolalloc.equivalent.condensation import ColumnLists, CondensedAngles, column_lists, condense
 from tolalloc.equivalent.contact_solver import solve_curves
 from tolalloc.equivalent.extremes import solve_extremes
@@ -206,3 +207,35 @@ class EquivalentModel:
             status=status,
             residual=residual,
         )
+
+    def peak_to_peak_derivatives(
+        self, errors: Float[np.ndarray, "sample column"], torque: float
+    ) -> tuple[Extremes, Float[np.ndarray, "sample column"]]:
+        """Return the extremes and the exact derivative of the peak-to-peak by every column [rad/m].
+
+        Parameters
+        ----------
+        errors
+            Deviations in the order of ``columns`` [m].
+        torque
+            Torque on the carrier; negative resists the rotation [N·m].
+
+        Notes
+        -----
+        Theory page, equation (23). It holds while both extremes stay at the same kinks of the curve: the derivative
+        is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
+        """
+        extremes = self.extremes(errors, torque)
+        per_turn = self.search.coarse * self.search.nodes_per_coarse / (2 * pi)
+        derivative = np.empty(errors.shape)
+        solve_derivatives(
+            self._tables,
+            (self._lists.bilateral, self._lists.contact),
+            np.ascontiguousarray(errors),
+            torque,
+            extremes.carrier_angle * per_turn + _MARGIN,
+            self.search.nodes_per_coarse * 0.5**self.search.levels,
+            derivative,
+            extremes.status,
+        )
+        return extremes, derivative

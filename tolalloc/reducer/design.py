@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos
+from math import cos, sqrt
 
 from tolalloc.reducer.stiffness import Stiffness
 
@@ -78,6 +78,21 @@ class Modification:
 
     equidistant: float
     shift: float
+
+    def flank_clearance(self, stage: CycloidStage) -> float:
+        """Return the smallest nominal gap, on the flank where cos φ′ = K1: Δr_rp − Δr_p·√(1−K1²) [m]."""
+        return self.equidistant - self.shift * sqrt(1 - stage.shortening**2)
+
+    @property
+    def radial_clearance(self) -> float:
+        """The nominal gap at tooth tip and root, Δr_rp − Δr_p [m]."""
+        return self.equidistant - self.shift
+
+    @classmethod
+    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage) -> Modification:
+        """Return the two amounts that give a flank and a radial clearance [m]."""
+        shift = (flank - radial) / (1 - sqrt(1 - stage.shortening**2))
+        return cls(equidistant=radial + shift, shift=shift)
 
 
 @dataclass(frozen=True, kw_only=True)

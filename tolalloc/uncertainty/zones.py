@@ -64,10 +64,15 @@ def harmonic_range_quantile(spectrum: Spectrum) -> float:
     if len(spectrum) == 1:
         return 2.0 * _RADIUS_QUANTILE * spectrum[0][1]
     waves = ndtri(qmc.Sobol(2 * len(spectrum), rng=np.random.default_rng(1)).random_base2(14))
+    weights = np.repeat([amplitude for _, amplitude in spectrum], 2)
+    return float(np.quantile(np.ptp((waves * weights) @ _waves_over_turn(spectrum), axis=1), INSIDE_AT_CP_1))
+
+
+def _waves_over_turn(spectrum: Spectrum) -> Float[np.ndarray, "column point"]:
+    """Return the cosine and sine of every order on fine points of one turn."""
     points = 48 * max(order for order, _ in spectrum)
     turn = 2 * np.pi * np.arange(points) / points
-    shape = np.concatenate([a * np.stack([np.cos(h * turn), np.sin(h * turn)]) for h, a in spectrum])
-    return float(np.quantile(np.ptp(waves @ shape, axis=1), INSIDE_AT_CP_1))
+    return np.concatenate([np.stack([np.cos(order * turn), np.sin(order * turn)]) for order, _ in spectrum])
 
 
 def standard_deviation_per_zone(feature: Feature, cp: float, spectrum: Spectrum) -> float:
@@ -111,3 +116,26 @@ def standard_values(
     magnitude = uniform[:, 0::2] * amplitudes / (2.0 * amplitudes.sum())
     phase = 2 * np.pi * uniform[:, 1::2]
     return np.stack([magnitude * np.cos(phase), magnitude * np.sin(phase)], axis=-1).reshape(uniform.shape)
+
+
+def at_limit(
+    feature: Feature, spectrum: Spectrum, uniform: Float[np.ndarray, "sample column"]
+) -> Float[np.ndarray, "sample column"]:
+    """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases.
+
+    Parameters
+    ----------
+    feature, spectrum
+        As in `tolalloc.uncertainty.sources.Source`.
+    uniform
+        Independent uniform numbers, as many as the source has columns [-].
+    """
+    if feature is Feature.SIZE:
+        return np.where(uniform < 0.5, -0.5, 0.5)
+    phase = 2 * np.pi * uniform[:, 0::2]
+    waves = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+    if feature is Feature.POSITION:
+        return np.asarray(0.5 * waves.reshape(uniform.shape))
+    waves *= np.array([amplitude for _, amplitude in spectrum])[:, np.newaxis]
+    columns = waves.reshape(uniform.shape)
+    return np.asarray(columns / np.ptp(columns @ _waves_over_turn(spectrum), axis=1)[:, np.newaxis])

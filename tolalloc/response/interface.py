@@ -1,0 +1,48 @@
+"""What a response is: the kernel, a surrogate and a test function all look like this from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """Answers of a response.
+
+    Parameters
+    ----------
+    values
+        Outputs, in the units that the response's output names state.
+    status
+        0 for a good sample; anything else is a failed one, whose values must not be used [-].
+    """
+
+    values: Float[np.ndarray, "sample output"]
+    status: UInt8[np.ndarray, " sample"]
+
+    @property
+    def good(self) -> Bool[np.ndarray, " sample"]:
+        """Which samples may be used."""
+        return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
+
+
+class Response(Protocol):
+    """Anything that maps named columns to named outputs, sample by sample."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of X."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units, in the order of Y."""
+        ...
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample."""
+        ...

@@ -1,0 +1,143 @@
+"""The equivalent model as a response: peak-to-peak transmission error of every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reducer.design import Modification
+from tolalloc.response.interface import Evaluation
+from tolalloc.units import ARCSECOND
+
+PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
+
+MODIFICATION = ("modification.equidistant", "modification.shift")
+"""Columns of the two modification amounts."""
+
+_SAMPLES_AT_ONCE = 1024
+
+Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
+"""Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
+
+
+def _unobserved(status: UInt8[np.ndarray, " sample"]) -> None:
+    """Observe nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithDerivatives:
+    """Answers of the kernel with the exact derivative of the peak-to-peak.
+
+    Parameters
+    ----------
+    evaluation
+        Peak-to-peak and status of every sample.
+    by_column
+        Derivative by every varied column [arcsec/m].
+    by_modification
+        Derivative by the equidistant and the shift amount [arcsec/m].
+    """
+
+    evaluation: Evaluation
+    by_column: Float[np.ndarray, "sample column"]
+    by_modification: Float[np.ndarray, "sample 2"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelResponse:
+    """Peak-to-peak transmission error on the real model.
+
+    Parameters
+    ----------
+    model
+        The equivalent model.
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
+    columns
+        Columns that vary, in the order of X.
+    fixed
+        Value of every other column of the model [m].
+    observe
+        Told the statuses of each chunk.
+
+    Raises
+    ------
+    UnknownNameError
+        A column that the model does not have.
+    InputError
+        A column of the model that is neither varied nor fixed.
+    """
+
+    model: EquivalentModel
+    torque: float
+    columns: tuple[str, ...]
+    fixed: Mapping[str, float]
+    observe: Observer = _unobserved
+
+    def __post_init__(self) -> None:
+        known, given = set(self.model.columns), {*self.columns, *self.fixed}
+        for name in (*self.columns, *self.fixed):
+            if name not in known:
+                raise UnknownNameError.among(f"errors of {self.model.reducer.name}", "source", name, known)
+        for name in self.model.columns:
+            if name not in given:
+                raise InputError(
+                    f"errors of {self.model.reducer.name}: {name} is not given; add its source to the tolerance table, "
+                    "with zone 0 and locked if it is to be neglected."
+                )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The one output."""
+        return (PEAK_TO_PEAK,)
+
+    def with_modification(self, modification: Modification) -> KernelResponse:
+        """Return the response of the same reducer with another tooth modification."""
+        amounts = dict(zip(MODIFICATION, (modification.equidistant, modification.shift), strict=True))
+        return replace(self, fixed={**self.fixed, **amounts})
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the peak-to-peak of every sample [arcsec]."""
+        values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
+        for rows in _chunks(x.shape[0]):
+            extremes = self.model.extremes(self._errors(x[rows]), self.torque)
+            values[rows, 0] = extremes.peak_to_peak / ARCSECOND
+            status[rows] = extremes.status
+            self.observe(extremes.status)
+        return Evaluation(values=values, status=status)
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> WithDerivatives:
+        """Return the peak-to-peak of every sample and its derivatives, at hardly more cost than without."""
+        varied = [self.model.columns.index(name) for name in self.columns]
+        amounts = [self.model.columns.index(name) for name in MODIFICATION]
+        values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
+        by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
+        for rows in _chunks(x.shape[0]):
+            extremes, derivative = self.model.peak_to_peak_derivatives(self._errors(x[rows]), self.torque)
+            values[rows, 0] = extremes.peak_to_peak / ARCSECOND
+            status[rows] = extremes.status
+            by_column[rows] = derivative[:, varied] / ARCSECOND
+            by_modification[rows] = derivative[:, amounts] / ARCSECOND
+            self.observe(extremes.status)
+        return WithDerivatives(
+            evaluation=Evaluation(values=values, status=status), by_column=by_column, by_modification=by_modification
+        )
+
+    def _errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
+        where = {name: at for at, name in enumerate(self.model.columns)}
+        errors = np.zeros((x.shape[0], len(where)))
+        for name, value in self.fixed.items():
+            errors[:, where[name]] = value
+        errors[:, [where[name] for name in self.columns]] = x
+        return errors
+
+
+def _chunks(samples: int) -> Iterator[slice]:
+    """Yield the rows of each chunk."""
+    for start in range(0, samples, _SAMPLES_AT_ONCE):
+        yield slice(start, min(start + _SAMPLES_AT_ONCE, samples))

@@ -1,0 +1,93 @@
+"""What a hand calculation would say: each error alone at its limit, summed and root-sum-squared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import SolveError
+from tolalloc.response.interface import Response
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.zones import at_limit
+
+DIRECTIONS = 24
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClassicalEstimate:
+    """Single-error outputs and the two sums that assume they add up.
+
+    Parameters
+    ----------
+    sources
+        Names, in the order of ``alone``.
+    without
+        Output without any error, from modification and torque alone [output].
+    alone
+        Largest output of each source alone at the limit of its zone, over random phases, beyond ``without`` [output].
+    """
+
+    sources: tuple[str, ...]
+    without: float
+    alone: Float[np.ndarray, " source"]
+
+    @property
+    def worst_case(self) -> float:
+        """Sum of all single errors [output]."""
+        return self.without + float(self.alone.sum())
+
+    @property
+    def root_sum_square(self) -> float:
+        """Root of the sum of the squared single errors [output]."""
+        return self.without + float(np.sqrt((self.alone**2).sum()))
+
+
+def classical_estimate(
+    response: Response, errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree
+) -> ClassicalEstimate:
+    """Return worst case and root-sum-square from one error at a time.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+
+    Raises
+    ------
+    SolveError
+        A sample failed.
+
+    Notes
+    -----
+    Both sums assume that single errors add up, which contact switching denies; they stand beside Monte Carlo for
+    comparison with a hand calculation.
+    """
+    columns = len(errors.columns)
+    middle = errors.deviations(np.zeros((1, columns)), zones)
+    x, start = [middle], 0
+    for source, zone in zip(errors.active, zones, strict=True):
+        own = slice(start, start + len(source.columns))
+        rows = np.repeat(middle, DIRECTIONS, axis=0)
+        uniform = next(seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
+        rows[:, own] += zone * at_limit(source.feature, source.spectrum, uniform)
+        x.append(rows)
+        start = own.stop
+    evaluation = response(np.concatenate(x))
+    if not evaluation.good.all():
+        raise SolveError(f"Classical estimate: {np.count_nonzero(~evaluation.good)} single-error units failed.")
+    values = evaluation.values[:, 0]
+    without = float(values[0])
+    return ClassicalEstimate(
+        sources=tuple(source.name for source in errors.active),
+        without=without,
+        alone=np.maximum(values[1:].reshape(len(errors.active), DIRECTIONS).max(axis=1) - without, 0.0),
+    )

@@ -1,0 +1,158 @@
+"""Monte Carlo: many random units, their yield and its confidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import beta
+
+from tolalloc.exceptions import SolveError
+from tolalloc.response.interface import Evaluation, Response
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import ErrorModel
+
+CONFIDENCE = 0.95
+LARGEST_FAILED_SHARE = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Yield:
+    """Share of units within the limit, with an exact two-sided interval (Clopper–Pearson).
+
+    Parameters
+    ----------
+    estimate, low, high
+        Yield and its 95 % interval [-].
+    bound
+        One-sided 95 % lower bound, the one that decides whether a target is met [-].
+    units, rejected
+        Numbers of units [-].
+    """
+
+    estimate: float
+    low: float
+    high: float
+    bound: float
+    units: int
+    rejected: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class MonteCarlo:
+    """Random units and what the response said of them.
+
+    Parameters
+    ----------
+    x
+        The units' deviations, in the order of the response's columns [m].
+    evaluation
+        The answers; a failed unit counts as rejected.
+    """
+
+    x: Float[np.ndarray, "sample column"]
+    evaluation: Evaluation
+
+    @property
+    def values(self) -> Float[np.ndarray, " sample"]:
+        """First output of the good units."""
+        return np.asarray(self.evaluation.values[self.evaluation.good, 0])
+
+    @property
+    def failed(self) -> int:
+        """Number of units without a usable answer."""
+        return int(np.count_nonzero(~self.evaluation.good))
+
+    def within(self, limit: float) -> Yield:
+        """Return the yield for an upper limit on the first output."""
+        units = self.evaluation.status.size
+        return proportion(units, int(np.count_nonzero(self.values > limit)) + self.failed)
+
+    def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
+        """Return the good unit whose first output is nearest to a quantile [m]."""
+        distance = np.where(self.evaluation.good, np.abs(self.evaluation.values[:, 0] - self.quantile(share)), np.inf)
+        return self.x[[int(distance.argmin())]]
+
+    def quantile(self, share: float) -> float:
+        """Return the empirical quantile of the good units."""
+        return float(np.quantile(self.values, share))
+
+    def quantile_bound(self, target: float) -> float:
+        """Return the smallest limit at which this sample shows the target yield with one-sided 95 % confidence.
+
+        Notes
+        -----
+        An order statistic: so many of the largest values are left out as the sample may reject. Infinite if the
+        sample is too small to show the target at all.
+        """
+        units = self.evaluation.status.size
+        allowed = allowed_rejections(units, target) - self.failed
+        return float(np.sort(self.values)[-1 - allowed]) if allowed >= 0 else float("inf")
+
+
+def proportion(units: int, rejected: int) -> Yield:
+    """Return the yield of a sample with its exact intervals."""
+    accepted, tail = units - rejected, (1 - CONFIDENCE) / 2
+    return Yield(
+        estimate=accepted / units,
+        low=float(beta.ppf(tail, accepted, rejected + 1)) if accepted else 0.0,
+        high=float(beta.ppf(1 - tail, accepted + 1, rejected)) if rejected else 1.0,
+        bound=float(beta.ppf(1 - CONFIDENCE, accepted, rejected + 1)) if accepted else 0.0,
+        units=units,
+        rejected=rejected,
+    )
+
+
+def allowed_rejections(units: int, target: float) -> int:
+    """Return how many rejected units still show the target yield with one-sided 95 % confidence; −1 if none do."""
+    rejected = -1
+    while rejected + 1 < units and proportion(units, rejected + 1).bound >= target:
+        rejected += 1
+    return rejected
+
+
+def monte_carlo(
+    response: Response, errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree, units: int
+) -> MonteCarlo:
+    """Return random units at the given zones.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree that this sample owns.
+    units
+        Number of units [-].
+
+    Raises
+    ------
+    SolveError
+        More than 1 % of the units failed.
+    """
+    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
+    x = errors.deviations(errors.standard_values(uniform), zones)
+    result = MonteCarlo(x=x, evaluation=response(x))
+    require_few_failures(result, ".".join(seeds.path))
+    return result
+
+
+def require_few_failures(result: MonteCarlo, name: str) -> None:
+    """Raise if more units failed than a trustworthy figure admits.
+
+    Raises
+    ------
+    SolveError
+        More than 1 % of the units failed.
+    """
+    units = result.evaluation.status.size
+    if result.failed > LARGEST_FAILED_SHARE * units:
+        raise SolveError(
+            f"Monte Carlo {name}: {result.failed} of {units} units have no usable answer; allowed is "
+            f"{LARGEST_FAILED_SHARE:.0%}, because more would bias every figure."
+        )
