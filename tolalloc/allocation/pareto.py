@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from pymoo.algorithms.moo.nsga2 import NSGA2
-from pymoo.core.callback import Callback
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from scipy.stats import qmc
@@ -64,15 +62,6 @@ class _Allocation(Problem):  # type: ignore[misc]
         out["F"] = np.column_stack([self.space.cost(designs), quantile])
 
 
-class _EachGeneration(Callback):  # type: ignore[misc]
-    def __init__(self, advance: Callable[[], None]) -> None:
-        super().__init__()
-        self.advance = advance
-
-    def notify(self, algorithm: NSGA2) -> None:  # noqa: ARG002
-        self.advance()
-
-
 def to_genes(designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
     """Return the genes of designs."""
     return np.concatenate([np.log(designs[..., :-2]), designs[..., -2:]], axis=-1)
@@ -117,7 +106,6 @@ def _search(
     seeds: SeedTree,
     population: int,
     generations: int,
-    advance: Callable[[], None],
 ) -> Front:
     """Return the front that one NSGA-II run finds, started from known designs and a space-filling rest."""
     lower, upper = to_genes(space.lower), to_genes(space.upper)
@@ -128,7 +116,6 @@ def _search(
         NSGA2(pop_size=population, sampling=np.concatenate([first, lower + fill * (upper - lower)])),
         ("n_gen", generations),
         seed=seeds.child("nsga2").integer(),
-        callback=_EachGeneration(advance),
         save_history=False,
         verbose=False,
     )
@@ -148,7 +135,6 @@ def pareto_front(
     convex_front: Float[np.ndarray, "design variable"],
     seeds: SeedTree,
     effort: FrontEffort,
-    advance: Callable[[], None],
 ) -> tuple[Front, Surrogate]:
     """Return the front and the surrogate it was found on, improved by kernel runs along the front.
 
@@ -166,8 +152,6 @@ def pareto_front(
         Node of the seed tree.
     effort
         How much may be spent.
-    advance
-        Called after each generation.
     """
     designs = np.concatenate([designs, convex_front])
     evaluation = response(designs)
@@ -192,7 +176,6 @@ def pareto_front(
             own,
             effort.population if trusted else effort.population_on_kernel,
             effort.generations if trusted else effort.generations_on_kernel,
-            advance,
         )
         picked = np.unique(np.linspace(0, front.cost.size - 1, min(effort.points, front.cost.size)).astype(int))
         evaluation = response(front.designs[picked])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -190,7 +189,6 @@ def allocate(
     modification: Modification,
     seeds: SeedTree,
     effort: SearchEffort,
-    advance: Callable[[], None],
 ) -> Allocation:
     """Return the cheapest verified allocation and what it is compared with.
 
@@ -206,8 +204,6 @@ def allocate(
         Node of the seed tree.
     effort
         How much may be spent.
-    advance
-        Called after each generation of NSGA-II.
     """
     space, limit = response.space, verifier.requirement.limit
     by_hand, program = scale_by_hand(verifier, modification, effort.steps), ConvexAllocation(space)
@@ -221,7 +217,6 @@ def allocate(
         convex_front,
         seeds.child("pareto"),
         effort.front,
-        advance,
     )
     # The front may have found something cheaper; it counts only if fresh units say so.
     cheaper = (front.quantile <= best.quantile_bound) & (front.cost < (1 - SETTLED) * best.cost)

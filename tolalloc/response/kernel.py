@@ -105,7 +105,7 @@ class KernelResponse:
         """Return the peak-to-peak of every sample [arcsec]."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         for rows in _chunks(x.shape[0]):
-            extremes = self.model.extremes(self._errors(x[rows]), self.torque)
+            extremes = self.model.extremes(self.errors(x[rows]), self.torque)
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             self.observe(extremes.status)
@@ -118,7 +118,7 @@ class KernelResponse:
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
         for rows in _chunks(x.shape[0]):
-            extremes, derivative = self.model.peak_to_peak_derivatives(self._errors(x[rows]), self.torque)
+            extremes, derivative = self.model.peak_to_peak_derivatives(self.errors(x[rows]), self.torque)
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             by_column[rows] = derivative[:, varied] / ARCSECOND
@@ -128,7 +128,8 @@ class KernelResponse:
             evaluation=Evaluation(values=values, status=status), by_column=by_column, by_modification=by_modification
         )
 
-    def _errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
+    def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
+        """Return the varied columns and the fixed ones together, in the order of the model [m]."""
         where = {name: at for at, name in enumerate(self.model.columns)}
         errors = np.zeros((x.shape[0], len(where)))
         for name, value in self.fixed.items():

@@ -1,0 +1,159 @@
+"""A figure said once, drawn twice: interactive in the page by plotly, as PNG by matplotlib.
+
+A still picture needs no browser on the user's machine, and the page keeps its zoom and hover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import plotly.graph_objects as go
+
+COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """One set of data in a figure.
+
+    Parameters
+    ----------
+    label
+        Name in the legend.
+    kind
+        How it is drawn; ``bars`` are horizontal with one category per entry of x.
+    x, y
+        Data; for ``bars`` the categories and the lengths, for ``histogram`` the values alone.
+    low, high
+        Ends of the intervals around y of ``bars``.
+    """
+
+    label: str
+    kind: Literal["line", "points", "stems", "bars", "histogram"]
+    x: Sequence[float] | Sequence[str]
+    y: Sequence[float] = ()
+    low: Sequence[float] = ()
+    high: Sequence[float] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A figure.
+
+    Parameters
+    ----------
+    name
+        File name without ending.
+    title
+        What it shows, as a sentence.
+    x_label, y_label
+        Axis titles with units.
+    series
+        The data.
+    vertical, horizontal
+        Marked values on the axes, with their names.
+    """
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+    vertical: tuple[tuple[float, str], ...] = ()
+    horizontal: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Number of categories of horizontal bars."""
+        return max((len(item.x) for item in self.series if item.kind == "bars"), default=0)
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Draw the figure into a PNG file."""
+    canvas, axes = plt.subplots(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
+    count = sum(item.kind == "bars" for item in figure.series)
+    for number, item in enumerate(figure.series):
+        colour = COLOURS[number % len(COLOURS)]
+        if item.kind == "line":
+            axes.plot(item.x, item.y, label=item.label, color=colour, linewidth=1.2)
+        elif item.kind == "points":
+            axes.plot(item.x, item.y, "o", label=item.label, color=colour, markersize=7)
+        elif item.kind == "stems":
+            offset = 0.28 * (number - (len(figure.series) - 1) / 2)
+            axes.bar([float(x) + offset for x in item.x], item.y, 0.28, label=item.label, color=colour)
+        elif item.kind == "histogram":
+            axes.hist(item.x, bins=60, label=item.label, color=colour, alpha=0.55)
+        else:
+            height = 0.8 / count
+            places = [row + height * (number - (count - 1) / 2) for row in range(len(item.x))]
+            error = (
+                [[y - low for y, low in zip(item.y, item.low, strict=True)],
+                 [high - y for y, high in zip(item.y, item.high, strict=True)]]
+                if item.low else None
+            )  # fmt: skip
+            axes.barh(places, item.y, height, xerr=error, label=item.label, color=colour, ecolor="#444444", capsize=2)
+            axes.set_yticks(range(len(item.x)), [str(name) for name in item.x])
+    for value, name in figure.vertical:
+        axes.axvline(value, color="#b00020", linestyle="--", label=name)
+    for value, name in figure.horizontal:
+        axes.axhline(value, color="#b00020", linestyle="--", label=name)
+    if figure.rows:
+        axes.invert_yaxis()
+    axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
+    axes.grid(alpha=0.3)
+    axes.legend()
+    canvas.savefig(path, dpi=130)
+    plt.close(canvas)
+
+
+def as_html(figure: Figure) -> str:
+    """Return the figure as a page fragment; the page itself carries plotly.js once."""
+    canvas = go.Figure()
+    for number, item in enumerate(figure.series):
+        colour = COLOURS[number % len(COLOURS)]
+        if item.kind == "line":
+            canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
+        elif item.kind == "points":
+            canvas.add_scatter(
+                x=item.x, y=item.y, name=item.label, mode="markers", marker={"color": colour, "size": 10}
+            )
+        elif item.kind == "stems":
+            canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
+        elif item.kind == "histogram":
+            canvas.add_histogram(x=item.x, name=item.label, marker_color=colour, opacity=0.6, nbinsx=80)
+        else:
+            interval = None
+            if item.low:
+                interval = {
+                    "type": "data",
+                    "symmetric": False,
+                    "array": [high - y for y, high in zip(item.y, item.high, strict=True)],
+                    "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
+                    "color": "#444444",
+                }
+            canvas.add_bar(
+                y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=interval
+            )
+    for value, name in figure.vertical:
+        canvas.add_vline(x=value, line_dash="dash", line_color="#b00020", annotation_text=name)
+    for value, name in figure.horizontal:
+        canvas.add_hline(y=value, line_dash="dash", line_color="#b00020", annotation_text=name)
+    canvas.update_layout(
+        template="plotly_white",
+        barmode="overlay" if any(item.kind == "histogram" for item in figure.series) else "group",
+        xaxis_title=figure.x_label,
+        yaxis_title=figure.y_label,
+        height=max(420, 24 * figure.rows + 140),
+        margin={"l": 60, "r": 30, "t": 30, "b": 60},
+        legend={"orientation": "h", "y": 1.08},
+    )
+    if figure.rows:
+        canvas.update_yaxes(autorange="reversed", automargin=True)
+    return str(canvas.to_html(full_html=False, include_plotlyjs=False))

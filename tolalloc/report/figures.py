@@ -1,0 +1,136 @@
+"""The figures of a study."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.report import tables
+from tolalloc.report.figure import Figure, Series
+from tolalloc.report.results import StudyResults
+from tolalloc.units import ARCSECOND, DEGREE
+
+
+def study_figures(results: StudyResults) -> tuple[Figure, ...]:
+    """Return all figures, in the order of the report."""
+    return (
+        _ranking(results),
+        _zones(results),
+        _peak_to_peak(results),
+        _pareto(results),
+        _curves(results),
+        _orders(results),
+    )
+
+
+def _ranking(results: StudyResults) -> Figure:
+    frame = tables.ranking(results)
+    bars = Series(
+        label="total Sobol index with its 90 % interval",
+        kind="bars",
+        x=list(frame["source"]),
+        y=list(frame["total index ST [-]"]),
+        low=list(frame["ST low 5 % [-]"]),
+        high=list(frame["ST high 95 % [-]"]),
+    )
+    return Figure(
+        name="ranking",
+        title="Which error drives the peak-to-peak, at the zones of the tolerance table",
+        x_label="total Sobol index [-]",
+        y_label="",
+        series=(bars,),
+    )
+
+
+def _zones(results: StudyResults) -> Figure:
+    frame = tables.before_after(results)
+    frame = frame[frame["zone before [µm]"] > 0]
+    names = list(frame["source"])
+    return Figure(
+        name="zones",
+        title="Drawing zones before and after",
+        x_label="zone [µm]",
+        y_label="",
+        series=(
+            Series(label="before", kind="bars", x=names, y=list(frame["zone before [µm]"])),
+            Series(label="after", kind="bars", x=names, y=list(frame["zone after [µm]"])),
+        ),
+    )
+
+
+def _peak_to_peak(results: StudyResults) -> Figure:
+    allocation = results.allocation
+    return Figure(
+        name="peak_to_peak",
+        title=f"Random units before and after; yield after {allocation.chosen.achieved.estimate:.2%}",
+        x_label="peak-to-peak transmission error, output side [arcsec]",
+        y_label="units [-]",
+        series=(
+            Series(label="tolerance table as it is", kind="histogram", x=list(allocation.baseline.sample.values)),
+            Series(label="allocated", kind="histogram", x=list(allocation.chosen.sample.values)),
+        ),
+        vertical=((results.requirement.limit, f"limit {results.requirement.limit:g}″"),),
+    )
+
+
+def _pareto(results: StudyResults) -> Figure:
+    allocation, front = results.allocation, results.allocation.front
+    checked = ~np.isnan(front.on_kernel)
+    chosen, by_hand, baseline = allocation.chosen, allocation.by_hand, allocation.baseline
+    return Figure(
+        name="pareto",
+        title="Cost against the peak-to-peak that the target yield keeps",
+        x_label=f"peak-to-peak kept by {results.requirement.target:.2%} of units [arcsec]",
+        y_label="cost [cost units]",
+        series=(
+            Series(label="front (NSGA-II)", kind="line", x=list(front.quantile), y=list(front.cost)),
+            Series(label="front on the kernel", kind="points", x=list(front.on_kernel[checked]), y=list(front.cost[checked])),
+            Series(label="allocated, verified", kind="points", x=[chosen.quantile_bound], y=[chosen.cost]),
+            Series(
+                label="table as it is; scaled alike",
+                kind="points",
+                x=[baseline.quantile_bound, by_hand.quantile_bound],
+                y=[baseline.cost, by_hand.cost],
+            ),
+        ),
+        vertical=((results.requirement.limit, f"limit {results.requirement.limit:g}″"),),
+    )  # fmt: skip
+
+
+def _curves(results: StudyResults) -> Figure:
+    return Figure(
+        name="transmission_error",
+        title=f"Transmission error over one output turn at {results.torque:g} N·m",
+        x_label="carrier angle [°]",
+        y_label="transmission error, output side [arcsec]",
+        series=tuple(
+            Series(
+                label=example.label,
+                kind="line",
+                x=list(example.curves.carrier_angle / DEGREE),
+                y=list(example.curves.transmission_error[0] / ARCSECOND),
+            )
+            for example in results.examples
+        ),
+    )
+
+
+def _orders(results: StudyResults) -> Figure:
+    frame = tables.orders(results)
+    return Figure(
+        name="orders",
+        title=(
+            f"Orders of the transmission error; multiples of {results.reducer.cycloid_stage.disc_teeth} stand still with "
+            f"the housing, of {results.reducer.cycloid_stage.pin_count} turn with disc or carrier"
+        ),
+        x_label="order of the output turn [-]",
+        y_label="amplitude, output side [arcsec]",
+        series=tuple(
+            Series(
+                label=example.label,
+                kind="stems",
+                x=list(frame["order of the output turn [-]"]),
+                y=list(frame[f"{example.label} [arcsec]"]),
+            )
+            for example in results.examples
+        ),
+    )

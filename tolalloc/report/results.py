@@ -1,0 +1,132 @@
+"""Everything a report is made of: one finished study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.verification import Requirement
+from tolalloc.equivalent.outputs import Orders
+from tolalloc.equivalent.transmission_error import Curves
+from tolalloc.reducer.design import Reducer
+from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.sensitivity.classical import ClassicalEstimate
+from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.surrogate.regression import Surrogate
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExampleUnit:
+    """One unit whose curve the report shows.
+
+    Parameters
+    ----------
+    label
+        What it is.
+    curves
+        Its transmission error over one turn.
+    orders
+        Orders of that curve.
+    """
+
+    label: str
+    curves: Curves
+    orders: Orders
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyResults:
+    """A finished study.
+
+    Parameters
+    ----------
+    name, seed, quick
+        Which study, its seed, and whether it was shortened.
+    reducer, torque
+        The reducer with the stiffness that was used, and the torque on its carrier [N·m].
+    identified
+        Identified stiffnesses that replaced the reducer's own, if any.
+    torsional_stiffness
+        Of the perfect reducer between test and rated torque [N·m/arcmin].
+    space, requirement
+        Design variables and the requirement.
+    sobol, classical
+        Ranking at the zones of the tolerance table, and the hand estimate beside it.
+    unit_surrogate
+        Stand-in for single units, with its Q²; the kernel ran for the ranking unless it earned its place.
+    allocation
+        What the search found.
+    examples
+        Units whose curves are shown.
+    statuses
+        Outcome → number of units, over the whole study [-].
+    """
+
+    name: str
+    seed: int
+    quick: bool
+    reducer: Reducer
+    torque: float
+    identified: IdentifiedStiffness | None
+    torsional_stiffness: float
+    space: DesignSpace
+    requirement: Requirement
+    sobol: SobolIndices
+    classical: ClassicalEstimate
+    unit_surrogate: Surrogate
+    allocation: Allocation
+    examples: tuple[ExampleUnit, ...]
+    statuses: dict[str, int]
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Everything in the answer that no source prints."""
+        clearances = self.space.clearances
+        return (
+            *self.reducer.assumptions,
+            "liu2020 prints magnitudes and angles of errors but not their zero directions and signs; the reading is that "
+            "of the unit file and the theory page",
+            "each zone is taken at the magnitude that liu2020, Table 4, measured on one unit; the zones of the shipped "
+            "table are not a maker's drawing",
+            "distributions, Cp = 1 and independence of the sources: no source prints them; the list below maps each zone",
+            "costs, their fall as 1/zone, and smallest and largest zones: no source prints them",
+            "tooth modification costs nothing and is exact; nominal clearance "
+            f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
+            f"{clearances.radial[0] * 1e6:g}…{clearances.radial[1] * 1e6:g} µm at tip and root",
+            "pins share one diameter deviation, grooves share one radius deviation; single pins do not scatter",
+            "bearing clearance, tilt and errors of the first stage are left out",
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on the answer."""
+        chosen, limit = self.allocation.chosen, self.requirement.limit
+        found = []
+        if self.quick:
+            found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
+        if not chosen.met:
+            found.append(
+                f"No design was verified to meet the limit of {limit:g}″ at {self.requirement.target:.2%} yield; the "
+                f"least violating one keeps {chosen.quantile_bound:.1f}″. The peak-to-peak limit is what blocks."
+            )
+        if not self.allocation.by_hand.met:
+            found.append("Uniform scaling was not verified to meet the limit, so the saving is against a miss.")
+        if not self.unit_surrogate.earns_its_place:
+            found.append(
+                f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, below "
+                f"0.95: it was not used, and the ranking ran on the real model."
+            )
+        if self.sobol.dropped:
+            found.append(f"{self.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")
+        failed = sum(count for outcome, count in self.statuses.items() if outcome != "equilibrium found")
+        if failed:
+            found.append(f"{failed} units have no equilibrium; they count as outside the limit.")
+        for group, scale, low, high in zip(
+            self.space.groups, chosen.design, self.space.lower, self.space.upper, strict=False
+        ):
+            if scale < low * 1.001 or scale > high * 0.999:
+                found.append(
+                    f"{group}: the zone stands on its {'smallest' if scale < low * 1.001 else 'largest'} allowed value."
+                )
+        return tuple(found)

@@ -1,0 +1,189 @@
+"""The tables of a study, as frames with a unit in every header."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.report.results import StudyResults
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_table import with_zones
+from tolalloc.units import MICROMETRE
+
+
+def ranking(results: StudyResults) -> pd.DataFrame:
+    """Return the sources, largest total Sobol index first, with intervals and the hand estimate beside them."""
+    sobol, classical = results.sobol, results.classical
+    baseline = results.allocation.baseline
+    share = sobol.total / sobol.total.sum() * 100
+    first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
+    among = sobol.among_first(3)
+    rows = [
+        {
+            "rank [-]": place + 1,
+            "source": sobol.sources[at],
+            "contribution [%]": share[at],
+            "cumulative [%]": share[sobol.order[: place + 1]].sum(),
+            "total index ST [-]": sobol.total[at],
+            "ST low 5 % [-]": total[0, at],
+            "ST high 95 % [-]": total[1, at],
+            "first index S1 [-]": sobol.first[at],
+            "S1 low 5 % [-]": first[0, at],
+            "S1 high 95 % [-]": first[1, at],
+            "S1 reading": "indistinguishable from 0" if first[0, at] <= 0 else "above 0",
+            "rank low 5 % [-]": rank[0, at],
+            "rank high 95 % [-]": rank[1, at],
+            "P(among first 3) [%]": among[at] * 100,
+            "zone [µm]": results.space.errors.zones[at] / MICROMETRE,
+            "Sens of the quantile [arcsec/µm]": baseline.by_zone[at] * MICROMETRE,
+            "alone at its limit [arcsec]": classical.alone[at],
+        }
+        for place, at in enumerate(sobol.order)
+    ]
+    return pd.DataFrame(rows)
+
+
+def allocated_sources(results: StudyResults) -> tuple[Source, ...]:
+    """Return all sources of the tolerance table at the chosen zones."""
+    errors = results.space.errors
+    chosen = results.space.zones(results.allocation.chosen.design)
+    zones = dict(zip((source.name for source in errors.active), chosen, strict=True))
+    return with_zones(errors.sources, [zones.get(source.name, source.zone) for source in errors.sources])
+
+
+def before_after(results: StudyResults) -> pd.DataFrame:
+    """Return the drawing table: zone and cost of every source before and after, and the two modification amounts."""
+    space, chosen = results.space, results.allocation.chosen
+    after = {source.name: source for source in allocated_sources(results)}
+    index = {name: at for at, name in enumerate(results.sobol.sources)}
+    share = results.sobol.total / results.sobol.total.sum() * 100
+    active = {source.name: at for at, source in enumerate(space.errors.active)}
+    rows = []
+    for source in space.errors.sources:
+        new = after[source.name]
+        rows.append(
+            {
+                "source": source.name,
+                "part": source.part,
+                "callout": source.feature.value,
+                "group": source.group,
+                "zone before [µm]": source.zone / MICROMETRE,
+                "zone after [µm]": new.zone / MICROMETRE,
+                "change [%]": (new.zone / source.zone - 1) * 100 if source.zone else 0.0,
+                "contribution before [%]": share[index[source.name]] if source.name in index else 0.0,
+                "cost before [cost units]": source.cost,
+                "cost after [cost units]": new.cost,
+                "Sens after [arcsec/µm]": (
+                    chosen.by_zone[active[source.name]] * MICROMETRE if source.name in active else 0.0
+                ),
+                "locked": "yes" if source.locked else "no",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def modification(results: StudyResults) -> pd.DataFrame:
+    """Return the modification amounts and the clearances they leave, before and after."""
+    stage = results.reducer.cycloid_stage
+    before, after = results.reducer.modification, results.space.modification(results.allocation.chosen.design)
+    rows = [
+        ("equidistant Δr_rp [µm]", before.equidistant, after.equidistant),
+        ("shift Δr_p [µm]", before.shift, after.shift),
+        ("flank clearance, smallest nominal gap [µm]", before.flank_clearance(stage), after.flank_clearance(stage)),
+        ("radial clearance at tip and root [µm]", before.radial_clearance, after.radial_clearance),
+    ]
+    return pd.DataFrame(
+        [{"amount": name, "before": old / MICROMETRE, "after": new / MICROMETRE} for name, old, new in rows]
+    )
+
+
+def _statistics(label: str, design: VerifiedDesign, limit: float) -> dict[str, object]:
+    """Return what a capability sheet says of one design."""
+    values, achieved = design.sample.values, design.achieved
+    mean, sigma = float(values.mean()), float(values.std(ddof=1))
+    return {
+        "design": label,
+        "Cost [cost units]": design.cost,
+        "Mean [arcsec]": mean,
+        "Sigma [arcsec]": sigma,
+        "Min [arcsec]": float(values.min()),
+        "Max [arcsec]": float(values.max()),
+        "USL [arcsec]": limit,
+        "Cpk [-]": (limit - mean) / (3 * sigma),
+        "Yield [%]": achieved.estimate * 100,
+        "Yield low 95 % [%]": achieved.low * 100,
+        "Yield high 95 % [%]": achieved.high * 100,
+        "% out [%]": (1 - achieved.estimate) * 100,
+        "PPM [1e-6]": (1 - achieved.estimate) * 1e6,
+        "kept at the target yield [arcsec]": design.quantile_bound,
+        "Units [-]": achieved.units,
+        "OK": "yes" if design.met else "no",
+    }
+
+
+def capability(results: StudyResults) -> pd.DataFrame:
+    """Return baseline, scaling by hand and chosen design side by side, each on its own fresh units."""
+    allocation, limit = results.allocation, results.requirement.limit
+    return pd.DataFrame(
+        [
+            _statistics("tolerance table as it is", allocation.baseline, limit),
+            _statistics("all zones scaled alike", allocation.by_hand, limit),
+            _statistics("allocated", allocation.chosen, limit),
+        ]
+    )
+
+
+def stack_up(results: StudyResults) -> pd.DataFrame:
+    """Return worst case, root-sum-square and Monte Carlo at the zones of the tolerance table."""
+    baseline = results.allocation.baseline.sample
+    target = results.requirement.target
+    rows = [
+        ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
+        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted"),
+        ("Monte Carlo mean", float(baseline.values.mean()), "real model, all errors together"),
+        (f"Monte Carlo {target:.2%} quantile", baseline.quantile(target), "real model, all errors together"),
+    ]
+    return pd.DataFrame(rows, columns=["estimate", "peak-to-peak [arcsec]", "assumes"])
+
+
+def verified(results: StudyResults) -> pd.DataFrame:
+    """Return every design that the search verified, in order."""
+    allocation = results.allocation
+    rows = []
+    for design in (allocation.baseline, allocation.by_hand, *allocation.tried):
+        row: dict[str, object] = {
+            "design": design.name,
+            "cost [cost units]": design.cost,
+            "yield [%]": design.achieved.estimate * 100,
+            "kept at the target yield [arcsec]": design.quantile_bound,
+            "met": "yes" if design.met else "no",
+        }
+        rows.append(row | dict(zip(results.space.columns, design.design, strict=True)))
+    return pd.DataFrame(rows).drop_duplicates("design")
+
+
+def pareto(results: StudyResults) -> pd.DataFrame:
+    """Return the Pareto front: cost, quantile told and checked, and the design."""
+    front = results.allocation.front
+    frame = pd.DataFrame(front.designs, columns=list(results.space.columns))
+    frame.insert(0, "quantile on the kernel [arcsec]", front.on_kernel)
+    frame.insert(0, "quantile on the surrogate [arcsec]", front.quantile)
+    frame.insert(0, "cost [cost units]", front.cost)
+    return frame
+
+
+def mappings(results: StudyResults) -> pd.DataFrame:
+    """Return how every zone became a distribution."""
+    return pd.DataFrame(
+        [{"source": source.name, "zone → distribution": source.mapping} for source in results.space.errors.active]
+    )
+
+
+def orders(results: StudyResults, largest: int = 130) -> pd.DataFrame:
+    """Return the amplitude of every order of the shown units."""
+    spectra = [example.orders for example in results.examples]
+    frame = pd.DataFrame({"order of the output turn [-]": spectra[0].order[:largest]})
+    for example, spectrum in zip(results.examples, spectra, strict=True):
+        frame[f"{example.label} [arcsec]"] = spectrum.amplitude[0, :largest] * (180 * 3600 / np.pi)
+    return frame

@@ -1,0 +1,209 @@
+"""What a user asks for: one study, checked as a whole before anything long runs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
+from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.search import SearchEffort
+from tolalloc.allocation.verification import Requirement
+from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.exceptions import InputError
+from tolalloc.reducer.design import Reducer
+from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.response.kernel import MODIFICATION, KernelResponse
+from tolalloc.sensitivity.monte_carlo import allowed_rejections
+from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
+from tolalloc.units import MICROMETRE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much a study may compute.
+
+    Parameters
+    ----------
+    verification_units
+        Fresh units per verified design [-].
+    sobol_blocks
+        Blocks of the Sobol analysis, a power of two [-].
+    shared_units
+        Common random units of the quantile surrogate [-].
+    search
+        Effort of the search.
+    """
+
+    verification_units: int = 6144
+    sobol_blocks: int = 512
+    shared_units: int = 256
+    search: SearchEffort = field(default_factory=SearchEffort)
+
+
+QUICK = Effort(
+    verification_units=1536,
+    sobol_blocks=32,
+    shared_units=64,
+    search=SearchEffort(
+        steps=3, front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=24, rounds=1, points=6)
+    ),
+)
+"""Effort of a quick run: every stage is real, every interval wide."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A study.
+
+    Parameters
+    ----------
+    name
+        Name of the study and of its run folder.
+    reducer, tolerances
+        Shipped names or paths of the user's files.
+    unit
+        A built unit whose curve is shown, by shipped name or path; none if empty.
+    stiffness
+        Identified stiffnesses that replace the reducer's, by shipped name or path; none if empty.
+    limit_arcsec
+        Largest peak-to-peak allowed, output side, one turn [arcsec].
+    yield_target
+        Share of units that must keep it [-].
+    torque_nm
+        Torque on the carrier, negative against the rotation; the reducer's test torque unless given [N·m].
+    flank_clearance_um, radial_clearance_um
+        Smallest and largest nominal clearance that the modification may leave [µm].
+    seed
+        Seed of every random number [-].
+    effort
+        How much may be computed.
+    """
+
+    name: str
+    reducer: str | Path = "rv20e"
+    tolerances: str | Path = "rv20e_baseline"
+    unit: str | Path = ""
+    stiffness: str | Path = ""
+    limit_arcsec: float = 60.0
+    yield_target: float = 0.9973
+    torque_nm: float | None = None
+    flank_clearance_um: tuple[float, float] = (1.0, 5.0)
+    radial_clearance_um: tuple[float, float] = (5.0, 20.0)
+    seed: int = 1
+    effort: Effort = field(default_factory=Effort)
+
+    def __post_init__(self) -> None:
+        place = f"study {self.name}"
+        for name, value, good, allowed in (
+            ("limit_arcsec", self.limit_arcsec, 0 < self.limit_arcsec <= 3600, "above 0 up to 3600"),
+            ("yield_target", self.yield_target, 0.5 <= self.yield_target < 1, "0.5 up to but not 1"),
+            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
+        ):
+            if not good:
+                raise InputError.at(place, name, value, allowed)
+        for name, (low, high) in (
+            ("flank_clearance_um", self.flank_clearance_um),
+            ("radial_clearance_um", self.radial_clearance_um),
+        ):
+            if not -50 <= low <= high <= 50:
+                raise InputError.at(place, name, (low, high), "two numbers from -50 to 50, the smaller one first")
+        blocks = self.effort.sobol_blocks
+        if blocks < 2 or blocks & (blocks - 1):
+            raise InputError.at(place, "effort.sobol_blocks", blocks, "a power of two, 2 or more")
+        units = self.effort.verification_units
+        if allowed_rejections(units, self.yield_target) < 0:
+            raise InputError.at(
+                place,
+                "effort.verification_units",
+                units,
+                f"enough to show a yield of {self.yield_target:.4%} with 95 % confidence, "
+                f"{_units_needed(self.yield_target)} or more",
+            )
+
+    @property
+    def hash(self) -> str:
+        """Digest of the study's own fields, the names of its files included but not their content."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _units_needed(target: float) -> int:
+    """Return the smallest sample without a rejection that shows the target with 95 % confidence."""
+    units = 1
+    while allowed_rejections(units, target) < 0:
+        units *= 2
+    return units
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """A study with all its files read and all names matched.
+
+    Parameters
+    ----------
+    study
+        What was asked for.
+    reducer, identified
+        The reducer with the stiffness in use, and the identified values if any.
+    unit
+        Built unit to show, if any.
+    space, requirement
+        Design variables and the requirement.
+    kernel
+        The real model at the reducer's own modification.
+    """
+
+    study: Study
+    reducer: Reducer
+    identified: IdentifiedStiffness | None
+    unit: BuiltUnit | None
+    space: DesignSpace
+    requirement: Requirement
+    kernel: KernelResponse
+
+
+def prepare(study: Study) -> Prepared:
+    """Read and check everything a study needs; nothing is solved and nothing is written.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, field and value that are not allowed.
+    """
+    reducer = load_reducer(study.reducer)
+    identified = load_identified_stiffness(study.stiffness) if study.stiffness else None
+    if identified:
+        reducer = with_stiffness(reducer, identified)
+    errors = ErrorModel(load_tolerance_table(study.tolerances))
+    model = EquivalentModel(reducer)
+    amounts = (reducer.modification.equidistant, reducer.modification.shift)
+    fixed: Mapping[str, float] = {**errors.still, **dict(zip(MODIFICATION, amounts, strict=True))}
+    kernel = KernelResponse(
+        model=model,
+        torque=reducer.load.test_torque if study.torque_nm is None else study.torque_nm,
+        columns=errors.columns,
+        fixed=fixed,
+    )
+    unit = load_unit(study.unit) if study.unit else None
+    if unit:
+        unit.errors(model.columns)
+    flank, radial = (
+        (low * MICROMETRE, high * MICROMETRE) for low, high in (study.flank_clearance_um, study.radial_clearance_um)
+    )
+    return Prepared(
+        study=study,
+        reducer=reducer,
+        identified=identified,
+        unit=unit,
+        space=DesignSpace(
+            errors=errors, stage=reducer.cycloid_stage, clearances=ClearanceRange(flank=flank, radial=radial)
+        ),
+        requirement=Requirement(limit=study.limit_arcsec, target=study.yield_target),
+        kernel=kernel,
+    )

@@ -1,0 +1,121 @@
+"""The run folder: made only where nothing can be lost, filled once the study is finished."""
+
+from __future__ import annotations
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from tolalloc.equivalent.transmission_error import AngleSearch
+from tolalloc.exceptions import RunFolderError
+from tolalloc.report import tables
+from tolalloc.report.excel import write_workbook
+from tolalloc.report.figure import save_png
+from tolalloc.report.figures import study_figures
+from tolalloc.report.page import write_page
+from tolalloc.report.results import StudyResults
+from tolalloc.study.definition import Study
+from tolalloc.study.stages import Record
+from tolalloc.uncertainty.tolerance_table import table_frame
+
+_LIBRARIES = ("numpy", "scipy", "numba", "cvxpy", "clarabel", "pymoo", "SALib", "pandas", "scikit-learn")
+
+
+def require_usable(folder: Path) -> None:
+    """Raise unless the folder is new or empty.
+
+    Raises
+    ------
+    RunFolderError
+        Something is in the way.
+    """
+    if folder.is_file():
+        raise RunFolderError(f"{folder}: is a file; the run needs a folder that is new or empty (--out).")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise RunFolderError(
+            f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), so that nothing is overwritten."
+        )
+
+
+def manifest(study: Study, results: StudyResults, record: Record) -> dict[str, Any]:
+    """Return what is needed to repeat the run and to trust it."""
+    search = AngleSearch()
+    return {
+        "study": study.name,
+        "study hash": study.hash,
+        "seed": study.seed,
+        "quick": results.quick,
+        "versions": {"tolalloc": version("tolalloc"), "python": platform.python_version()}
+        | {name: version(name) for name in _LIBRARIES},
+        "threads": numba.get_num_threads(),
+        "angles": {
+            "coarse [-]": search.coarse,
+            "tabulated per coarse [-]": search.nodes_per_coarse,
+            "halvings [-]": search.levels,
+            "accuracy": "peak-to-peak within 0.05 arcsec of the finest search for 99 % of random RV-20E units",
+        },
+        "statuses": record.counts,
+        "stages": record.stages,
+    }
+
+
+def summary(results: StudyResults) -> dict[str, Any]:
+    """Return the answer in a few numbers."""
+    allocation, ranked = results.allocation, tables.ranking(results)
+    chosen, surrogate = allocation.chosen, allocation.surrogate
+    return {
+        "reducer": results.reducer.name,
+        "torque [N·m]": results.torque,
+        "limit [arcsec]": results.requirement.limit,
+        "yield target [-]": results.requirement.target,
+        "met": chosen.met,
+        "yield [-]": chosen.achieved.estimate,
+        "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],
+        "yield lower bound, one-sided 95 % [-]": chosen.achieved.bound,
+        "kept at the target yield [arcsec]": chosen.quantile_bound,
+        "cost [cost units]": chosen.cost,
+        "cost of uniform scaling [cost units]": allocation.by_hand.cost,
+        "yield of uniform scaling [-]": allocation.by_hand.achieved.estimate,
+        "uniform scaling met": allocation.by_hand.met,
+        "saving [-]": allocation.saving,
+        "cost bound of the convex model [cost units]": allocation.bound,
+        "optimality gap [-]": allocation.gap,
+        "baseline yield [-]": allocation.baseline.achieved.estimate,
+        "first sources": list(ranked["source"].head(5)),
+        "design surrogate Q2 [-]": surrogate.q2,
+        "design surrogate used": surrogate.earns_its_place,
+        "unit surrogate Q2 [-]": results.unit_surrogate.q2,
+        "unit surrogate used": False,
+        "torsional stiffness of the perfect reducer [N·m/arcmin]": results.torsional_stiffness,
+        "warnings": list(results.warnings),
+    }
+
+
+def write_json(content: dict[str, Any], path: Path) -> None:
+    """Write a JSON file."""
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def write_run(folder: Path, study: Study, results: StudyResults, record: Record) -> None:
+    """Write all files of a finished study.
+
+    Raises
+    ------
+    RunFolderError
+        The folder is no longer empty.
+    """
+    require_usable(folder)
+    (folder / "figures").mkdir(parents=True)
+    write_json(manifest(study, results, record), folder / "manifest.json")
+    write_json(summary(results), folder / "summary.json")
+    tables.ranking(results).to_csv(folder / "sensitivity.csv", index=False)
+    table_frame(tables.allocated_sources(results)).to_csv(folder / "allocation.csv", index=False)
+    tables.pareto(results).to_csv(folder / "pareto.csv", index=False)
+    write_workbook(results, folder / "results.xlsx")
+    for figure in study_figures(results):
+        save_png(figure, folder / "figures" / f"{figure.name}.png")
+    write_page(results, folder / "report.html")

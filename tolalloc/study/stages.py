@@ -1,0 +1,170 @@
+"""The stages of a study, in order."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.allocation.search import allocate, require_reachable
+from tolalloc.allocation.verification import Verifier
+from tolalloc.equivalent.outputs import order_spectrum, torsional_stiffness
+from tolalloc.equivalent.status import Status
+from tolalloc.report.results import ExampleUnit, StudyResults
+from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.sensitivity.classical import classical_estimate
+from tolalloc.sensitivity.monte_carlo import MonteCarlo
+from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.study.definition import Prepared
+from tolalloc.surrogate.regression import Surrogate, fit_surrogate, quadratic_regression
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.units import ARCMINUTE
+
+_FIRST_SPREAD = 3.1
+"""Distance of the 99.73 % quantile from the mean over σ, until a large sample has said better [-]."""
+
+
+class Progress(Protocol):
+    """What shows a person how far the work has come."""
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage."""
+        ...
+
+    def advance(self, units: int) -> None:
+        """So many more units are solved."""
+        ...
+
+
+@dataclass
+class Record:
+    """What the manifest says of the run itself: statuses and times per stage.
+
+    Parameters
+    ----------
+    progress
+        Told of every stage and every chunk of units.
+    """
+
+    progress: Progress
+    statuses: Counter[int] = field(default_factory=Counter)
+    stages: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage and count its units."""
+        self.progress.begin(name)
+        units, start = sum(self.statuses.values()), time.perf_counter()
+        yield
+        seconds, solved = time.perf_counter() - start, sum(self.statuses.values()) - units
+        self.stages[name] = {"seconds": round(seconds, 3), "units": solved, "units per second": round(solved / seconds, 1)}
+
+    def observe(self, status: UInt8[np.ndarray, " sample"]) -> None:
+        """Count the statuses of one chunk."""
+        self.statuses.update(int(value) for value in status)
+        self.progress.advance(status.size)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Outcome → number of units."""
+        return {status.sentence: self.statuses[int(status)] for status in Status}
+
+
+def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
+    """Return the results of a study; nothing is written.
+
+    Parameters
+    ----------
+    prepared
+        The checked study.
+    record
+        Keeps statuses and times.
+    quick
+        Whether the effort was shortened, for the report to say so.
+
+    Raises
+    ------
+    InputError
+        The limit is below what the smallest zones leave.
+    SolveError
+        Too many units failed.
+    """
+    study, space, requirement = prepared.study, prepared.space, prepared.requirement
+    seeds, kernel = SeedTree(study.seed), replace(prepared.kernel, observe=record.observe)
+    shared = next(seeds.child("shared").uniform_chunks(study.effort.shared_units, len(space.errors.columns)))
+    quantile = QuantileResponse(
+        space=space, kernel=kernel, standard=space.errors.standard_values(shared), spread=_FIRST_SPREAD
+    )
+    with record.stage("is the limit in reach"):
+        require_reachable(quantile, requirement, f"study {study.name}")
+    with record.stage("ranking"):
+        sobol = sobol_indices(kernel, space.errors, space.errors.zones, seeds.child("sobol"), study.effort.sobol_blocks)
+        classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
+    with record.stage("allocation"):
+        verifier = Verifier(
+            space=space,
+            kernel=kernel,
+            requirement=requirement,
+            seeds=seeds.child("verification"),
+            units=study.effort.verification_units,
+        )
+        allocation = allocate(
+            quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
+        )
+    with record.stage("report"):
+        return StudyResults(
+            name=study.name,
+            seed=study.seed,
+            quick=quick,
+            reducer=prepared.reducer,
+            torque=kernel.torque,
+            identified=prepared.identified,
+            torsional_stiffness=_torsional_stiffness(prepared),
+            space=space,
+            requirement=requirement,
+            sobol=sobol,
+            classical=classical,
+            unit_surrogate=_unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size),
+            allocation=allocation,
+            examples=_examples(prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design),
+            statuses=record.counts,
+        )
+
+
+def _torsional_stiffness(prepared: Prepared) -> float:
+    """Return the torsional stiffness of the perfect reducer between test and rated torque [N·m/arcmin]."""
+    model, load = prepared.kernel.model, prepared.reducer.load
+    perfect = np.zeros((1, len(model.columns)))
+    return float(torsional_stiffness(model, perfect, -0.03 * load.rated_torque, -load.rated_torque)[0] * ARCMINUTE)
+
+
+def _unit_surrogate(kernel: KernelResponse, sample: MonteCarlo, sources: int) -> Surrogate:
+    """Return the quadratic stand-in for single units, judged on a fifth of the baseline's units."""
+    good = sample.evaluation.good
+    x, y = sample.x[good][: 200 * sources], sample.evaluation.values[good, 0][: 200 * sources]
+    return fit_surrogate(quadratic_regression(), kernel.columns, PEAK_TO_PEAK, x, y, held_out=y.size // 5)
+
+
+def _examples(
+    prepared: Prepared, baseline: MonteCarlo, chosen: MonteCarlo, design: Float[np.ndarray, " variable"]
+) -> tuple[ExampleUnit, ...]:
+    """Return the curves of the built unit, if any, and of the median units before and after."""
+    kernel, after = prepared.kernel, prepared.kernel.with_modification(prepared.space.modification(design))
+    rows = [
+        ("median unit before", kernel.errors(baseline.unit_at(0.5))),
+        ("median unit after", after.errors(chosen.unit_at(0.5))),
+    ]
+    if prepared.unit:
+        rows.insert(0, (f"unit {prepared.unit.name}", prepared.unit.errors(kernel.model.columns)))
+    curves = [(label, kernel.model.curves(errors, kernel.torque)) for label, errors in rows]
+    return tuple(
+        ExampleUnit(label=label, curves=curve, orders=order_spectrum(curve.transmission_error))
+        for label, curve in curves
+    )
