@@ -39,5 +39,5 @@ def write_workbook(results: StudyResults, path: Path) -> None:
                 cell = sheet.cell(1, number)
                 cell.font, cell.alignment = Font(bold=True), Alignment(wrap_text=True, vertical="top")
                 for row in range(2, len(frame) + 2):
-                    if isinstance(frame.iat[row - 2, number - 1], float):
+                    if isinstance(frame.iloc[row - 2, number - 1], float):
                         sheet.cell(row, number).number_format = "0.0###"

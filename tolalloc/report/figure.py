@@ -138,9 +138,7 @@ def as_html(figure: Figure) -> str:
                     "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
                     "color": "#444444",
                 }
-            canvas.add_bar(
-                y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=interval
-            )
+            canvas.add_bar(y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=interval)
     for value, name in figure.vertical:
         canvas.add_vline(x=value, line_dash="dash", line_color="#b00020", annotation_text=name)
     for value, name in figure.horizontal:

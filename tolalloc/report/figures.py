@@ -83,7 +83,12 @@ def _pareto(results: StudyResults) -> Figure:
         y_label="cost [cost units]",
         series=(
             Series(label="front (NSGA-II)", kind="line", x=list(front.quantile), y=list(front.cost)),
-            Series(label="front on the kernel", kind="points", x=list(front.on_kernel[checked]), y=list(front.cost[checked])),
+            Series(
+                label="front on the kernel",
+                kind="points",
+                x=list(front.on_kernel[checked]),
+                y=list(front.cost[checked]),
+            ),
             Series(label="allocated, verified", kind="points", x=[chosen.quantile_bound], y=[chosen.cost]),
             Series(
                 label="table as it is; scaled alike",
@@ -93,7 +98,7 @@ def _pareto(results: StudyResults) -> Figure:
             ),
         ),
         vertical=((results.requirement.limit, f"limit {results.requirement.limit:g}″"),),
-    )  # fmt: skip
+    )
 
 
 def _curves(results: StudyResults) -> Figure:
@@ -119,8 +124,8 @@ def _orders(results: StudyResults) -> Figure:
     return Figure(
         name="orders",
         title=(
-            f"Orders of the transmission error; multiples of {results.reducer.cycloid_stage.disc_teeth} stand still with "
-            f"the housing, of {results.reducer.cycloid_stage.pin_count} turn with disc or carrier"
+            f"Orders of the transmission error; multiples of {results.reducer.cycloid_stage.disc_teeth} stand still "
+            f"with the housing, of {results.reducer.cycloid_stage.pin_count} turn with disc or carrier"
         ),
         x_label="order of the output turn [-]",
         y_label="amplitude, output side [arcsec]",

@@ -34,14 +34,16 @@ _RANKING_COLUMNS = (
 def _number(value: object) -> str:
     """Return a cell as text with four significant digits at most."""
     if isinstance(value, float):
-        return "" if pd.isna(value) else f"{value:.4g}"
+        if pd.isna(value):
+            return ""
+        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
     return str(value)
 
 
 def _table(frame: pd.DataFrame) -> Markup:
     """Return a frame as an HTML table."""
     text = frame.map(_number)
-    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))  # noqa: S704
+    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))
 
 
 def write_page(results: StudyResults, path: Path) -> None:
@@ -53,11 +55,8 @@ def write_page(results: StudyResults, path: Path) -> None:
     content: dict[str, Any] = {
         "results": results,
         "allocation": results.allocation,
-        "plotly": Markup(get_plotlyjs()),  # noqa: S704
-        "figures": {
-            figure.name: (figure.title, Markup(as_html(figure)))  # noqa: S704
-            for figure in study_figures(results)
-        },
+        "plotly": Markup(get_plotlyjs()),
+        "figures": {figure.name: (figure.title, Markup(as_html(figure))) for figure in study_figures(results)},
         "first": ranked.iloc[0],
         "ninety": int((ranked["cumulative [%]"] < 90).sum()) + 1,
         "ranking": _table(ranked[list(_RANKING_COLUMNS)]),

@@ -13,7 +13,7 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol import SobolIndices
-from tolalloc.surrogate.regression import Surrogate
+from tolalloc.surrogate.regression import NEEDED_Q2, Surrogate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +85,8 @@ class StudyResults:
         clearances = self.space.clearances
         return (
             *self.reducer.assumptions,
-            "liu2020 prints magnitudes and angles of errors but not their zero directions and signs; the reading is that "
-            "of the unit file and the theory page",
+            "liu2020 prints magnitudes and angles of errors but not their zero directions and signs; the reading is "
+            "that of the unit file and the theory page",
             "each zone is taken at the magnitude that liu2020, Table 4, measured on one unit; the zones of the shipped "
             "table are not a maker's drawing",
             "distributions, Cp = 1 and independence of the sources: no source prints them; the list below maps each zone",
@@ -107,15 +107,15 @@ class StudyResults:
             found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
         if not chosen.met:
             found.append(
-                f"No design was verified to meet the limit of {limit:g}″ at {self.requirement.target:.2%} yield; the "
-                f"least violating one keeps {chosen.quantile_bound:.1f}″. The peak-to-peak limit is what blocks."
+                f"No design was verified to meet the limit of {limit:g}″ at {self.requirement.target:.2%} yield; "
+                f"the least violating one keeps {chosen.quantile_bound:.1f}″. The peak-to-peak limit is what blocks."
             )
         if not self.allocation.by_hand.met:
             found.append("Uniform scaling was not verified to meet the limit, so the saving is against a miss.")
         if not self.unit_surrogate.earns_its_place:
             found.append(
-                f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, below "
-                f"0.95: it was not used, and the ranking ran on the real model."
+                f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, "
+                f"below {NEEDED_Q2}: it was not used, and the ranking ran on the real model."
             )
         if self.sobol.dropped:
             found.append(f"{self.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")

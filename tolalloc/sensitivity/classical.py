@@ -13,7 +13,7 @@ from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.zones import at_limit
 
-DIRECTIONS = 24
+DIRECTIONS = 16
 
 
 @dataclass(frozen=True, kw_only=True)

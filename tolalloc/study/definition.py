@@ -48,11 +48,12 @@ class Effort:
 
 
 QUICK = Effort(
-    verification_units=1536,
+    verification_units=1152,
     sobol_blocks=32,
     shared_units=64,
     search=SearchEffort(
-        steps=3, front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=24, rounds=1, points=6)
+        steps=3,
+        front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
     ),
 )
 """Effort of a quick run: every stage is real, every interval wide."""

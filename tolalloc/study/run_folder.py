@@ -37,7 +37,8 @@ def require_usable(folder: Path) -> None:
         raise RunFolderError(f"{folder}: is a file; the run needs a folder that is new or empty (--out).")
     if folder.is_dir() and any(folder.iterdir()):
         raise RunFolderError(
-            f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), so that nothing is overwritten."
+            f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), "
+            "so that nothing is overwritten."
         )
 
 
@@ -82,6 +83,7 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "yield of uniform scaling [-]": allocation.by_hand.achieved.estimate,
         "uniform scaling met": allocation.by_hand.met,
         "saving [-]": allocation.saving,
+        "saving if uniform scaling used the whole limit [-]": allocation.saving_at_least,
         "cost bound of the convex model [cost units]": allocation.bound,
         "optimality gap [-]": allocation.gap,
         "baseline yield [-]": allocation.baseline.achieved.estimate,

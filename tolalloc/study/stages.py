@@ -64,7 +64,11 @@ class Record:
         units, start = sum(self.statuses.values()), time.perf_counter()
         yield
         seconds, solved = time.perf_counter() - start, sum(self.statuses.values()) - units
-        self.stages[name] = {"seconds": round(seconds, 3), "units": solved, "units per second": round(solved / seconds, 1)}
+        self.stages[name] = {
+            "seconds": round(seconds, 3),
+            "units": solved,
+            "units per second": round(solved / seconds, 1),
+        }
 
     def observe(self, status: UInt8[np.ndarray, " sample"]) -> None:
         """Count the statuses of one chunk."""
@@ -133,7 +137,9 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             classical=classical,
             unit_surrogate=_unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size),
             allocation=allocation,
-            examples=_examples(prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design),
+            examples=_examples(
+                prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design
+            ),
             statuses=record.counts,
         )
 

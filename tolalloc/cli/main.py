@@ -1,0 +1,135 @@
+"""The command line: ``tolalloc run``, ``tolalloc check``, ``tolalloc te``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import UnitProgress, messages, screen
+from tolalloc.cli.study_script import load_study
+from tolalloc.cli.transmission_error import as_table, unit_answer
+from tolalloc.exceptions import TolallocError
+from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.study.definition import Study, prepare
+from tolalloc.study.run import run_study
+from tolalloc.study.run_folder import summary
+from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.units import MICROMETRE
+
+app = typer.Typer(
+    help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
+
+
+@app.command()
+def run(
+    script: Script,
+    quick: Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a study and write its report."""
+    study = load_study(script)
+    _run(study if seed is None else replace(study, seed=seed), quick, out, as_json)
+
+
+def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
+    folder = out or Path("runs") / study.name
+    with UnitProgress() as progress:
+        results = run_study(study, folder, progress, quick=quick)
+    if as_json:
+        sys.stdout.write(json.dumps({"folder": str(folder), **summary(results)}, ensure_ascii=False, indent=2) + "\n")
+        return
+    allocation, limit = results.allocation, results.requirement.limit
+    chosen = allocation.chosen
+    screen.print(
+        f"{'Met' if chosen.met else 'NOT met'}: {chosen.achieved.estimate:.2%} of {chosen.achieved.units} fresh units "
+        f"keep {limit:g}″ (95 % interval {chosen.achieved.low:.2%}…{chosen.achieved.high:.2%})."
+    )
+    screen.print(
+        f"Cost {chosen.cost:.2f} cost units, {allocation.saving:.1%} below all zones scaled alike "
+        f"({allocation.by_hand.cost:.2f})."
+    )
+    for warning in results.warnings:
+        screen.print(f"[yellow]{warning}[/yellow]")
+    screen.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
+
+
+@app.command()
+def check(script: Script, as_json: AsJson = False) -> None:
+    """Check a study's names, units and bounds without running it."""
+    study = load_study(script)
+    prepared = prepare(study)
+    space = prepared.space
+    if as_json:
+        content = {
+            "study": study.name,
+            "reducer": prepared.reducer.name,
+            "sources": len(space.errors.sources),
+            "varying": len(space.errors.active),
+            "groups": list(space.groups),
+            "limit_arcsec": study.limit_arcsec,
+            "yield_target": study.yield_target,
+        }
+        sys.stdout.write(json.dumps(content, ensure_ascii=False, indent=2) + "\n")
+        return
+    screen.print(f"{script}: study {study.name} is in order.", soft_wrap=True)
+    screen.print(
+        f"{prepared.reducer.name}: {len(space.errors.active)} of {len(space.errors.sources)} sources vary, in "
+        f"{len(space.groups)} groups; limit {study.limit_arcsec:g}″ at {study.yield_target:.2%}."
+    )
+    for source in space.errors.active:
+        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
+        screen.print(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}", soft_wrap=True)
+
+
+@app.command()
+def te(
+    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv20e",
+    unit: Annotated[str, typer.Option(help="Shipped unit name or TOML file.")] = "table4",
+    torque: Annotated[
+        float | None, typer.Option(help="Torque on the carrier [N·m], negative against the rotation.")
+    ] = None,
+    stiffness: Annotated[str, typer.Option(help="Identified stiffness: shipped name or TOML file.")] = "",
+    as_json: AsJson = False,
+) -> None:
+    """Transmission error of one built unit over one output turn."""
+    design = load_reducer(reducer)
+    if stiffness:
+        design = with_stiffness(design, load_identified_stiffness(stiffness))
+    answer = unit_answer(design, load_unit(unit), design.load.test_torque if torque is None else torque)
+    if as_json:
+        sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
+    else:
+        screen.print(as_table(answer))
+
+
+def main() -> None:
+    """Run the command line; an error that a user can mend becomes one sentence and exit code 2."""
+    try:
+        app()
+    except TolallocError as error:
+        messages.print(f"Error: {error}", soft_wrap=True, markup=False, highlight=False)
+        raise SystemExit(2) from None
+
+
+def run_script() -> None:
+    """Run the study of the calling script, with the options of ``tolalloc run``."""
+    sys.argv = [sys.argv[0], "run", *sys.argv]
+    main()
+
+
+if __name__ == "__main__":
+    main()
