@@ -54,14 +54,18 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         # The check of a whole record can say more than the check of one field, so unknown fields come first.
         problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
         problem = problems[0]
-        field = ".".join(str(part) for part in problem["loc"]) or "the whole record"
+        field = ".".join(str(part) for part in problem["loc"])
         if problem["type"] == "extra_forbidden":
             known = _known_fields(model, problem["loc"])
             raise UnknownNameError.among(place, "field", field, known) from None
         if problem["type"] == "missing":
             raise InputError(f"{place}: {field} is missing.") from None
         message = problem["msg"].removeprefix("Value error, ")
-        message = message[0].lower() + message[1:]
+        if message[1:2].islower():
+            message = message[0].lower() + message[1:]
+        if isinstance(problem["input"], Mapping):  # a check of several fields together names their values itself
+            whole = f"{field}: " if problem["loc"] else ""
+            raise InputError(f"{place}: {whole}{message}.") from None
         raise InputError(f"{place}: {field} is {problem['input']!r}; {message}.") from None
 
 

@@ -97,7 +97,7 @@ class Allocation:
 
     @property
     def saving_at_least(self) -> float:
-        """The same had uniform scaling used the limit to its last arcsecond: its zones, and so its cost, moved there [-].
+        """The same had uniform scaling used the limit to its last arcsecond: so its cost moved with it [-].
 
         The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
         """

@@ -63,7 +63,7 @@ def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
         f"({allocation.by_hand.cost:.2f})."
     )
     for warning in results.warnings:
-        screen.print(f"[yellow]{warning}[/yellow]")
+        screen.print(warning, style="yellow", markup=False)
     screen.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from tolalloc.equivalent.outputs import order_spectrum, torsional_stiffness
@@ -73,5 +74,5 @@ def as_table(answer: dict[str, Any]) -> Table:
         ("largest unbalanced force over largest force [-]", f"{answer['largest_residual_of_largest_force']:.1e}"),
     ]
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(escape(cell) for cell in row))
     return table

@@ -89,7 +89,7 @@ class StudyResults:
             "that of the unit file and the theory page",
             "each zone is taken at the magnitude that liu2020, Table 4, measured on one unit; the zones of the shipped "
             "table are not a maker's drawing",
-            "distributions, Cp = 1 and independence of the sources: no source prints them; the list below maps each zone",
+            "distributions, Cp = 1 and independence of the sources: no source prints them; see the list below",
             "costs, their fall as 1/zone, and smallest and largest zones: no source prints them",
             "tooth modification costs nothing and is exact; nominal clearance "
             f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
@@ -115,7 +115,7 @@ class StudyResults:
         if not self.unit_surrogate.earns_its_place:
             found.append(
                 f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, "
-                f"below {NEEDED_Q2}: it was not used, and the ranking ran on the real model."
+                f"below {NEEDED_Q2}: it was not used; the ranking ran on the real model."
             )
         if self.sobol.dropped:
             found.append(f"{self.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")

@@ -50,9 +50,9 @@ class Effort:
 QUICK = Effort(
     verification_units=1152,
     sobol_blocks=32,
-    shared_units=64,
+    shared_units=48,
     search=SearchEffort(
-        steps=3,
+        steps=2,
         front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
     ),
 )

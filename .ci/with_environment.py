@@ -1,0 +1,64 @@
+"""Make the project's environment if it is not there, then run a command in it.
+
+    python3 .ci/with_environment.py tolalloc run studies/rv20e_allocation.py
+    python3 .ci/with_environment.py pytest
+
+Needs nothing but Python 3.11 or later; the environment is the folder .venv, or what TOLALLOC_ENVIRONMENT names.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+import venv
+from importlib.util import find_spec
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+CONSTRAINTS = ROOT / ".ci" / "constraints.txt"
+
+
+def stop(sentence: str) -> None:
+    sys.exit(f"Error: {sentence}")
+
+
+def environment() -> Path:
+    """Return the folder of the environment, made and filled if its stamp does not match."""
+    folder = Path(os.environ.get("TOLALLOC_ENVIRONMENT", ROOT / ".venv"))
+    python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
+    wanted = hashlib.sha256(CONSTRAINTS.read_bytes() + (ROOT / "pyproject.toml").read_bytes()).hexdigest()
+    stamp = folder / "tolalloc.stamp"
+    if stamp.is_file() and stamp.read_text() == wanted:
+        return python.parent
+    print(f"Making the environment in {folder} (once, a minute or two) ...", file=sys.stderr, flush=True)
+    own_pip = find_spec("ensurepip") is not None
+    venv.create(folder, with_pip=own_pip, clear=False)
+    # Debian may ship Python without ensurepip; its own pip can still fill the environment.
+    pip = [str(python), "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", str(python)]
+    if not own_pip and find_spec("pip") is None:
+        stop("this Python has neither ensurepip nor pip; on Debian or Ubuntu run: apt install python3-venv")
+    quiet = ["--quiet", "--disable-pip-version-check"]
+    for arguments in (
+        ["install", *quiet, "--require-hashes", "-r", str(CONSTRAINTS)],
+        ["install", *quiet, "--no-deps", "--no-build-isolation", "-e", str(ROOT)],
+    ):
+        if subprocess.run([*pip, *arguments], check=False).returncode:
+            stop(f"pip could not fill {folder}; its own message stands above.")
+    stamp.write_text(wanted)
+    return python.parent
+
+
+def main() -> None:
+    if sys.version_info < (3, 11):
+        stop(f"Python 3.11 or later is needed, and this is {sys.version.split()[0]}.")
+    if len(sys.argv) < 2:
+        stop("a command is needed, for example: tolalloc run studies/rv20e_allocation.py")
+    scripts = environment()
+    path = os.pathsep.join([str(scripts), os.environ.get("PATH", "")])
+    program = scripts / sys.argv[1]
+    command = [str(program if program.exists() else sys.argv[1]), *sys.argv[2:]]
+    sys.exit(subprocess.run(command, env={**os.environ, "PATH": path}, check=False).returncode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+"""The commands as a user meets them: answers, files, and one sentence for every kind of bad input."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.uncertainty.unit_file import DATA
+
+ROOT = Path(__file__).parents[2]
+STUDY = ROOT / "studies" / "rv20e_allocation.py"
+
+
+def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("run") / "quick"
+    result = tolalloc("run", STUDY, "--quick", "--out", folder)
+    assert result.returncode == 0, result.stderr
+    return folder
+
+
+def study_with(tmp_path: Path, **fields: object) -> Path:
+    values = {"name": "bad", **fields}
+    text = ", ".join(f"{name}={value!r}" for name, value in values.items())
+    script = tmp_path / "bad_study.py"
+    script.write_text(f"from tolalloc.study.definition import Study\nstudy = Study({text})\n", encoding="utf-8")
+    return script
+
+
+def table_with(tmp_path: Path, change) -> str:
+    frame = pd.read_csv(DATA / "rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    path = tmp_path / "table.csv"
+    change(frame).to_csv(path, index=False)
+    return str(path)
+
+
+def set_cell(row: int, column: str, value: str):
+    def change(frame: pd.DataFrame) -> pd.DataFrame:
+        frame.loc[row, column] = value
+        return frame
+
+    return change
+
+
+def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    sentence = result.stderr.strip()
+    assert sentence.splitlines()[-1].startswith("Error: ")
+    for word in words:
+        assert word in sentence, sentence
+
+
+def test_te_of_table_4():
+    result = tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--torque", "-1", "--json")
+    answer = json.loads(result.stdout)
+    assert result.returncode == 0
+    assert answer["peak_to_peak_arcsec"] == pytest.approx(96.58, abs=0.05)
+    assert [wave["order"] for wave in answer["main_orders"]][:6] == [1, 78, 80, 79, 39, 2]
+    assert answer["torsional_stiffness_nm_per_arcmin"]["perfect_reducer"] == pytest.approx(2519, abs=1)
+    assert answer["statuses"]["equilibrium found"] == 936
+
+
+def test_te_for_a_person_names_units():
+    result = tolalloc("te")
+    assert "peak-to-peak over one output turn [arcsec]" in result.stdout
+    assert "N·m/arcmin" in result.stdout
+
+
+def test_check_is_in_order():
+    result = tolalloc("check", STUDY)
+    assert result.returncode == 0
+    assert "is in order" in result.stdout
+    assert "σ =" in result.stdout
+
+
+def test_run_folder_is_complete(run_folder):
+    names = {str(path.relative_to(run_folder)) for path in run_folder.rglob("*") if path.is_file()}
+    tables = {"manifest.json", "summary.json", "sensitivity.csv", "allocation.csv", "pareto.csv", "results.xlsx"}
+    figures = {"ranking", "zones", "peak_to_peak", "pareto", "transmission_error", "orders"}
+    assert names == tables | {"report.html"} | {f"figures/{name}.png" for name in figures}
+
+
+def test_report_works_offline(run_folder):
+    page = (run_folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("plotly.js v") == 1
+    for outside in ('src="http', "src='http", 'href="http', "cdn."):
+        assert outside not in page.split("</script>", 1)[1]
+    assert "nan" not in page.split("</script>", 1)[1].lower().split("plotly.newplot", 1)[0]
+
+
+def test_manifest_and_summary_say_what_was_done(run_folder):
+    manifest = json.loads((run_folder / "manifest.json").read_text(encoding="utf-8"))
+    summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
+    assert manifest["seed"] == 1
+    assert manifest["versions"]["numpy"]
+    assert manifest["statuses"]["equilibrium found"] > 5000
+    assert sum(manifest["statuses"].values()) == manifest["statuses"]["equilibrium found"]
+    assert summary["met"] is True
+    assert summary["saving [-]"] > 0
+    assert summary["yield lower bound, one-sided 95 % [-]"] >= 0.9973
+    assert summary["optimality gap [-]"] >= -1e-9
+
+
+def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
+    before, after = load_tolerance_table("rv20e_baseline"), load_tolerance_table(run_folder / "allocation.csv")
+    assert [source.name for source in after] == [source.name for source in before]
+    for old, new in zip(before, after, strict=True):
+        assert new.columns == old.columns
+        if old.zone:
+            assert new.cost * new.zone == pytest.approx(old.cost * old.zone, rel=1e-3)
+            assert old.minimum * 0.999 <= new.zone <= old.maximum * 1.001
+
+
+def test_every_header_states_a_unit_where_there_is_one(run_folder):
+    words = {"source", "S1 reading"}
+    frame = pd.read_csv(run_folder / "sensitivity.csv")
+    assert all("[" in header or header in words for header in frame.columns)
+    assert all("[" in header for header in pd.read_csv(run_folder / "pareto.csv").columns)
+
+
+def test_same_seed_gives_the_same_bits(run_folder, tmp_path):
+    result = tolalloc("run", STUDY, "--quick", "--out", tmp_path / "again")
+    assert result.returncode == 0, result.stderr
+    for name in ("sensitivity.csv", "allocation.csv", "pareto.csv", "summary.json"):
+        assert (run_folder / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+
+
+def test_a_run_folder_with_something_in_it_is_refused(tmp_path):
+    (tmp_path / "mine.txt").write_text("keep")
+    refused(tolalloc("run", STUDY, "--quick", "--out", tmp_path), str(tmp_path), "not empty")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (set_cell(3, "id", "disc2.bore9.position"), ["disc2.bore9.position.x", "not known", "disc2.bore2.position"]),
+        (set_cell(0, "plus [unit]", "-4"), ["row 2", "disc1.bore1.position", "-4", "must be 0 to 200 µm"]),
+        (set_cell(4, "plus [unit]", "900000"), ["row 6", "900000 µm", "must be 0 to 200 µm"]),
+        (set_cell(2, "Cp [-]", "good"), ["row 4", "Cp", "good", "a number"]),
+        (set_cell(5, "distribution", "gauss"), ["row 7", "distribution", "gauss", "normal, uniform"]),
+        (set_cell(6, "min [unit]", "7"), ["row 8", "min 7", "between min and max"]),
+        (lambda frame: frame.drop(columns="cost [cost units]"), ["'cost'", "missing"]),
+        (lambda frame: frame.rename(columns={"Cp [-]": "Cpk [-]"}), ["Cpk", "Cp"]),
+        (lambda frame: frame.drop(index=9), ["carrier.bore2.position.x", "not given"]),
+        (lambda frame: pd.concat([frame, frame.iloc[[0]]]), ["disc1.bore1.position", "second time"]),
+    ],
+)
+def test_bad_tables_are_refused_in_one_sentence(tmp_path, change, words):
+    script = study_with(tmp_path, tolerances=table_with(tmp_path, change))
+    refused(tolalloc("check", script), *words)
+    out = tmp_path / "run"
+    refused(tolalloc("run", script, "--quick", "--out", out), *words)
+    assert not out.exists()
+
+
+def test_a_truncated_workbook_is_refused(tmp_path):
+    path = tmp_path / "table.xlsx"
+    pd.read_csv(DATA / "rv20e_baseline.tolerances.csv").to_excel(path, index=False)
+    assert tolalloc("check", study_with(tmp_path, tolerances=str(path))).returncode == 0
+    path.write_bytes(path.read_bytes()[:2000])
+    refused(tolalloc("check", study_with(tmp_path, tolerances=str(path))), "table.xlsx", "truncated")
+
+
+def test_a_truncated_table_is_refused(tmp_path):
+    text = (DATA / "rv20e_baseline.tolerances.csv").read_text(encoding="utf-8")
+    (tmp_path / "table.csv").write_text(text[: int(len(text) * 0.7)].rsplit(",", 9)[0], encoding="utf-8")
+    refused(tolalloc("check", study_with(tmp_path, tolerances=str(tmp_path / "table.csv"))), "table.csv", "missing")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("eccentricity_mm = 0.9", "eccentricity_mm = 900", ["cycloid_stage.eccentricity_mm", "900", "10"]),
+        ("eccentricity_mm = 0.9", "eccentricity_m = 0.9", ["eccentricity_m", "eccentricity_mm"]),
+        ("eccentricity_mm = 0.9", "eccentricity_mm = 1.9", ["K1", "below 1"]),
+        ("disc_teeth = 39", "disc_teeth = 38", ["disc_teeth", "39"]),
+        ("pin_count = 40\n", "", ["cycloid_stage.pin_count", "missing"]),
+        ('name = "RV-20E"', 'name = "RV-20E', ["truncated"]),
+    ],
+)
+def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
+    from tolalloc.reducer.files import PRESETS
+
+    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    refused(tolalloc("te", "--reducer", path), "mine.toml", *words)
+
+
+def test_unknown_names_offer_the_nearest(tmp_path):
+    refused(tolalloc("te", "--reducer", "rv20"), "rv20", "rv20e")
+    refused(tolalloc("te", "--unit", "tabel4"), "tabel4", "table4")
+    path = tmp_path / "unit.toml"
+    text = (DATA / "table4.unit.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace('"carrier.bore1.position"', '"carrier.bore3.position"'), encoding="utf-8")
+    refused(tolalloc("te", "--unit", path), "carrier.bore3.position", "carrier.bore1.position")
+
+
+def test_an_infeasible_limit_names_what_can_be_reached(tmp_path):
+    out = tmp_path / "run"
+    result = tolalloc("run", study_with(tmp_path, limit_arcsec=10.0), "--quick", "--out", out)
+    refused(result, "limit_arcsec", "10", "or more")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"limit_arcsec": -60.0}, ["limit_arcsec", "-60", "above 0"]),
+        ({"yield_target": 99.73}, ["yield_target", "99.73", "0.5"]),
+        ({"seed": -1}, ["seed", "-1"]),
+        ({"flank_clearance_um": (5.0, 1.0)}, ["flank_clearance_um", "smaller one first"]),
+        ({"tolerances": "nothing.csv"}, ["nothing.csv", "no such file"]),
+    ],
+)
+def test_bad_studies_are_refused_in_one_sentence(tmp_path, fields, words):
+    refused(tolalloc("check", study_with(tmp_path, **fields)), *words)
+
+
+def test_a_script_without_a_study_is_refused(tmp_path):
+    script = tmp_path / "empty.py"
+    script.write_text("x = 1\n")
+    refused(tolalloc("check", script), "empty.py", "study = Study")
+    script.write_text("study = (\n")
+    refused(tolalloc("check", script), "empty.py", "truncated")
+    refused(tolalloc("check", tmp_path / "none.py"), "none.py", "no such study")
+
+
+def test_the_script_runs_by_itself(tmp_path):
+    copy = tmp_path / "rv20e_allocation.py"
+    shutil.copy(STUDY, copy)
+    (tmp_path / "busy").mkdir()
+    (tmp_path / "busy" / "file").write_text("x")
+    command = [sys.executable, str(copy), "--quick", "--out", str(tmp_path / "busy")]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    refused(result, "busy", "not empty")
