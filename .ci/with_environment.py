@@ -13,13 +13,15 @@ import sys
 import venv
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[1]
 CONSTRAINTS = ROOT / ".ci" / "constraints.txt"
 
 
-def stop(sentence: str) -> None:
-    sys.exit(f"Error: {sentence}")
+def stop(sentence: str) -> NoReturn:
+    print(f"Error: {sentence}", file=sys.stderr)
+    sys.exit(2)
 
 
 def environment() -> Path:
@@ -32,7 +34,7 @@ def environment() -> Path:
         return python.parent
     print(f"Making the environment in {folder} (once, a minute or two) ...", file=sys.stderr, flush=True)
     own_pip = find_spec("ensurepip") is not None
-    venv.create(folder, with_pip=own_pip, clear=False)
+    venv.create(folder, with_pip=own_pip)
     # Debian may ship Python without ensurepip; its own pip can still fill the environment.
     pip = [str(python), "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", str(python)]
     if not own_pip and find_spec("pip") is None:
