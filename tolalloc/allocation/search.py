@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -223,7 +223,7 @@ def allocate(
     best = answer(tried)
     convex_front = program.front(best.local, np.linspace(0.6, 1.5, effort.front.points) * limit)
     front, surrogate = pareto_front(
-        response,
+        replace(response, spread=best.spread),
         best.local,
         designs_around(space, best.design, 2.5, effort.front.designs, seeds.child("designs")),
         convex_front,

@@ -67,6 +67,12 @@ class VerifiedDesign:
     by_zone: Float[np.ndarray, " source"]
     local: LocalQuantile
 
+    @property
+    def spread(self) -> float:
+        """Distance of the quantile bound from the mean of the sample over its standard deviation [-]."""
+        values = self.sample.values
+        return float((self.quantile_bound - values.mean()) / values.std(ddof=1))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Verifier:

@@ -108,6 +108,7 @@ def save_png(figure: Figure, path: Path) -> None:
         axes.invert_yaxis()
     axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
     axes.grid(alpha=0.3)
+    axes.set_axisbelow(True)
     axes.legend()
     canvas.savefig(path, dpi=130)
     plt.close(canvas)

@@ -124,8 +124,8 @@ def _orders(results: StudyResults) -> Figure:
     return Figure(
         name="orders",
         title=(
-            f"Orders of the transmission error; multiples of {results.reducer.cycloid_stage.disc_teeth} stand still "
-            f"with the housing, of {results.reducer.cycloid_stage.pin_count} turn with disc or carrier"
+            f"Orders: multiples of {results.reducer.cycloid_stage.disc_teeth} stand still with the housing, "
+            f"of {results.reducer.cycloid_stage.pin_count} turn with disc or carrier"
         ),
         x_label="order of the output turn [-]",
         y_label="amplitude, output side [arcsec]",
