@@ -72,7 +72,7 @@ class Allocation:
     front
         Pareto front of cost against the quantile.
     convex_front
-        Designs of the convex program for a ladder of limits, the seed of NSGA-II.
+        Designs of the convex program for a ladder of limits, the seed of NSGA-II [-, µm].
     """
 
     limit: float

@@ -70,9 +70,9 @@ class ColumnLists:
     names
         All columns, in the order of X.
     bilateral
-        Position in ``names`` of each column of ``CondensedAngles.load`` but the torque.
+        Position in ``names`` of each column of ``CondensedAngles.load`` but the torque [-].
     contact
-        Position in ``names`` of each column of ``CondensedAngles.contact_by_error``, per disc.
+        Position in ``names`` of each column of ``CondensedAngles.contact_by_error``, per disc [-].
     """
 
     names: tuple[str, ...]

@@ -41,8 +41,10 @@ class StudyResults:
 
     Parameters
     ----------
-    name, seed, quick
-        Which study, its seed, and whether it was shortened.
+    name, quick
+        Which study, and whether it was shortened.
+    seed
+        Its seed [-].
     reducer, torque
         The reducer with the stiffness that was used, and the torque on its carrier [N·m].
     identified

@@ -16,7 +16,7 @@ class Evaluation:
     Parameters
     ----------
     values
-        Outputs, in the units that the response's output names state.
+        Outputs [as the response's output names state].
     status
         0 for a good sample; anything else is a failed one, whose values must not be used [-].
     """

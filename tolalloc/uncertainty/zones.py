@@ -70,7 +70,7 @@ def harmonic_range_quantile(spectrum: Spectrum) -> float:
 
 def _waves_over_turn(spectrum: Spectrum) -> Float[np.ndarray, "column point"]:
     """Return the cosine and sine of every order on fine points of one turn."""
-    points = 48 * max(order for order, _ in spectrum)
+    points = 96 * max(order for order, _ in spectrum)
     turn = 2 * np.pi * np.arange(points) / points
     return np.concatenate([np.stack([np.cos(order * turn), np.sin(order * turn)]) for order, _ in spectrum])
 

@@ -1,0 +1,107 @@
+"""The house: names in the nomenclature, docstrings, doors of the heavy libraries, the top level."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
+DOORS = {
+    "SALib": "sensitivity",
+    "pymoo": "allocation",
+    "cvxpy": "allocation",
+    "sklearn": "surrogate",
+    "plotly": "report",
+    "matplotlib": "report",
+    "jinja2": "report",
+    "openpyxl": "report",
+    "numba": ("equivalent", "study"),
+    "typer": "cli",
+    "rich": "cli",
+}
+
+
+def imports(tree: ast.Module) -> set[str]:
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {name.name.split(".")[0] for name in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_heavy_libraries_enter_through_one_door(path):
+    room = path.relative_to(ROOT / "tolalloc").parts[0]
+    for library in imports(ast.parse(path.read_text(encoding="utf-8"))) & DOORS.keys():
+        allowed = DOORS[library]
+        assert room in ((allowed,) if isinstance(allowed, str) else allowed), f"{path}: {library}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_stay_small(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= 400
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) else node.body
+            lines = (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+            assert lines <= 65, f"{path}: {node.name} has {lines} lines"
+
+
+def test_every_documented_number_states_its_unit():
+    """Every parameter of a public record ends with a unit in brackets, unless it is a name, a flag or a record."""
+    wanting = []
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ClassDef):
+                continue
+            numbers = {
+                item.target.id
+                for item in node.body
+                if isinstance(item, ast.AnnAssign)
+                and isinstance(item.target, ast.Name)
+                and ast.unparse(item.annotation).startswith(("float", "int", "Float", "Int"))
+            }
+            text = ast.get_docstring(node) or ""
+            for match in re.finditer(r"^(\w[\w, ]*)\n((?:    .*\n?)+)", text, re.MULTILINE):
+                names = set(match[1].split(", "))
+                if names & numbers and "[" not in match[2]:
+                    wanting.append(f"{path.name}: {node.name}.{match[1]}")
+    assert not wanting
+
+
+def test_columns_of_the_model_stand_in_the_nomenclature(rv20e):
+    page = (ROOT / "docs" / "reference" / "nomenclature.md").read_text(encoding="utf-8")
+    for column in rv20e.columns:
+        source = re.sub(r"\.(x|y|cos\d+|sin\d+)$", "", column)
+        generic = re.sub(r"crank\d+", "crank{i}", source)
+        generic = re.sub(r"journal\d+", "journal{j}", generic)
+        generic = re.sub(r"disc\d+", "disc{j}", generic)
+        generic = re.sub(r"bore\d+", "bore{i}", generic)
+        generic = re.sub(r"planet\d+", "planet{i}", generic)
+        generic = generic.removeprefix("modification.")
+        assert f"`{generic}`" in page, generic
+
+
+def test_equations_name_functions_that_exist():
+    page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    code = "\n".join(path.read_text(encoding="utf-8") for path in FILES)
+    for name in re.findall(r"`(?:tolalloc\.)?(?:\w+\.)+(\w+)`", page):
+        assert re.search(rf"(def|class) {name}\b|{name} =|/{name}\.py|^{name}$", code, re.MULTILINE) or any(
+            path.stem == name for path in FILES
+        ), name
+
+
+def test_top_level_holds_only_what_it_should():
+    tracked = subprocess.run(["git", "ls-tree", "--name-only", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    if tracked.returncode:
+        pytest.skip("not a git checkout")
+    names = {name for name in tracked.stdout.split() if not name.startswith(".")}
+    assert names <= {"pyproject.toml", "tolalloc", "studies", "tests", "docs", "README.md", "LICENSE"}

@@ -1,0 +1,42 @@
+"""The search for the extremes: its accuracy on random units, and the interpolation it stands on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.random_units import random_units
+from tolalloc.equivalent.transmission_error import AngleSearch, EquivalentModel
+from tolalloc.units import ARCSECOND
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.3])
+def test_peak_to_peak_is_within_a_twentieth_arcsecond_on_99_percent(rv20e, table4, generator, scale):
+    """Against a search from four times as many angles that follows candidates four times as far.
+
+    The share is tested with its standard error: 1,200 units, 99 % promised.
+    """
+    units = random_units(table4, rv20e.columns, generator, 1200)
+    own = np.array([not name.startswith("modification") for name in rv20e.columns])
+    units[:, own] *= scale
+    finest = EquivalentModel(rv20e.reducer, AngleSearch(coarse=3744, nodes_per_coarse=1, levels=11, safety=4.0))
+    found = rv20e.extremes(units, -1.0).peak_to_peak / ARCSECOND
+    best = np.maximum(found, finest.extremes(units, -1.0).peak_to_peak / ARCSECOND)
+    missed = (best - found > 0.05).mean()
+    assert missed <= 0.01 + 2 * np.sqrt(0.01 * 0.99 / units.shape[0])
+
+
+def test_interpolated_tables_agree_with_exact_ones(rv20e, table4, generator):
+    units = random_units(table4, rv20e.columns, generator, 60)
+    extremes = rv20e.extremes(units, -1.0)
+    for unit, angles, largest, smallest in zip(
+        units, extremes.carrier_angle, extremes.largest, extremes.smallest, strict=True
+    ):
+        exact = rv20e.curves(unit[np.newaxis], -1.0, angles).transmission_error[0]
+        np.testing.assert_allclose([largest, smallest], exact, atol=0.005 * ARCSECOND, rtol=0)
+
+
+def test_remaining_error_is_stated(rv20e, table4):
+    result = rv20e.extremes(table4, -1.0)
+    assert 0 <= result.remaining[0] < 0.05 * ARCSECOND
+    assert result.solves[0] > rv20e.search.coarse

@@ -1,0 +1,103 @@
+"""From zones to columns: the mapping is what it says, and random numbers hang on one seed tree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tolalloc.uncertainty.seeds import CHUNK, SeedTree
+from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
+from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.uncertainty.zones import Distribution, Feature, at_limit, standard_values
+
+SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
+CASES = [
+    (Feature.SIZE, (), 1),
+    (Feature.POSITION, (), 2),
+    (Feature.PITCH, SPECTRUM, 6),
+    (Feature.RUNOUT, ((1, 1.0),), 2),
+]
+
+
+def measure(feature: Feature, spectrum, columns: np.ndarray) -> np.ndarray:
+    """Return what the drawing limits, over the zone: 1 is just inside."""
+    if feature is Feature.SIZE:
+        return 2 * np.abs(columns[:, 0])
+    if feature is Feature.POSITION:
+        return 2 * np.hypot(columns[:, 0], columns[:, 1])
+    turn = np.linspace(0, 2 * np.pi, 721)
+    waves = np.concatenate([[np.cos(order * turn), np.sin(order * turn)] for order, _ in spectrum])
+    return np.ptp(columns @ waves, axis=1)
+
+
+@pytest.mark.parametrize(("feature", "spectrum", "columns"), CASES)
+def test_9973_percent_lie_inside_the_zone_at_cp_1(feature, spectrum, columns, generator):
+    count = 200_000
+    uniform = generator.random((count, columns))
+    values = standard_values(feature, Distribution.NORMAL, 1.0, 0.0, spectrum, uniform)
+    inside = (measure(feature, spectrum, values) <= 1).mean()
+    # Three standard errors of the share; the range's quantile itself is integrated to about a tenth of a percent.
+    assert inside == pytest.approx(0.9973, abs=3 * np.sqrt(0.0027 / count) + 1e-4 * (len(spectrum) > 1))
+
+
+@pytest.mark.parametrize(("feature", "spectrum", "columns"), CASES)
+def test_uniform_magnitudes_stay_inside_the_zone(feature, spectrum, columns, generator):
+    uniform = generator.random((5000, columns))
+    values = standard_values(feature, Distribution.UNIFORM, 1.0, 0.0, spectrum, uniform)
+    inside = measure(feature, spectrum, values)
+    assert inside.max() <= 1 + 1e-12
+    assert inside.max() > 0.8
+
+
+@pytest.mark.parametrize(("feature", "spectrum", "columns"), CASES)
+def test_errors_at_the_limit_fill_the_zone(feature, spectrum, columns, generator):
+    values = at_limit(feature, spectrum, generator.random((200, columns)))
+    np.testing.assert_allclose(measure(feature, spectrum, values), 1.0, rtol=2e-3)
+
+
+def test_cp_and_shift(generator):
+    uniform = generator.random((100_000, 1))
+    values = standard_values(Feature.SIZE, Distribution.NORMAL, 2.0, 0.5, (), uniform)[:, 0]
+    assert values.std() == pytest.approx(1 / 12, rel=0.01)
+    assert values.mean() == pytest.approx(0.25, abs=3 / 12 / np.sqrt(values.size))
+
+
+def test_baseline_zones_are_the_magnitudes_of_table_4():
+    """A bore 2 µm off centre is a position of Ø 4 µm; a range over a turn is that of the printed harmonics."""
+    unit = load_unit("table4").deviations
+    for source in load_tolerance_table("rv20e_baseline"):
+        if source.zone == 0:
+            continue
+        errors = np.array([[unit[column] for column in source.columns]])
+        printed = measure(source.feature, source.spectrum, errors)[0]
+        assert source.zone == pytest.approx(printed, abs=0.06e-6), source.name
+
+
+def test_columns_are_linear_in_the_zones(generator):
+    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    standard = errors.standard_values(generator.random((10, len(errors.columns))))
+    one, two = errors.deviations(standard, errors.zones), errors.deviations(standard, 2 * errors.zones)
+    np.testing.assert_allclose(two, 2 * one, rtol=1e-12)
+
+
+def test_table_survives_writing_and_reading(tmp_path):
+    sources = load_tolerance_table("rv20e_baseline")
+    moved = with_zones(sources, [0.8 * source.zone for source in sources])
+    table_frame(moved).to_csv(tmp_path / "moved.csv", index=False)
+    table_frame(moved).to_excel(tmp_path / "moved.xlsx", index=False)
+    for again in (load_tolerance_table(tmp_path / "moved.csv"), load_tolerance_table(tmp_path / "moved.xlsx")):
+        for source, other in zip(moved, again, strict=True):
+            assert other.zone == pytest.approx(source.zone, abs=1e-10)
+            assert other.cost == pytest.approx(source.cost, abs=1e-6)
+            assert (other.name, other.group, other.locked) == (source.name, source.group, source.locked)
+
+
+def test_seed_tree_gives_the_same_bits_for_any_number_of_samples_and_tells_its_nodes_apart():
+    node = SeedTree(0).child("a")
+    long = np.concatenate(list(node.uniform_chunks(2 * CHUNK + 5, 3)))
+    short = np.concatenate(list(node.uniform_chunks(CHUNK + 7, 3)))
+    np.testing.assert_array_equal(long[: CHUNK + 7], short)
+    assert not np.array_equal(next(SeedTree(0).child("b").uniform_chunks(5, 3)), long[:5])
+    assert not np.array_equal(next(SeedTree(1).child("a").uniform_chunks(5, 3)), long[:5])
+    assert SeedTree(0).integer() > 0
