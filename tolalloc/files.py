@@ -96,4 +96,4 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
         if not path.is_file():
             raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
         return path
-    raise UnknownNameError.among(f"{what} {str(name)!r}", "name", str(name), shipped)
+    raise UnknownNameError.among(f"shipped {what} files", "name", str(name), shipped)

@@ -16,8 +16,6 @@ from tolalloc.cli.transmission_error import as_table, unit_answer
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.study.definition import Study, prepare
-from tolalloc.study.run import run_study
-from tolalloc.study.run_folder import summary
 from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.units import MICROMETRE
 
@@ -46,6 +44,10 @@ def run(
 
 
 def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
+    # The report's libraries take half a second to import; the other commands need not wait for them.
+    from tolalloc.study.run import run_study
+    from tolalloc.study.run_folder import summary
+
     folder = out or Path("runs") / study.name
     with UnitProgress() as progress:
         results = run_study(study, folder, progress, quick=quick)

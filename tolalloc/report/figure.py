@@ -10,11 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import plotly.graph_objects as go
+from matplotlib.figure import Figure as Canvas
 
 COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a")
 
@@ -77,7 +74,8 @@ class Figure:
 
 def save_png(figure: Figure, path: Path) -> None:
     """Draw the figure into a PNG file."""
-    canvas, axes = plt.subplots(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
+    canvas = Canvas(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
+    axes = canvas.subplots()
     count = sum(item.kind == "bars" for item in figure.series)
     for number, item in enumerate(figure.series):
         colour = COLOURS[number % len(COLOURS)]
@@ -111,7 +109,6 @@ def save_png(figure: Figure, path: Path) -> None:
     axes.set_axisbelow(True)
     axes.legend()
     canvas.savefig(path, dpi=130)
-    plt.close(canvas)
 
 
 def as_html(figure: Figure) -> str:

@@ -91,7 +91,7 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "design surrogate Q2 [-]": surrogate.q2,
         "design surrogate used": surrogate.earns_its_place,
         "unit surrogate Q2 [-]": results.unit_surrogate.q2,
-        "unit surrogate used": False,
+        "unit surrogate used": results.unit_surrogate.earns_its_place,
         "torsional stiffness of the perfect reducer [N·m/arcmin]": results.torsional_stiffness,
         "warnings": list(results.warnings),
     }

@@ -108,9 +108,6 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
     )
     with record.stage("is the limit in reach"):
         require_reachable(quantile, requirement, f"study {study.name}")
-    with record.stage("ranking"):
-        sobol = sobol_indices(kernel, space.errors, space.errors.zones, seeds.child("sobol"), study.effort.sobol_blocks)
-        classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
     with record.stage("allocation"):
         verifier = Verifier(
             space=space,
@@ -122,6 +119,12 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
         allocation = allocate(
             quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
         )
+    with record.stage("ranking"):
+        # A stand-in for single units would save the ranking's kernel runs; it must have earned that.
+        surrogate = _unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size)
+        ranked = surrogate if surrogate.earns_its_place else kernel
+        sobol = sobol_indices(ranked, space.errors, space.errors.zones, seeds.child("sobol"), study.effort.sobol_blocks)
+        classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
     with record.stage("report"):
         return StudyResults(
             name=study.name,
@@ -135,7 +138,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             requirement=requirement,
             sobol=sobol,
             classical=classical,
-            unit_surrogate=_unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size),
+            unit_surrogate=surrogate,
             allocation=allocation,
             examples=_examples(
                 prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design
