@@ -26,9 +26,9 @@ def sizes(*names: str) -> ErrorModel:
                 part="part",
                 feature=Feature.SIZE,
                 zone=2 * np.pi,
-                minimum=1,
-                maximum=10,
-                cost=1,
+                minimum=1.0,
+                maximum=10.0,
+                cost=1.0,
                 distribution=Distribution.UNIFORM,
             )
             for name in names

@@ -85,7 +85,7 @@ class DesignSpace:
     @cached_property
     def locked_cost(self) -> float:
         """Cost of the zones that may not change [cost units]."""
-        return sum(source.cost for source in self.errors.active if source.locked)
+        return float(sum(source.cost for source in self.errors.active if source.locked))
 
     @cached_property
     def lower(self) -> Float[np.ndarray, " variable"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -30,6 +30,7 @@ class Evaluation:
         return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
 
 
+@runtime_checkable
 class Response(Protocol):
     """Anything that maps named columns to named outputs, sample by sample."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -128,11 +127,6 @@ class Study:
                 f"{_units_needed(self.yield_target)} or more",
             )
 
-    @property
-    def hash(self) -> str:
-        """Digest of the study's own fields, the names of its files included but not their content."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True, default=str).encode()).hexdigest()
-
 
 def _units_needed(target: float) -> int:
     """Return the smallest sample without a rejection that shows the target with 95 % confidence."""
@@ -167,6 +161,12 @@ class Prepared:
     space: DesignSpace
     requirement: Requirement
     kernel: KernelResponse
+
+    @property
+    def hash(self) -> str:
+        """Digest of the study and of what its files hold, wherever they stand."""
+        content = (asdict(self.study), self.reducer, self.space.errors.sources, self.unit, self.kernel.torque)
+        return hashlib.sha256(repr(content).encode()).hexdigest()
 
 
 def prepare(study: Study) -> Prepared:

@@ -35,5 +35,5 @@ def run_study(study: Study, folder: Path, progress: Progress, *, quick: bool = F
         study = replace(study, effort=QUICK)
     prepared, record = prepare(study), Record(progress)
     results = run_stages(prepared, record, quick)
-    write_run(folder, study, results, record)
+    write_run(folder, prepared, results, record)
     return results

@@ -18,7 +18,7 @@ from tolalloc.report.figure import save_png
 from tolalloc.report.figures import study_figures
 from tolalloc.report.page import write_page
 from tolalloc.report.results import StudyResults
-from tolalloc.study.definition import Study
+from tolalloc.study.definition import Prepared
 from tolalloc.study.stages import Record
 from tolalloc.uncertainty.tolerance_table import table_frame
 
@@ -42,13 +42,13 @@ def require_usable(folder: Path) -> None:
         )
 
 
-def manifest(study: Study, results: StudyResults, record: Record) -> dict[str, Any]:
+def manifest(prepared: Prepared, results: StudyResults, record: Record) -> dict[str, Any]:
     """Return what is needed to repeat the run and to trust it."""
     search = AngleSearch()
     return {
-        "study": study.name,
-        "study hash": study.hash,
-        "seed": study.seed,
+        "study": prepared.study.name,
+        "study hash": prepared.hash,
+        "seed": prepared.study.seed,
         "quick": results.quick,
         "versions": {"tolalloc": version("tolalloc"), "python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
@@ -102,7 +102,7 @@ def write_json(content: dict[str, Any], path: Path) -> None:
     path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def write_run(folder: Path, study: Study, results: StudyResults, record: Record) -> None:
+def write_run(folder: Path, prepared: Prepared, results: StudyResults, record: Record) -> None:
     """Write all files of a finished study.
 
     Raises
@@ -112,7 +112,7 @@ def write_run(folder: Path, study: Study, results: StudyResults, record: Record)
     """
     require_usable(folder)
     (folder / "figures").mkdir(parents=True)
-    write_json(manifest(study, results, record), folder / "manifest.json")
+    write_json(manifest(prepared, results, record), folder / "manifest.json")
     write_json(summary(results), folder / "summary.json")
     tables.ranking(results).to_csv(folder / "sensitivity.csv", index=False)
     table_frame(tables.allocated_sources(results)).to_csv(folder / "allocation.csv", index=False)

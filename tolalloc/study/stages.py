@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -31,6 +31,7 @@ _FIRST_SPREAD = 3.1
 """Distance of the 99.73 % quantile from the mean over σ, until a large sample has said better [-]."""
 
 
+@runtime_checkable
 class Progress(Protocol):
     """What shows a person how far the work has come."""
 
