@@ -54,7 +54,8 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         # The check of a whole record can say more than the check of one field, so unknown fields come first.
         problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
         problem = problems[0]
-        field = ".".join(str(part) for part in problem["loc"])
+        # A field that is a number or a record names the failing kind last; a reader knows the field alone.
+        field = ".".join(str(part) for part in problem["loc"] if part != "constrained-float")
         if problem["type"] == "extra_forbidden":
             known = _known_fields(model, problem["loc"])
             raise UnknownNameError.among(place, "field", field, known) from None

@@ -47,7 +47,7 @@ def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float) -> dict[str, A
         "angles": {"equally_spaced": model.search.coarse, "solved_in_all": int(extremes.solves[0])},
         "largest_residual_of_largest_force": float(extremes.residual[0]),
         "statuses": dict(count_statuses(curves.status)),
-        "assumptions": list(reducer.assumptions),
+        "assumptions": [*reducer.assumptions, *unit.assumptions],
     }
 
 

@@ -12,7 +12,15 @@ from pydantic import Field, model_validator
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reducer.design import CycloidStage, FirstStage, Load, Modification, Reducer
-from tolalloc.reducer.stiffness import IdentifiedStiffness, Stiffness, line_contact
+from tolalloc.reducer.stiffness import (
+    TAPER_ANGLE,
+    IdentifiedStiffness,
+    Stiffness,
+    gear_mesh,
+    line_contact,
+    roller_bearing,
+    shaft_support,
+)
 from tolalloc.units import DEGREE, GIGAPASCAL, MICROMETRE, MILLIMETRE
 
 PRESETS = Path(__file__).parent / "presets"
@@ -60,16 +68,67 @@ class MaterialRecord(Record):
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
 
 
-class StiffnessRecord(Record):
-    """Table ``[stiffness]``, N/m; without ``pin_contact`` it is πbE/(4(1−µ²))."""
+class ShaftRecord(Record):
+    """Dimensions from which Table 2 of liu2020 gives the support of the sun."""
 
-    sun_support: NewtonPerMetre
-    gear_mesh: NewtonPerMetre
-    crank_disc_bearing: NewtonPerMetre
-    crank_carrier_bearing: NewtonPerMetre
+    diameter_mm: Annotated[float, Field(gt=0, le=500)]
+    length_mm: Annotated[float, Field(gt=0, le=2000)]
+
+
+class BearingRecord(Record):
+    """Roller length times number of rollers, from which Table 2 of liu2020 gives a bearing's stiffness."""
+
+    loaded_length_mm: Annotated[float, Field(gt=0, le=10000)]
+
+
+class MeshRecord(Record):
+    """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness."""
+
+    contact_ratio: Annotated[float, Field(ge=1, le=4)]
+    sun_virtual_teeth: Annotated[float, Field(ge=5)]
+    planet_virtual_teeth: Annotated[float, Field(ge=5)]
+    face_width_mm: Annotated[float, Field(gt=0, le=500)]
+
+
+class StiffnessRecord(Record):
+    """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE/(4(1−µ²))."""
+
+    sun_support: NewtonPerMetre | ShaftRecord
+    gear_mesh: NewtonPerMetre | MeshRecord
+    crank_disc_bearing: NewtonPerMetre | BearingRecord
+    crank_carrier_bearing: NewtonPerMetre | BearingRecord
     carrier_bearing: NewtonPerMetre
     pin_contact: NewtonPerMetre | None = None
     pin_contact_law: Literal["constant", "table2"] = "constant"
+
+    def stiffness(self, material: MaterialRecord, face_width: float) -> Stiffness:
+        """Return all stiffnesses, given or by formula [N/m]; the disc's face width is in m."""
+        modulus, poisson = material.elastic_modulus_gpa * GIGAPASCAL, material.poisson_ratio
+        sun, mesh, journal, crank = (
+            self.sun_support,
+            self.gear_mesh,
+            self.crank_disc_bearing,
+            self.crank_carrier_bearing,
+        )
+        if isinstance(sun, ShaftRecord):
+            sun = shaft_support(sun.diameter_mm * MILLIMETRE, sun.length_mm * MILLIMETRE, modulus)
+        if isinstance(mesh, MeshRecord):
+            mesh = gear_mesh(
+                mesh.contact_ratio, mesh.sun_virtual_teeth, mesh.planet_virtual_teeth, mesh.face_width_mm * MILLIMETRE
+            )
+        if isinstance(journal, BearingRecord):
+            journal = roller_bearing(journal.loaded_length_mm * MILLIMETRE, modulus, poisson)
+        if isinstance(crank, BearingRecord):
+            crank = roller_bearing(crank.loaded_length_mm * MILLIMETRE, modulus, poisson, TAPER_ANGLE)
+        return Stiffness(
+            sun_support=sun,
+            gear_mesh=mesh,
+            crank_disc_bearing=journal,
+            crank_carrier_bearing=crank,
+            carrier_bearing=self.carrier_bearing,
+            pin_contact=self.pin_contact or line_contact(face_width, modulus, poisson),
+            pin_contact_law=self.pin_contact_law,
+        )
 
 
 class ModificationRecord(Record):
@@ -105,10 +164,6 @@ class ReducerRecord(Record):
         """Return the reducer in SI units."""
         first, cycloid, stiffness = self.first_stage, self.cycloid_stage, self.stiffness
         width = cycloid.face_width_mm * MILLIMETRE
-        given = stiffness.model_dump()
-        given["pin_contact"] = stiffness.pin_contact or line_contact(
-            width, self.material.elastic_modulus_gpa * GIGAPASCAL, self.material.poisson_ratio
-        )
         return Reducer(
             name=self.name,
             source=self.source,
@@ -128,7 +183,7 @@ class ReducerRecord(Record):
                 eccentricity=cycloid.eccentricity_mm * MILLIMETRE,
                 face_width=width,
             ),
-            stiffness=Stiffness(**given),
+            stiffness=stiffness.stiffness(self.material, width),
             modification=Modification(
                 equidistant=self.modification.equidistant_um * MICROMETRE,
                 shift=self.modification.shift_um * MICROMETRE,

@@ -8,6 +8,9 @@ from math import pi, radians, sin
 import numpy as np
 from jaxtyping import Float
 
+TAPER_ANGLE = radians(80.0)
+"""Contact angle of the taper roller bearings that liu2020 puts into K_b [rad]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stiffness:

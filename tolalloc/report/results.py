@@ -14,6 +14,7 @@ from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol import SobolIndices
 from tolalloc.surrogate.regression import NEEDED_Q2, Surrogate
+from tolalloc.uncertainty.unit_file import BuiltUnit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +60,8 @@ class StudyResults:
         Stand-in for single units, with its Q²; the kernel ran for the ranking unless it earned its place.
     allocation
         What the search found.
+    unit
+        The built unit that is shown, if any.
     examples
         Units whose curves are shown.
     statuses
@@ -78,6 +81,7 @@ class StudyResults:
     classical: ClassicalEstimate
     unit_surrogate: Surrogate
     allocation: Allocation
+    unit: BuiltUnit | None
     examples: tuple[ExampleUnit, ...]
     statuses: dict[str, int]
 
@@ -87,12 +91,10 @@ class StudyResults:
         clearances = self.space.clearances
         return (
             *self.reducer.assumptions,
-            "liu2020 prints magnitudes and angles of errors but not their zero directions and signs; the reading is "
-            "that of the unit file and the theory page",
-            "each zone is taken at the magnitude that liu2020, Table 4, measured on one unit; the zones of the shipped "
-            "table are not a maker's drawing",
-            "distributions, Cp = 1 and independence of the sources: no source prints them; see the list below",
-            "costs, their fall as 1/zone, and smallest and largest zones: no source prints them",
+            *(self.unit.assumptions if self.unit else ()),
+            "zones, distributions, Cp, costs, smallest and largest zones: as the tolerance table states them; its "
+            "notes say where each comes from (list below)",
+            "all sources are independent of each other; a cost falls as 1/zone",
             "tooth modification costs nothing and is exact; nominal clearance "
             f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
             f"{clearances.radial[0] * 1e6:g}…{clearances.radial[1] * 1e6:g} µm at tip and root",

@@ -174,9 +174,12 @@ def pareto(results: StudyResults) -> pd.DataFrame:
 
 
 def mappings(results: StudyResults) -> pd.DataFrame:
-    """Return how every zone became a distribution."""
+    """Return how every zone became a distribution, and where the zone comes from."""
     return pd.DataFrame(
-        [{"source": source.name, "zone → distribution": source.mapping} for source in results.space.errors.active]
+        [
+            {"source": source.name, "zone → distribution": source.mapping, "note of the table": source.note}
+            for source in results.space.errors.active
+        ]
     )
 
 

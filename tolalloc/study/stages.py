@@ -141,6 +141,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             classical=classical,
             unit_surrogate=surrogate,
             allocation=allocation,
+            unit=prepared.unit,
             examples=_examples(
                 prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design
             ),

@@ -30,6 +30,7 @@ class UnitRecord(Record):
     name: str
     source: str
     neglected: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     lengths: dict[str, Micrometres] = Field(default_factory=dict)
     vectors: dict[str, tuple[Magnitude, Degrees]] = Field(default_factory=dict)
     harmonics: dict[str, tuple[tuple[Order, Magnitude, Degrees], ...]] = Field(default_factory=dict)
@@ -47,12 +48,15 @@ class BuiltUnit:
         Column → deviation [m].
     neglected
         Names of sources that the unit leaves out, taken as zero.
+    assumptions
+        What the source does not print.
     """
 
     name: str
     source: str
     deviations: dict[str, float]
     neglected: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
     def errors(self, columns: Iterable[str]) -> Float[np.ndarray, "1 column"]:
         """Return the unit as one row of errors in the order of the model's columns [m].
@@ -98,4 +102,10 @@ def load_unit(name: str | Path) -> BuiltUnit:
         for order, amplitude, phase in waves:
             deviations[f"{source}.cos{order}"] = amplitude * MICROMETRE * sin(radians(phase))
             deviations[f"{source}.sin{order}"] = amplitude * MICROMETRE * cos(radians(phase))
-    return BuiltUnit(name=record.name, source=record.source, deviations=deviations, neglected=record.neglected)
+    return BuiltUnit(
+        name=record.name,
+        source=record.source,
+        deviations=deviations,
+        neglected=record.neglected,
+        assumptions=record.assumptions,
+    )
