@@ -211,6 +211,17 @@ def test_unknown_names_offer_the_nearest(tmp_path):
     refused(tolalloc("te", "--unit", path), "carrier.bore3.position", "carrier.bore1.position")
 
 
+@pytest.mark.parametrize("torque", ["nan", "0", "1e9"])
+def test_a_torque_without_meaning_is_refused(torque):
+    refused(tolalloc("te", "--torque", torque), "torque", "1670 N·m, but not 0")
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("keep")
+    refused(tolalloc("run", STUDY, "--quick", "--out", tmp_path / "file" / "run"), "cannot be made")
+    assert (tmp_path / "file").read_text() == "keep"
+
+
 def test_an_infeasible_limit_names_what_can_be_reached(tmp_path):
     out = tmp_path / "run"
     result = tolalloc("run", study_with(tmp_path, limit_arcsec=10.0), "--quick", "--out", out)
@@ -224,6 +235,8 @@ def test_an_infeasible_limit_names_what_can_be_reached(tmp_path):
         ({"limit_arcsec": -60.0}, ["limit_arcsec", "-60", "above 0"]),
         ({"yield_target": 99.73}, ["yield_target", "99.73", "0.5"]),
         ({"seed": -1}, ["seed", "-1"]),
+        ({"name": "../elsewhere"}, ["name", "../elsewhere", "letters"]),
+        ({"torque_nm": 1e9}, ["torque", "1670 N·m"]),
         ({"flank_clearance_um": (5.0, 1.0)}, ["flank_clearance_um", "smaller one first"]),
         ({"tolerances": "nothing.csv"}, ["nothing.csv", "no such file"]),
     ],

@@ -157,3 +157,4 @@ def test_a_torque_that_nothing_resists_is_a_status(rv20e, table4):
     )
     curves = loose.curves(table4, -1.0)
     assert (curves.status == Status.NOT_RESISTED).all()
+    assert np.isnan(curves.transmission_error).all()

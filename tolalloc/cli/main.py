@@ -111,7 +111,7 @@ def te(
     design = load_reducer(reducer)
     if stiffness:
         design = with_stiffness(design, load_identified_stiffness(stiffness))
-    answer = unit_answer(design, load_unit(unit), design.load.test_torque if torque is None else torque)
+    answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"))
     if as_json:
         sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
     else:

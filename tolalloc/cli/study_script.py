@@ -25,8 +25,9 @@ def load_study(path: Path) -> Study:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:
         reason = " ".join(str(error).split())
+        hint = "; is it truncated?" if isinstance(error, SyntaxError) else "."
         raise InputError(
-            f"{path}: the script cannot be read as a study ({type(error).__name__}: {reason}); is it truncated?"
+            f"{path}: the script cannot be read as a study ({type(error).__name__}: {reason}){hint}"
         ) from None
     study = names.get("study")
     if not isinstance(study, Study):

@@ -9,8 +9,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from tolalloc.equivalent.outputs import order_spectrum, torsional_stiffness
-from tolalloc.equivalent.status import count_statuses
+from tolalloc.equivalent.status import Status, count_statuses
 from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.exceptions import SolveError
 from tolalloc.reducer.design import Reducer
 from tolalloc.uncertainty.unit_file import BuiltUnit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
@@ -21,6 +22,9 @@ def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float) -> dict[str, A
     model, rated = EquivalentModel(reducer), reducer.load.rated_torque
     errors = unit.errors(model.columns)
     curves, extremes = model.curves(errors, torque), model.extremes(errors, torque)
+    worst = Status(max(extremes.status[0], curves.status.max()))
+    if worst is not Status.CONVERGED:
+        raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     perfect = np.zeros_like(errors)
     loads = (-0.03 * rated, -rated)
     return {

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int, UInt8
 
 from tolalloc.equivalent.adjoint import solve_derivatives
 from tolalloc.equivalent.condensation import ColumnLists, CondensedAngles, column_lists, condense
-from tolalloc.equivalent.contact_solver import solve_curves
+from tolalloc.equivalent.contact_solver import CONVERGED, solve_curves
 from tolalloc.equivalent.extremes import solve_extremes
 from tolalloc.reducer.design import Reducer
 
@@ -170,6 +170,7 @@ class EquivalentModel:
         solve_curves(
             tables, lists, np.ascontiguousarray(errors), torque, 0, 1, rotation, discs_at, status, residual, touching
         )
+        rotation[status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Curves(
             carrier_angle=carrier_angle,
             transmission_error=rotation,
@@ -198,6 +199,7 @@ class EquivalentModel:
             self._tables, lists, np.ascontiguousarray(errors), torque, search.coarse, how,
             extreme, position, left_over, solves, status, residual,
         )  # fmt: skip
+        extreme[status != CONVERGED] = np.nan
         return Extremes(
             largest=extreme[:, 0],
             smallest=extreme[:, 1],

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, sqrt
 
+from tolalloc.exceptions import InputError
 from tolalloc.reducer.stiffness import Stiffness
 
 
@@ -127,6 +128,19 @@ class Reducer:
     def planet_base_radius(self) -> float:
         """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
         return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+
+    def torque_on_carrier(self, asked: float | None, place: str) -> float:
+        """Return the torque to use, the test torque unless one is asked for [N·m].
+
+        Raises
+        ------
+        InputError
+            Zero, where the play leaves the equilibrium undetermined, or beyond ten times the rated torque.
+        """
+        torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
+        if not 0 < abs(torque) <= largest:
+            raise InputError.at(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
+        return torque
 
     @property
     def ratio(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -102,6 +103,7 @@ class Study:
     def __post_init__(self) -> None:
         place = f"study {self.name}"
         for name, value, good, allowed in (
+            ("name", self.name, re.fullmatch(r"[\w-][\w. -]*", self.name), "letters, digits, '_', '-', '.' and blanks"),
             ("limit_arcsec", self.limit_arcsec, 0 < self.limit_arcsec <= 3600, "above 0 up to 3600"),
             ("yield_target", self.yield_target, 0.5 <= self.yield_target < 1, "0.5 up to but not 1"),
             ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
@@ -187,7 +189,7 @@ def prepare(study: Study) -> Prepared:
     fixed: Mapping[str, float] = {**errors.still, **dict(zip(MODIFICATION, amounts, strict=True))}
     kernel = KernelResponse(
         model=model,
-        torque=reducer.load.test_torque if study.torque_nm is None else study.torque_nm,
+        torque=reducer.torque_on_carrier(study.torque_nm, f"study {study.name}"),
         columns=errors.columns,
         fixed=fixed,
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tolalloc.report.results import StudyResults
 from tolalloc.study.definition import QUICK, Study, prepare
-from tolalloc.study.run_folder import require_usable, write_run
+from tolalloc.study.run_folder import claimed, require_usable, write_run
 from tolalloc.study.stages import Progress, Record, run_stages
 
 
@@ -34,6 +34,7 @@ def run_study(study: Study, folder: Path, progress: Progress, *, quick: bool = F
     if quick:
         study = replace(study, effort=QUICK)
     prepared, record = prepare(study), Record(progress)
-    results = run_stages(prepared, record, quick)
-    write_run(folder, prepared, results, record)
+    with claimed(folder):
+        results = run_stages(prepared, record, quick)
+        write_run(folder, prepared, results, record)
     return results

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -40,6 +42,31 @@ def require_usable(folder: Path) -> None:
             f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), "
             "so that nothing is overwritten."
         )
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Make the folder before anything long runs; if the work inside fails, take it away again.
+
+    Raises
+    ------
+    RunFolderError
+        Something is in the way, or the folder cannot be made.
+    """
+    require_usable(folder)
+    new = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunFolderError(
+            f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
+        ) from None
+    try:
+        yield
+    except BaseException:
+        if new and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
 
 
 def manifest(prepared: Prepared, results: StudyResults, record: Record) -> dict[str, Any]:
@@ -111,7 +138,7 @@ def write_run(folder: Path, prepared: Prepared, results: StudyResults, record: R
         The folder is no longer empty.
     """
     require_usable(folder)
-    (folder / "figures").mkdir(parents=True)
+    (folder / "figures").mkdir()
     write_json(manifest(prepared, results, record), folder / "manifest.json")
     write_json(summary(results), folder / "summary.json")
     tables.ranking(results).to_csv(folder / "sensitivity.csv", index=False)
