@@ -45,6 +45,8 @@ class CycloidStage:
         Crank eccentricity e [m].
     face_width
         Loaded width b of a disc [m].
+    disc_spacing
+        Distance between the middle planes of neighbouring discs [m].
     """
 
     pin_count: int
@@ -53,6 +55,7 @@ class CycloidStage:
     pin_radius: float
     eccentricity: float
     face_width: float
+    disc_spacing: float = 0.0
 
     @property
     def shortening(self) -> float:
@@ -97,6 +100,24 @@ class Modification:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Clearances:
+    """Nominal clearance of the bilateral interfaces; where it is 0 the interface has no play.
+
+    Parameters
+    ----------
+    gear_mesh
+        Half the normal backlash of a sun–planet mesh [m].
+    crank_disc_bearing, crank_carrier_bearing, carrier_bearing
+        Radial clearance of a bearing, half its diametral one [m].
+    """
+
+    gear_mesh: float = 0.0
+    crank_disc_bearing: float = 0.0
+    crank_carrier_bearing: float = 0.0
+    carrier_bearing: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Load:
     """Torques on the carrier [N·m]; negative resists the positive direction of rotation."""
 
@@ -117,6 +138,7 @@ class Reducer:
     stiffness: Stiffness
     modification: Modification
     load: Load
+    clearances: Clearances = field(default_factory=Clearances)
     assumptions: tuple[str, ...] = field(default=())
 
     @property

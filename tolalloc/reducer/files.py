@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
-from tolalloc.reducer.design import CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.reducer.stiffness import (
     TAPER_ANGLE,
     IdentifiedStiffness,
@@ -47,6 +47,7 @@ class CycloidStageRecord(Record):
     pin_radius_mm: Annotated[float, Field(ge=0.1, le=50)]
     eccentricity_mm: Annotated[float, Field(ge=0.05, le=10)]
     face_width_mm: Annotated[float, Field(ge=0.5, le=200)]
+    disc_spacing_mm: Annotated[float, Field(ge=0, le=500)] | None = None
 
     @model_validator(mode="after")
     def _is_a_cycloid(self) -> CycloidStageRecord:
@@ -99,7 +100,7 @@ class StiffnessRecord(Record):
     crank_carrier_bearing: NewtonPerMetre | BearingRecord
     carrier_bearing: NewtonPerMetre
     pin_contact: NewtonPerMetre | None = None
-    pin_contact_law: Literal["constant", "table2"] = "constant"
+    pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
 
     def stiffness(self, material: MaterialRecord, face_width: float) -> Stiffness:
         """Return all stiffnesses, given or by formula [N/m]; the disc's face width is in m."""
@@ -131,6 +132,24 @@ class StiffnessRecord(Record):
         )
 
 
+class ClearancesRecord(Record):
+    """Table ``[clearances]``, half the play; an interface that is not named has none."""
+
+    gear_mesh_um: Annotated[float, Field(ge=0, le=200)] = 0.0
+    crank_disc_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
+    crank_carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
+    carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
+
+    def clearances(self) -> Clearances:
+        """Return the clearances in SI units."""
+        return Clearances(
+            gear_mesh=self.gear_mesh_um * MICROMETRE,
+            crank_disc_bearing=self.crank_disc_bearing_um * MICROMETRE,
+            crank_carrier_bearing=self.crank_carrier_bearing_um * MICROMETRE,
+            carrier_bearing=self.carrier_bearing_um * MICROMETRE,
+        )
+
+
 class ModificationRecord(Record):
     """Table ``[modification]``."""
 
@@ -158,6 +177,7 @@ class ReducerRecord(Record):
     stiffness: StiffnessRecord
     modification: ModificationRecord
     load: LoadRecord
+    clearances: ClearancesRecord = ClearancesRecord()
     assumptions: tuple[str, ...] = ()
 
     def reducer(self) -> Reducer:
@@ -182,6 +202,7 @@ class ReducerRecord(Record):
                 pin_radius=cycloid.pin_radius_mm * MILLIMETRE,
                 eccentricity=cycloid.eccentricity_mm * MILLIMETRE,
                 face_width=width,
+                disc_spacing=width if cycloid.disc_spacing_mm is None else cycloid.disc_spacing_mm * MILLIMETRE,
             ),
             stiffness=stiffness.stiffness(self.material, width),
             modification=Modification(
@@ -189,6 +210,7 @@ class ReducerRecord(Record):
                 shift=self.modification.shift_um * MICROMETRE,
             ),
             load=Load(test_torque=self.load.test_torque_nm, rated_torque=self.load.rated_torque_nm),
+            clearances=self.clearances.clearances(),
             assumptions=self.assumptions,
         )
 

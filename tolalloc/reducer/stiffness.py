@@ -31,7 +31,8 @@ class Stiffness:
     pin_contact
         C, one pin against one disc tooth [N/m].
     pin_contact_law
-        ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part.
+        ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part;
+        ``logarithmic``: Hertzian line contact, softer under small forces, C of the flat flank as its scale.
     """
 
     sun_support: float
@@ -184,3 +185,34 @@ def pin_contact_table2(
     length = pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
     concave = convex_stiffness * length / (length + 2 * pin_radius * np.maximum(curvature_term, 0.0))
     return np.where(curvature_term > 0, concave, convex_stiffness)
+
+
+def equivalent_length(
+    shortening: float,
+    pin_count: int,
+    pin_circle_radius: float,
+    pin_angle: Float[np.ndarray, "..."],
+) -> Float[np.ndarray, "..."]:
+    """Return L, the radius of curvature of the path of the pin's centre on the disc, at most Rp [m].
+
+    Notes
+    -----
+    It is the flank's radius plus r_rp where the flank is convex and minus r_rp where it is concave; with Hertz's half
+    width the approach of pin and flank depends on the radii by L alone. Near the inflection L grows without bound and
+    the approach only with its logarithm; Rp as the largest length is an assumption.
+
+    Parameters
+    ----------
+    shortening
+        K1 [-].
+    pin_count
+        zp [-].
+    pin_circle_radius
+        Rp [m].
+    pin_angle
+        Angle φ′ of the pin from the crank direction [rad].
+    """
+    cosine = np.cos(pin_angle)
+    curvature_term = np.abs(shortening * (1 + pin_count) * cosine - (1 + pin_count * shortening**2))
+    length = pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
+    return np.asarray(pin_circle_radius * length / np.maximum(length, pin_circle_radius * curvature_term))
