@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.reducer.files import load_reducer
 from tolalloc.uncertainty.unit_file import load_unit
 

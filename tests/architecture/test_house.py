@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tolalloc.equivalent.columns import source_name
+
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
 DOORS = {
@@ -80,12 +82,11 @@ def test_every_documented_number_states_its_unit():
 def test_columns_of_the_model_stand_in_the_nomenclature(rv20e):
     page = (ROOT / "docs" / "reference" / "nomenclature.md").read_text(encoding="utf-8")
     for column in rv20e.columns:
-        source = re.sub(r"\.(x|y|cos\d+|sin\d+)$", "", column)
-        generic = re.sub(r"crank\d+", "crank{i}", source)
+        generic = re.sub(r"crank\d+", "crank{i}", source_name(column))
         generic = re.sub(r"journal\d+", "journal{j}", generic)
         generic = re.sub(r"disc\d+", "disc{j}", generic)
         generic = re.sub(r"bore\d+", "bore{i}", generic)
-        generic = re.sub(r"planet\d+", "planet{i}", generic)
+        generic = re.sub(r"(planet|mesh)\d+", r"\1{i}", generic)
         generic = generic.removeprefix("modification.")
         assert f"`{generic}`" in page, generic
 

@@ -10,6 +10,9 @@ from jaxtyping import Float
 
 from tolalloc.reducer.design import Reducer
 
+HARMONICS = (1, 2, 4)
+"""Orders of the pitch and run-out deviations that liu2020 prints in Table 4."""
+
 
 @dataclass(frozen=True)
 class Coordinates:
@@ -52,6 +55,8 @@ class Positions:
         The nominal design.
     carrier_angle
         θc, counter-clockwise positive; one output turn is 0 … 2π [rad].
+    orders
+        Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
 
     Notes
     -----
@@ -60,6 +65,7 @@ class Positions:
 
     reducer: Reducer
     carrier_angle: Float[np.ndarray, " angle"]
+    orders: tuple[int, ...] = HARMONICS
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -78,6 +84,10 @@ class Positions:
     def crank_position(self, crank: int) -> Float[np.ndarray, " angle"]:
         """P_i = θc + φ_i, the direction of a crank axis on the carrier [rad]."""
         return self.carrier_angle + 2 * np.pi * crank / self.reducer.crank_count
+
+    def plane(self, disc: int) -> float:
+        """z_j − z_0, height of a disc's middle plane above the middle of all discs [m]."""
+        return (disc - (self.reducer.disc_count - 1) / 2) * self.reducer.cycloid_stage.disc_spacing
 
     @cached_property
     def sun_angle(self) -> Float[np.ndarray, " angle"]:

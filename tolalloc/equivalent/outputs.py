@@ -1,13 +1,16 @@
-"""What engineers read off the equilibria: orders of the transmission error, torsional stiffness."""
+"""What engineers read off the equilibria, each output one small function over the same solve."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.equivalent.answers import Equilibria
+from tolalloc.equivalent.forces import Forces, forces
+from tolalloc.units import ARCSECOND
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +31,12 @@ class Orders:
     amplitude: Float[np.ndarray, "sample order"]
     phase: Float[np.ndarray, "sample order"]
 
-    def main(self, count: int, sample: int = 0) -> list[tuple[int, float]]:
-        """Return the strongest orders of one sample with their amplitude [rad], strongest first."""
+    def main(self, count: int, sample: int = 0) -> list[tuple[int, float, float]]:
+        """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first."""
         strongest = np.argsort(-self.amplitude[sample])[:count]
-        return [(int(self.order[at]), float(self.amplitude[sample, at])) for at in strongest]
+        return [
+            (int(self.order[at]), float(self.amplitude[sample, at]), float(self.phase[sample, at])) for at in strongest
+        ]
 
 
 def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
@@ -47,19 +52,83 @@ def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Ord
     return Orders(order=np.arange(1, waves.shape[1] + 1), amplitude=np.abs(waves), phase=np.angle(waves))
 
 
-def torsional_stiffness(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"], torque: float, other_torque: float
-) -> Float[np.ndarray, " sample"]:
-    """Return the torsional stiffness between two torques, its twist averaged over one turn [N·m/rad].
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """One solve over a turn, with what several outputs need.
 
     Parameters
     ----------
-    model
-        The reducer.
-    errors
-        Deviations in the order of the model's columns [m].
-    torque, other_torque
-        The two torques on the carrier [N·m].
+    equilibria
+        Equilibria of all samples over one turn.
+    forces
+        Forces in them.
     """
-    twist = [model.curves(errors, value).transmission_error.mean(axis=1) for value in (torque, other_torque)]
-    return np.asarray((torque - other_torque) / (twist[0] - twist[1]))
+
+    equilibria: Equilibria
+    forces: Forces
+
+    @classmethod
+    def of(cls, equilibria: Equilibria) -> Solved:
+        """Return the equilibria with their forces."""
+        return cls(equilibria=equilibria, forces=forces(equilibria))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """A number per sample.
+
+    Parameters
+    ----------
+    name, unit
+        What it is, and its unit of measurement.
+    value
+        From a solve, the number of each sample.
+    """
+
+    name: str
+    unit: str
+    value: Callable[[Solved], Float[np.ndarray, " sample"]]
+
+
+def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
+    """Return the share of all pin force that each disc carries, mean over the turn [-]."""
+    total = pins.sum(axis=(1, 3))
+    return np.asarray(total / total.sum(axis=1, keepdims=True))
+
+
+def _mean(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.transmission_error.mean(axis=1) / ARCSECOND)
+
+
+def _fewest(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.pins_in_contact.min(axis=1), float)
+
+
+def _most(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.pins_in_contact.max(axis=1), float)
+
+
+def _pin_force(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.forces.pins.max(axis=(1, 2, 3)))
+
+
+def _interface_force(interface: str) -> Callable[[Solved], Float[np.ndarray, " sample"]]:
+    return lambda solved: np.asarray(solved.forces.of(interface).max(axis=(1, 2)))
+
+
+def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(load_share(solved.forces.pins).max(axis=1))
+
+
+OUTPUTS = (
+    Output(name="mean transmission error", unit="arcsec", value=_mean),
+    Output(name="pins in contact, least", unit="-", value=_fewest),
+    Output(name="pins in contact, most", unit="-", value=_most),
+    Output(name="largest pin force", unit="N", value=_pin_force),
+    Output(name="largest mesh force", unit="N", value=_interface_force("gear_mesh")),
+    Output(name="largest crank–disc bearing force", unit="N", value=_interface_force("crank_disc_bearing")),
+    Output(name="largest crank–carrier bearing force", unit="N", value=_interface_force("crank_carrier_bearing")),
+    Output(name="largest carrier bearing force", unit="N", value=_interface_force("carrier_bearing")),
+    Output(name="share of the pin force on the most loaded disc", unit="-", value=_largest_share),
+)
+"""Every output of one solve; a new one is one function and one line here."""

@@ -5,127 +5,175 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from tolalloc.equivalent.kinematics import Positions
-from tolalloc.equivalent.springs import SpringGroup
-from tolalloc.reducer.stiffness import pin_contact_table2
+from tolalloc.equivalent.springs import SpringGroup, harmonic_columns, harmonic_waves, vector_columns
+from tolalloc.reducer.design import Reducer
+from tolalloc.reducer.stiffness import equivalent_length, pin_contact_table2
 
-HARMONICS = (1, 2, 4)
-"""Orders of the pitch and run-out deviations, those that liu2020 prints in Table 4."""
+Terms = dict[str, list[tuple[int, float]]]
+"""Column → the entries of a table that it moves, and by how much each [m/m or -]."""
 
 
-@dataclass(frozen=True)
-class PinGeometry:
-    """Directions of one disc's contact with every pin, on the nominal profile.
+@dataclass(frozen=True, kw_only=True)
+class PinContact:
+    """Contact of every disc with every pin at a batch of carrier angles; compression is minus the gap.
 
     Parameters
     ----------
-    towards_crank, towards_tangent
-        cos a and sin a: the normal from the pin into the disc, seen from the crank direction [-].
-    outward, tangential
-        cos κ and sin κ: the same normal seen from the pin's radius [-].
-    disc_angle
-        θ_b, angle of the contact point in the disc's own frame [rad].
-    normal_on_radius, normal_on_tangent
-        n·e_r and n·e_t at the contact point, about the disc's centre [-].
+    by_disc
+        Compression per displacement x, y and rotation of the disc [m/m, m/m, m/rad].
+    by_pin
+        Compression per radial and tangential deviation of the pin's place [m/m].
+    by_tooth
+        Compression per pitch and run-out deviation of the tooth that the pin meets [m/m].
+    tooth
+        Which tooth that is, counted from 0 at the disc's zero direction [-].
+    tooth_angle
+        θ_b, where on the disc the contact is, in the disc's own frame [rad].
     stiffness
         Contact stiffness of the pin at this tooth [N/m].
+    equivalent_length
+        L of the logarithmic law, `tolalloc.reducer.stiffness.equivalent_length` [m].
     """
 
-    towards_crank: Float[np.ndarray, "angle pin"]
-    towards_tangent: Float[np.ndarray, "angle pin"]
-    outward: Float[np.ndarray, "angle pin"]
-    tangential: Float[np.ndarray, "angle pin"]
-    disc_angle: Float[np.ndarray, "angle pin"]
-    normal_on_radius: Float[np.ndarray, "angle pin"]
-    normal_on_tangent: Float[np.ndarray, "angle pin"]
-    stiffness: Float[np.ndarray, "angle pin"]
+    by_disc: Float[np.ndarray, "angle disc 3 pin"]
+    by_pin: Float[np.ndarray, "angle disc 2 pin"]
+    by_tooth: Float[np.ndarray, "angle disc 2 pin"]
+    tooth: Int[np.ndarray, "angle disc pin"]
+    tooth_angle: Float[np.ndarray, "angle disc pin"]
+    stiffness: Float[np.ndarray, "angle disc pin"]
+    equivalent_length: Float[np.ndarray, "angle disc pin"]
 
 
-def pin_geometry(at: Positions, disc: int) -> PinGeometry:
-    """Return the contact directions of one disc, theory page equations (13)–(16)."""
-    stage, constant = at.reducer.cycloid_stage, at.reducer.stiffness.pin_contact
-    shortening = stage.shortening
-    direction = at.disc_direction(disc)[:, np.newaxis]
-    pin_angle = at.pin_direction[np.newaxis, :] - direction
+def pin_contact(at: Positions) -> PinContact:
+    """Return the contacts of all discs, theory page equations (13)–(18).
+
+    Notes
+    -----
+    A tooth reaches from one root to the next. Its number follows from the contact's place on the disc, so it is tracked
+    through the whole turn; at a root, where it changes, a pitch deviation has no effect.
+    """
+    stage, stiffness = at.reducer.cycloid_stage, at.reducer.stiffness
+    shortening, teeth = stage.shortening, stage.disc_teeth
+    direction = np.stack([at.disc_direction(disc) for disc in range(at.reducer.disc_count)], axis=1)[..., np.newaxis]
+    pin_angle = at.pin_direction - direction
     cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
     root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
     towards_crank, towards_tangent = (shortening - cosine) / root, -sine / root
+    normal = direction + np.arctan2(towards_tangent, towards_crank)
     # Contact point Q seen from the disc's centre, axes along and across the crank direction.
     along = stage.pin_circle_radius * cosine + stage.pin_radius * towards_crank - stage.eccentricity
     across = stage.pin_circle_radius * sine + stage.pin_radius * towards_tangent
     radius = np.hypot(along, across)
-    if at.reducer.stiffness.pin_contact_law == "table2":
-        stiffness = pin_contact_table2(
-            constant, shortening, stage.pin_count, stage.pin_circle_radius, stage.pin_radius, pin_angle
+    # Unwrapped, so that a whole pin pitch of crank angle is a whole tooth; rounding must not change the tooth.
+    turned = np.arctan2(across, along) - np.arctan2(sine, cosine) + at.pin_direction + direction / teeth
+    if stiffness.pin_contact_law == "table2":
+        contact = pin_contact_table2(
+            stiffness.pin_contact, shortening, stage.pin_count, stage.pin_circle_radius, stage.pin_radius, pin_angle
         )
     else:
-        stiffness = np.full_like(pin_angle, constant)
-    return PinGeometry(
-        towards_crank=towards_crank,
-        towards_tangent=towards_tangent,
-        outward=(1 - shortening * cosine) / root,
-        tangential=shortening * sine / root,
-        disc_angle=np.arctan2(across, along) + direction * (1 + 1 / stage.disc_teeth),
-        normal_on_radius=(towards_crank * along + towards_tangent * across) / radius,
-        normal_on_tangent=(-towards_crank * across + towards_tangent * along) / radius,
-        stiffness=stiffness,
+        contact = np.full_like(pin_angle, stiffness.pin_contact)
+    lever = stage.disc_pitch_radius * towards_tangent
+    return PinContact(
+        by_disc=np.stack([-np.cos(normal), -np.sin(normal), -lever], axis=2),
+        by_pin=np.stack([shortening * cosine - 1, -shortening * sine], axis=2) / root[:, :, np.newaxis],
+        by_tooth=np.stack(
+            [
+                (towards_crank * across - towards_tangent * along) / radius,
+                -(towards_crank * along + towards_tangent * across) / radius,
+            ],
+            axis=2,
+        ),
+        tooth=np.floor(turned * teeth / (2 * np.pi) + 1e-9).astype(np.int64) % teeth,
+        tooth_angle=turned,
+        stiffness=contact,
+        equivalent_length=equivalent_length(shortening, stage.pin_count, stage.pin_circle_radius, pin_angle),
     )
 
 
-def harmonic_columns(name: str) -> tuple[str, ...]:
-    """Return the column names of a deviation along a ring: cosine and sine amplitude of each order."""
-    return tuple(f"{name}.{wave}{order}" for order in HARMONICS for wave in ("cos", "sin"))
-
-
-def _waves(angle: Float[np.ndarray, "..."]) -> Float[np.ndarray, "... wave"]:
-    """Return the cosine and sine of every order at the angles."""
-    return np.stack([wave(order * angle) for order in HARMONICS for wave in (np.cos, np.sin)], axis=-1)
-
-
-def pin_contact(at: Positions) -> SpringGroup:
-    """Return one unilateral spring per disc and pin; compression is minus the gap, equations (17)–(18).
+def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
+    """Return what each column adds to the pins: entries 0, zp, 2zp … are radial, tangential and radius deviations.
 
     Notes
     -----
-    Lengths, outward or material added positive unless said otherwise [m]: ``housing.pitch`` (tangential,
-    counter-clockwise) and ``housing.runout`` of the pin positions, ``housing.groove.radius`` r_k (a larger groove
-    lets the pin sink), ``pin.diameter`` d_k, ``modification.equidistant`` Δr_rp, ``modification.shift``
-    Δr_p, ``disc{j}.pitch`` along the arc and ``disc{j}.runout`` of the teeth.
+    Outward, counter-clockwise or material added is positive unless said otherwise [m]. For all pins alike:
+    ``pin.diameter`` d_k, ``housing.groove.radius`` r_k (a larger groove lets the pin sink),
+    ``modification.equidistant`` Δr_rp and ``modification.shift`` Δr_p. Along the ring: ``housing.runout`` radial, ``housing.pitch`` tangential.
+    One pin k alone: ``each_pin.position.{k}`` with x radial and y tangential, ``each_pin.diameter.{k}``,
+    ``each_pin.groove.{k}``.
     """
-    discs, pins = at.reducer.disc_count, at.reducer.cycloid_stage.pin_count
-    angles, waves = at.carrier_angle.size, 2 * len(HARMONICS)
-    shared = ("pin.diameter", "housing.groove.radius", "modification.equidistant", "modification.shift")
-    columns = [*shared, *harmonic_columns("housing.runout"), *harmonic_columns("housing.pitch")]
-    first_disc_column = len(columns)
-    displacement = np.zeros((angles, discs * pins, at.coordinates.count))
-    gap = np.zeros((angles, discs * pins, first_disc_column + discs * 2 * waves))
-    stiffness = np.zeros((angles, discs * pins))
-    housing_waves = _waves(at.pin_direction)
+    pins = reducer.cycloid_stage.pin_count
+    radial, tangential, radius = (range(first, first + pins) for first in (0, pins, 2 * pins))
+    terms: Terms = {
+        "pin.diameter": [(entry, 1.0) for entry in radius],
+        "housing.groove.radius": [(entry, -1.0) for entry in radius],
+        "modification.equidistant": [(entry, -1.0) for entry in radius],
+        "modification.shift": [(entry, -1.0) for entry in radial],
+    }
+    waves = harmonic_waves(2 * np.pi * np.arange(pins) / pins, orders)
+    for name, entries in (("housing.runout", radial), ("housing.pitch", tangential)):
+        for column, wave in zip(harmonic_columns(name, orders), waves.T, strict=True):
+            terms[column] = list(zip(entries, (float(value) for value in wave), strict=True))
+    for pin in range(pins):
+        terms[f"each_pin.diameter.{pin + 1}"] = [(radius[pin], 1.0)]
+        terms[f"each_pin.groove.{pin + 1}"] = [(radius[pin], -1.0)]
+        x, y = vector_columns(f"each_pin.position.{pin + 1}")
+        terms |= {x: [(radial[pin], 1.0)], y: [(tangential[pin], 1.0)]}
+    return terms
+
+
+def wave_terms(disc: int, orders: tuple[int, ...]) -> Terms:
+    """Return the harmonic deviations of a disc's teeth: ``disc{j}.pitch`` along the arc, ``disc{j}.runout`` outward."""
+    names = (*harmonic_columns(f"disc{disc + 1}.pitch", orders), *harmonic_columns(f"disc{disc + 1}.runout", orders))
+    return {name: [(entry, 1.0)] for entry, name in enumerate(names)}
+
+
+def tooth_terms(reducer: Reducer, disc: int) -> Terms:
+    """Return the deviations of single teeth t: ``disc{j}.each_tooth.pitch.{t}``, ``disc{j}.each_tooth.runout.{t}``."""
+    names = (
+        f"disc{disc + 1}.each_tooth.{kind}.{tooth + 1}"
+        for kind in ("pitch", "runout")
+        for tooth in range(reducer.cycloid_stage.disc_teeth)
+    )
+    return {name: [(entry, 1.0)] for entry, name in enumerate(names)}
+
+
+def tilt_terms(disc: int) -> Terms:
+    """Return the tilt of a disc, ``disc{j}.tilt``, which turns with it [rad]."""
+    return {name: [(entry, 1.0)] for entry, name in enumerate(vector_columns(f"disc{disc + 1}.tilt"))}
+
+
+def dense_rows(at: Positions) -> SpringGroup:
+    """Return the pin contacts with all columns but the tilt as one plain spring group: large, for proofs only."""
+    contact, reducer = pin_contact(at), at.reducer
+    angles, discs, pins = contact.stiffness.shape
+    stage, coordinates = reducer.cycloid_stage, at.coordinates
+    displacement = np.zeros((angles, discs, pins, coordinates.count))
+    columns: dict[str, Float[np.ndarray, "angle disc pin"]] = {}
+    own_pin = np.concatenate([contact.by_pin, np.ones((angles, discs, 1, pins))], axis=2)
+    for name, terms in pin_terms(reducer, at.orders).items():
+        column = columns.setdefault(name, np.zeros((angles, discs, pins)))
+        for entry, factor in terms:
+            column[:, :, entry % pins] += factor * own_pin[:, :, entry // pins, entry % pins]
     for disc in range(discs):
-        geometry, rows = pin_geometry(at, disc), slice(disc * pins, (disc + 1) * pins)
-        normal_angle = at.disc_direction(disc)[:, np.newaxis] + np.arctan2(
-            geometry.towards_tangent, geometry.towards_crank
-        )
-        plate = at.coordinates.disc(disc)
-        displacement[:, rows, plate] = -np.cos(normal_angle)
-        displacement[:, rows, plate + 1] = -np.sin(normal_angle)
-        displacement[:, rows, plate + 2] = -at.reducer.cycloid_stage.disc_pitch_radius * geometry.towards_tangent
-        gap[:, rows, 0:3] = (-1.0, 1.0, 1.0)
-        gap[:, rows, 3] = -geometry.outward
-        gap[:, rows, 4 : 4 + waves] = geometry.outward[..., np.newaxis] * housing_waves
-        gap[:, rows, 4 + waves : 4 + 2 * waves] = geometry.tangential[..., np.newaxis] * housing_waves
-        disc_waves, start = _waves(geometry.disc_angle), first_disc_column + disc * 2 * waves
-        gap[:, rows, start : start + waves] = geometry.normal_on_tangent[..., np.newaxis] * disc_waves
-        gap[:, rows, start + waves : start + 2 * waves] = geometry.normal_on_radius[..., np.newaxis] * disc_waves
-        stiffness[:, rows] = geometry.stiffness
-        columns += [*harmonic_columns(f"disc{disc + 1}.pitch"), *harmonic_columns(f"disc{disc + 1}.runout")]
+        first = coordinates.disc(disc)
+        displacement[:, disc, :, first : first + 3] = np.swapaxes(contact.by_disc[:, disc], 1, 2)
+        waves = harmonic_waves(contact.tooth_angle[:, disc], at.orders)
+        for entry, name in enumerate(wave_terms(disc, at.orders)):
+            column = columns.setdefault(name, np.zeros((angles, discs, pins)))
+            column[:, disc] = contact.by_tooth[:, disc, entry // waves.shape[2]] * waves[..., entry % waves.shape[2]]
+        for entry, name in enumerate(tooth_terms(reducer, disc)):
+            column = columns.setdefault(name, np.zeros((angles, discs, pins)))
+            met = contact.tooth[:, disc] == entry % stage.disc_teeth
+            column[:, disc] = np.where(met, contact.by_tooth[:, disc, entry // stage.disc_teeth], 0.0)
     return SpringGroup(
         name="pin contact",
-        displacement=displacement,
-        error=-gap,
+        stiffness_name="pin_contact",
+        displacement=displacement.reshape(angles, discs * pins, coordinates.count),
+        error=np.stack(list(columns.values()), axis=-1).reshape(angles, discs * pins, len(columns)),
         columns=tuple(columns),
-        stiffness=stiffness,
+        stiffness=contact.stiffness.reshape(angles, discs * pins),
         contact="unilateral",
     )

@@ -1,0 +1,236 @@
+"""The equivalent model of a reducer: errors in, equilibria and transmission error out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.equivalent.angle_search import AngleSearch
+from tolalloc.equivalent.answers import Derivatives, Equilibria, Extremes
+from tolalloc.equivalent.columns import Columns
+from tolalloc.equivalent.condensation import CondensedAngles, condense, error_columns
+from tolalloc.equivalent.kinematics import HARMONICS
+from tolalloc.equivalent.solvers.adjoint import Derivative, solve_peak_to_peak_derivatives, solve_rotation_derivatives
+from tolalloc.equivalent.solvers.contact_solver import CONVERGED
+from tolalloc.equivalent.solvers.extremes import Found, solve_extremes
+from tolalloc.equivalent.solvers.turn import Design, Turn, design_of, solve_curves
+from tolalloc.reducer.design import Reducer
+
+
+@dataclass(frozen=True)
+class EquivalentModel:
+    """Equivalent spring model of one reducer, liu2020 equations (1)–(14).
+
+    Parameters
+    ----------
+    reducer
+        Nominal design, stiffness and load.
+    search
+        At which angles the extremes are looked for.
+    orders
+        Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
+
+    Notes
+    -----
+    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
+    """
+
+    reducer: Reducer
+    search: AngleSearch = field(default_factory=AngleSearch)
+    orders: tuple[int, ...] = HARMONICS
+
+    @cached_property
+    def error_columns(self) -> Columns:
+        """The error columns and the values that they move."""
+        return error_columns(self.reducer, self.orders)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the error columns, the order of the errors that every method takes."""
+        return self.error_columns.names
+
+    @property
+    def design(self) -> Design:
+        """The reducer as the solvers take it."""
+        return design_of(self.reducer)
+
+    @cached_property
+    def _tables(self) -> CondensedAngles:
+        return self.tables_at(self.search.node_angle)
+
+    @cached_property
+    def _turn(self) -> tuple[Float[np.ndarray, " angle"], CondensedAngles]:
+        """The coarse angles and their tables."""
+        angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
+        return angle, self.tables_at(angle)
+
+    def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+        """Return the condensed tables at the carrier angles [rad]."""
+        return condense(self.reducer, self.orders, carrier_angle)
+
+    def equilibria(
+        self,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float,
+        carrier_angle: Float[np.ndarray, " angle"] | None = None,
+    ) -> Equilibria:
+        """Return the equilibrium of every sample at the carrier angles.
+
+        Parameters
+        ----------
+        errors
+            Deviations in the order of ``columns`` [m, angles rad].
+        torque
+            Torque on the carrier; negative resists the rotation [N·m].
+        carrier_angle
+            Carrier angles; the coarse angles of the search unless given [rad].
+        """
+        angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
+        shape = (errors.shape[0], angle.size)
+        turn = Turn(
+            np.empty(shape),
+            np.empty((*shape, tables.load.shape[2])),
+            np.empty(shape, np.uint8),
+            np.empty(shape),
+            np.empty(shape, np.uint8),
+        )
+        columns = self.error_columns
+        solve_curves(0, 1, tables, columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque, turn)
+        turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
+        return Equilibria(
+            reducer=self.reducer,
+            columns=columns,
+            tables=tables,
+            errors=errors,
+            torque=torque,
+            carrier_angle=angle,
+            transmission_error=turn.rotation,
+            kept=turn.kept,
+            status=turn.status,
+            residual=turn.residual,
+            pins_in_contact=turn.touching,
+        )
+
+    def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
+        """Return the refined extremes of every sample over one output turn.
+
+        Parameters
+        ----------
+        errors
+            Deviations in the order of ``columns`` [m, angles rad].
+        torque
+            Torque on the carrier; negative resists the rotation [N·m].
+        """
+        samples, columns, halving = errors.shape[0], self.error_columns, self.search.halving
+        found = Found(
+            np.empty((samples, 2)),
+            np.empty((samples, 2)),
+            np.empty(samples),
+            np.empty(samples, np.int64),
+            np.empty(samples, np.uint8),
+            np.empty(samples),
+        )
+        solve_extremes(
+            self._tables, columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque, halving, found
+        )
+        found.extreme[found.status != CONVERGED] = np.nan
+        return Extremes(
+            largest=found.extreme[:, 0],
+            smallest=found.extreme[:, 1],
+            carrier_angle=(found.position - halving.first) * self.search.node_step,
+            remaining=found.left_over,
+            solves=found.solves,
+            status=found.status,
+            residual=found.residual,
+        )
+
+    def peak_to_peak_derivatives(
+        self, errors: Float[np.ndarray, "sample column"], torque: float
+    ) -> tuple[Extremes, Derivatives]:
+        """Return the extremes and the exact derivatives of the peak-to-peak.
+
+        Parameters
+        ----------
+        errors
+            Deviations in the order of ``columns`` [m, angles rad].
+        torque
+            Torque on the carrier; negative resists the rotation [N·m].
+
+        Notes
+        -----
+        Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
+        is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
+        """
+        extremes, columns, halving = self.extremes(errors, torque), self.error_columns, self.search.halving
+        derivative = self._derivative(errors.shape[0])
+        derivative.status[:] = extremes.status
+        solve_peak_to_peak_derivatives(
+            self._tables,
+            columns.layout,
+            columns.map,
+            self.design,
+            np.ascontiguousarray(errors),
+            torque,
+            extremes.carrier_angle / self.search.node_step + halving.first,
+            halving.stride * 0.5**halving.levels,
+            derivative,
+        )
+        np.maximum(extremes.status, derivative.status, out=extremes.status)
+        return extremes, self._derivatives(derivative)
+
+    def rotation_derivatives(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Derivatives:
+        """Return the exact derivatives of one sample's transmission error at every coarse angle of the search.
+
+        Parameters
+        ----------
+        errors
+            Deviations in the order of ``columns`` [m, angles rad].
+        torque
+            Torque on the carrier; negative resists the rotation [N·m].
+
+        Notes
+        -----
+        They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
+        """
+        columns, halving = self.error_columns, self.search.halving
+        derivative = self._derivative(halving.coarse)
+        position = halving.first + halving.stride * np.arange(float(halving.coarse))
+        solve_rotation_derivatives(
+            self._tables,
+            columns.layout,
+            columns.map,
+            self.design,
+            np.ascontiguousarray(errors),
+            torque,
+            position,
+            derivative,
+        )
+        return self._derivatives(derivative)
+
+    def _derivative(self, items: int) -> Derivative:
+        rows = self._tables.row_stiffness.shape[1] + self._tables.play_stiffness.shape[1]
+        return Derivative(
+            np.empty((items, self.error_columns.layout.end)),
+            np.empty((items, rows)),
+            np.empty(items),
+            np.empty(items, np.uint8),
+        )
+
+    def _derivatives(self, derivative: Derivative) -> Derivatives:
+        """Return the derivatives by columns and by named stiffnesses."""
+        columns = self.error_columns
+        stiffness = self.reducer.stiffness
+        by_stiffness = {
+            name: getattr(stiffness, name) * derivative.by_row[:, rows].sum(axis=1)
+            for name, rows in columns.rows_of_stiffness.items()
+        }
+        return Derivatives(
+            by_error=np.asarray((columns.matrix.T @ derivative.by_value.T).T),
+            by_torque=derivative.by_value[:, columns.layout.torque],
+            by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
+            status=derivative.status,
+        )

@@ -1,0 +1,46 @@
+"""How the kernel's functions are compiled: without the interpreter's lock, without reordered sums, kept on disc.
+
+numba keeps a compiled function until its own file changes, although functions from other files are built into it. So
+what is kept stands in a folder named after a digest of this whole room: a change in any file compiles all anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba as nb
+
+_ROOM = Path(__file__).parent
+_DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_ROOM.glob("*.py")))).hexdigest()
+_KEPT = _ROOM / "__pycache__" / f"compiled-{_DIGEST[:16]}"
+
+
+def is_kept() -> bool:
+    """Return whether functions of this version were compiled on this machine before."""
+    return _KEPT.exists()
+
+
+def _compile(function: Callable[..., Any], parallel: bool) -> Any:
+    others = nb.config.CACHE_DIR
+    nb.config.CACHE_DIR = str(_KEPT)  # read while decorating only
+    try:
+        return nb.njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(function)
+    finally:
+        nb.config.CACHE_DIR = others
+
+
+def jit(function: Callable[..., Any]) -> Any:
+    """Compile a function for one thread."""
+    return _compile(function, parallel=False)
+
+
+def parallel_jit(function: Callable[..., Any]) -> Any:
+    """Compile a function whose `numba.prange` loops share their turns among the threads.
+
+    The loop's number is unsigned to the threads and signed to the rest; pass ``np.int64(number)`` on, or all that
+    is called is compiled twice.
+    """
+    return _compile(function, parallel=True)

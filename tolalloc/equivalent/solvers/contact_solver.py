@@ -1,0 +1,339 @@
+"""Equilibrium of one sample at one angle, for every contact law, tilt and play.
+
+The energy ½qᵀSq − fᵀq + Σφ(h + D·q) is convex. Newton's method with an exact line search converges from anywhere in a
+few steps; a plain active-set iteration cycles. S has one zero eigenvalue (the whole mechanism turning), so with too few
+contacts the tangent is singular: a vanishing pivot is then replaced by a small one, which keeps the step a descent
+direction, and the line search stops where contacts take over.
+
+Each sample is solved alone and in a fixed order of operations, so its bits do not depend on the number of threads, on
+its place in a batch or on its neighbours.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.equivalent.solvers.contact_law import LINEAR, pin_force
+
+CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
+
+TOLERANCE = 1e-11  # of the largest force; the promise to users is 1e-9
+ROUNDING = 2e-15  # of the terms that cancel in the balance of forces; below it a residual is noise
+PIVOT = 1e-12  # of the largest diagonal entry
+_ITERATIONS = 100
+_SOFTEST = 6  # decades by which play is softened where a part slides around inside its bearing
+_SEARCH_STEPS = 200
+_FARTHEST = 1e9  # steps; a contact that resists only beyond is none
+_REACH = 1.0  # metres; the same
+
+
+class Problem(NamedTuple):
+    """One sample at one angle, in the kept coordinates; the discs' come first.
+
+    Parameters
+    ----------
+    law
+        `tolalloc.equivalent.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+    stiffness, force
+        S [N/m] and f [N].
+    by_disc, undisturbed
+        D [m/m] and compression h at undisplaced discs [m].
+    contact, length, half_tilt
+        Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m].
+    play_by_kept, play_offset
+        Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m].
+    play_stiffness, clearance
+        Stiffness [N/m] and clearance [m] of every element with play.
+    """
+
+    law: int
+    stiffness: Float[np.ndarray, "kept kept"]
+    force: Float[np.ndarray, " kept"]
+    by_disc: Float[np.ndarray, "disc 3 pin"]
+    undisturbed: Float[np.ndarray, " contact"]
+    contact: Float[np.ndarray, " contact"]
+    length: Float[np.ndarray, " contact"]
+    half_tilt: Float[np.ndarray, " contact"]
+    play_by_kept: Float[np.ndarray, "element 2 kept"]
+    play_offset: Float[np.ndarray, "element 2"]
+    play_stiffness: Float[np.ndarray, " element"]
+    clearance: Float[np.ndarray, " element"]
+
+
+class Work(NamedTuple):
+    """Work space of one thread: what changes from one Newton step to the next."""
+
+    compression: Float[np.ndarray, " contact"]
+    rate: Float[np.ndarray, " contact"]
+    play: Float[np.ndarray, "element 2"]
+    play_rate: Float[np.ndarray, "element 2"]
+    gradient: Float[np.ndarray, " kept"]
+    step: Float[np.ndarray, " kept"]
+    tangent: Float[np.ndarray, "kept kept"]
+
+
+@jit
+def make_work(kept, contacts, elements):
+    """Return a new work space."""
+    return Work(
+        np.empty(contacts),
+        np.empty(contacts),
+        np.empty((elements, 2)),
+        np.empty((elements, 2)),
+        np.empty(kept),
+        np.empty(kept),
+        np.empty((kept, kept)),
+    )
+
+
+@jit
+def solve_tangent(tangent, gradient, step):
+    """Solve tangent·step = −gradient by Cholesky in place; return whether a pivot was replaced."""
+    size = gradient.size
+    largest = 0.0
+    for i in range(size):
+        largest = max(largest, tangent[i, i])
+    replaced = False
+    for i in range(size):
+        for j in range(i):
+            value = tangent[i, j]
+            for m in range(j):
+                value -= tangent[i, m] * tangent[j, m]
+            tangent[i, j] = value / tangent[j, j]
+        pivot = tangent[i, i]
+        for m in range(i):
+            pivot -= tangent[i, m] * tangent[i, m]
+        if not pivot > PIVOT * largest:
+            pivot = PIVOT * largest
+            replaced = True
+        tangent[i, i] = np.sqrt(pivot)
+    for i in range(size):
+        value = -gradient[i]
+        for m in range(i):
+            value -= tangent[i, m] * step[m]
+        step[i] = value / tangent[i, i]
+    for i in range(size - 1, -1, -1):
+        value = step[i]
+        for m in range(i + 1, size):
+            value -= tangent[m, i] * step[m]
+        step[i] = value / tangent[i, i]
+    return replaced
+
+
+@jit
+def _along(by_disc, play_by_kept, vector, compression, play):
+    """Set the compressions of pins and elements that a displacement gives."""
+    discs, _, pins = by_disc.shape
+    for d in range(discs):
+        x, y, turn = vector[3 * d], vector[3 * d + 1], vector[3 * d + 2]
+        for k in range(pins):
+            compression[d * pins + k] = by_disc[d, 0, k] * x + by_disc[d, 1, k] * y + by_disc[d, 2, k] * turn
+    for e in range(play_by_kept.shape[0]):
+        for i in range(2):
+            play[e, i] = 0.0
+            for j in range(vector.size):
+                play[e, i] += play_by_kept[e, i, j] * vector[j]
+
+
+@jit
+def compress(problem, q, compression, play):
+    """Set the compressions of pins and elements with play at the coordinates q."""
+    _along(problem.by_disc, problem.play_by_kept, q, compression, play)
+    for k in range(compression.size):
+        compression[k] += problem.undisturbed[k]
+    for e in range(play.shape[0]):
+        play[e, 0] += problem.play_offset[e, 0]
+        play[e, 1] += problem.play_offset[e, 1]
+
+
+@jit
+def play_force(stiffness, clearance, x, y):
+    """Return force (x, y) of an element with play and its derivative (xx, xy, yy), theory page equation (28)."""
+    reach = np.sqrt(x * x + y * y)
+    if not reach > clearance:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    free = clearance / reach
+    taut = stiffness * (1.0 - free)
+    across = stiffness * free / (reach * reach)
+    return taut * x, taut * y, taut + across * x * x, across * x * y, taut + across * y * y
+
+
+@jit
+def assemble(problem, compression, play, q, gradient, tangent):
+    """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact."""
+    size, pins = problem.force.size, problem.by_disc.shape[2]
+    largest, cancelling, touching = 0.0, 0.0, 0
+    for i in range(size):
+        value, terms = -problem.force[i], 0.0
+        largest = max(largest, abs(problem.force[i]))
+        for j in range(size):
+            value += problem.stiffness[i, j] * q[j]
+            terms += abs(problem.stiffness[i, j] * q[j])
+            tangent[i, j] = problem.stiffness[i, j]
+        gradient[i] = value
+        cancelling = max(cancelling, terms)
+    for d in range(problem.by_disc.shape[0]):
+        for k in range(pins):
+            c = d * pins + k
+            if not compression[c] + problem.half_tilt[c] > 0.0:
+                continue
+            force, slope = pin_force(
+                problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], compression[c]
+            )
+            touching += 1
+            largest = max(largest, force)
+            for i in range(3):
+                gradient[3 * d + i] += force * problem.by_disc[d, i, k]
+                weighted = slope * problem.by_disc[d, i, k]
+                for j in range(i + 1):
+                    tangent[3 * d + i, 3 * d + j] += weighted * problem.by_disc[d, j, k]
+    for e in range(play.shape[0]):
+        fx, fy, xx, xy, yy = play_force(problem.play_stiffness[e], problem.clearance[e], play[e, 0], play[e, 1])
+        largest = max(largest, np.sqrt(fx * fx + fy * fy))
+        for i in range(size):
+            ax, ay = problem.play_by_kept[e, 0, i], problem.play_by_kept[e, 1, i]
+            gradient[i] += fx * ax + fy * ay
+            for j in range(i + 1):
+                bx, by = problem.play_by_kept[e, 0, j], problem.play_by_kept[e, 1, j]
+                tangent[i, j] += ax * (xx * bx + xy * by) + ay * (xy * bx + yy * by)
+    return largest, cancelling, touching
+
+
+@jit
+def _slope_at(problem, work, length, slope, curvature):
+    """Return first and second derivative of the energy along the step, ``length`` steps from q."""
+    first, second = slope + curvature * length, curvature
+    if problem.law == LINEAR:
+        for c in range(work.compression.size):
+            compression = work.compression[c] + length * work.rate[c]
+            if problem.half_tilt[c] == 0.0 and compression > 0.0:
+                stiff = problem.contact[c] * work.rate[c]
+                first += stiff * compression
+                second += stiff * work.rate[c]
+    for c in range(work.compression.size):
+        if problem.law != LINEAR or problem.half_tilt[c] > 0.0:
+            compression = work.compression[c] + length * work.rate[c]
+            force, stiff = pin_force(
+                problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], compression
+            )
+            first += force * work.rate[c]
+            second += stiff * work.rate[c] * work.rate[c]
+    for e in range(work.play.shape[0]):
+        vx, vy = work.play_rate[e, 0], work.play_rate[e, 1]
+        fx, fy, xx, xy, yy = play_force(
+            problem.play_stiffness[e],
+            problem.clearance[e],
+            work.play[e, 0] + length * vx,
+            work.play[e, 1] + length * vy,
+        )
+        first += fx * vx + fy * vy
+        second += xx * vx * vx + 2.0 * xy * vx * vy + yy * vy * vy
+    return first, second
+
+
+@jit
+def _exact_step(problem, work, q):
+    """Return how many steps away the energy along the step is least, or −1 where it falls for ever.
+
+    The derivative along the step increases, straight between the lengths where contacts change. Newton's method on it,
+    kept between lengths where it was seen to be negative and positive, ends on the root of the piecewise linear law.
+    """
+    slope, curvature, least, start = 0.0, 0.0, 0.0, 0.0
+    for i in range(q.size):
+        against = -problem.force[i]
+        start += work.gradient[i] * work.step[i]
+        least += PIVOT * problem.stiffness[i, i] * work.step[i] * work.step[i]
+        for j in range(q.size):
+            against += problem.stiffness[i, j] * q[j]
+            curvature += work.step[i] * problem.stiffness[i, j] * work.step[j]
+        slope += against * work.step[i]
+    curvature = max(curvature, 0.0)
+    low, high, length = 0.0, np.inf, 1.0
+    for _ in range(_SEARCH_STEPS):
+        first, second = _slope_at(problem, work, length, slope, curvature)
+        if abs(first) <= 1e-14 * abs(start):
+            return length
+        if first < 0.0:
+            low = length
+        else:
+            high = length
+        guess = length - first / second if second > least else np.inf
+        if high == np.inf:
+            if not guess < 10.0 * length:
+                guess = 10.0 * length
+            if guess > _FARTHEST:
+                return -1.0
+        elif not low < guess < high:
+            guess = 0.5 * (low + high)
+        if guess == length or not low < guess < high:
+            return length
+        length = guess
+    return length
+
+
+@jit
+def _newton(problem, q, work):
+    ratio, touching = np.inf, 0
+    for _ in range(_ITERATIONS):
+        compress(problem, q, work.compression, work.play)
+        largest, cancelling, touching = assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
+        residual = 0.0
+        for i in range(q.size):
+            residual = max(residual, abs(work.gradient[i]))
+        ratio = residual / largest if largest > 0.0 else 0.0
+        if residual <= max(TOLERANCE * largest, ROUNDING * cancelling):
+            return CONVERGED, ratio, touching
+        replaced = solve_tangent(work.tangent, work.gradient, work.step)
+        _along(problem.by_disc, problem.play_by_kept, work.step, work.rate, work.play_rate)
+        changed = work.play.shape[0] > 0 or problem.law != LINEAR
+        for c in range(work.compression.size):
+            changed |= (work.compression[c] > 0.0) != (work.compression[c] + work.rate[c] > 0.0)
+            changed |= problem.half_tilt[c] > 0.0
+        length = 1.0
+        if changed or replaced:
+            length = _exact_step(problem, work, q)
+            if length < 0.0:
+                return NOT_RESISTED, ratio, touching
+        for i in range(q.size):
+            q[i] += length * work.step[i]
+            if not abs(q[i]) < _REACH:
+                return NOT_RESISTED, ratio, touching
+    return NOT_CONVERGED, ratio, touching
+
+
+@jit
+def _softened(problem, factor):
+    """Return the problem with softer elements with play."""
+    return Problem(
+        problem.law,
+        problem.stiffness,
+        problem.force,
+        problem.by_disc,
+        problem.undisturbed,
+        problem.contact,
+        problem.length,
+        problem.half_tilt,
+        problem.play_by_kept,
+        problem.play_offset,
+        factor * problem.play_stiffness,
+        problem.clearance,
+    )
+
+
+@jit
+def equilibrium(problem, q, work):
+    """Bring q to equilibrium; return status, residual over the largest force, pins in contact.
+
+    Under a small torque a loose part slides around the wall of its bearing: a stiff, curved valley of the energy that
+    Newton's steps only creep along. With soft bearings the valley is wide; they are stiffened decade by decade.
+    """
+    status, ratio, touching = _newton(problem, q, work)
+    if status == NOT_CONVERGED and problem.clearance.size:
+        for decade in range(_SOFTEST):
+            _newton(_softened(problem, 10.0 ** (decade - _SOFTEST)), q, work)
+        status, ratio, touching = _newton(problem, q, work)
+    return status, ratio, touching

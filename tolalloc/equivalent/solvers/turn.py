@@ -1,0 +1,165 @@
+"""All samples over a turn of angles: tiles of samples in parallel, each from its own last angle's equilibrium.
+
+Pins on linear springs without play go eight samples to a register; whatever needs more care goes one by one. Which way
+a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit
+from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
+from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
+from tolalloc.equivalent.solvers.lane_solver import TILE, make_tile, nonzero_rows, nonzero_waves, solve_tile_at
+from tolalloc.equivalent.solvers.problem import make_memory, solve_at_node, values_of
+from tolalloc.reducer.design import Reducer
+
+
+class Design(NamedTuple):
+    """What a reducer is to the solvers, next to its tables.
+
+    Parameters
+    ----------
+    law
+        `tolalloc.equivalent.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+    face_width
+        Loaded width of a disc [m].
+    """
+
+    law: int
+    face_width: float
+
+
+def design_of(reducer: Reducer) -> Design:
+    """Return a reducer as the solvers take it."""
+    return Design(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
+
+
+class Turn(NamedTuple):
+    """Equilibria of samples over angles, filled in by the solvers.
+
+    Parameters
+    ----------
+    rotation
+        Carrier rotation [rad].
+    kept
+        Kept coordinates at equilibrium [m].
+    status, residual, touching
+        Outcome, residual over the largest force, pins in contact [-].
+    """
+
+    rotation: Float[np.ndarray, "sample angle"]
+    kept: Float[np.ndarray, "sample angle coordinate"]
+    status: UInt8[np.ndarray, "sample angle"]
+    residual: Float[np.ndarray, "sample angle"]
+    touching: UInt8[np.ndarray, "sample angle"]
+
+
+@jit
+def make_turn(samples, angles, kept):
+    """Return an empty turn."""
+    return Turn(
+        np.empty((samples, angles)),
+        np.empty((samples, angles, kept)),
+        np.empty((samples, angles), np.uint8),
+        np.empty((samples, angles)),
+        np.empty((samples, angles), np.uint8),
+    )
+
+
+@jit
+def _give_up(turn, s):
+    turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
+    turn.kept[s] = np.nan
+
+
+@jit
+def _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve some samples at every ``stride``-th node, one after another."""
+    for s in range(values.shape[0]):
+        if not finite[s]:
+            _give_up(turn, s)
+            continue
+        guess = np.zeros(turn.kept.shape[2])
+        for angle in range(turn.rotation.shape[1]):
+            at = first + angle * stride
+            rotation, status, ratio, touching = solve_at_node(
+                at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+            )
+            turn.rotation[s, angle], turn.status[s, angle] = rotation, status
+            turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
+            turn.kept[s, angle] = guess
+            if status != CONVERGED:
+                guess[:] = 0.0
+
+
+@jit
+def _side_by_side(first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
+    samples, size, contacts = values.shape[0], turn.kept.shape[2], tables.contact_stiffness.shape[1]
+    tile = make_tile(layout, size, contacts)
+    careful, tilted = np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    for s in range(TILE):
+        own = min(s, samples - 1)
+        for m in range(layout.end):
+            tile.values[m, s] = values[own, m] if finite[own] else 0.0
+        tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
+    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
+    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
+    guess = np.empty(size)
+    for angle in range(turn.rotation.shape[1]):
+        at = first + angle * stride
+        solve_tile_at(at, tables, layout, rows, waves, teeth_deviate, tile, careful)
+        for s in range(samples):
+            turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
+            turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
+            for i in range(size):
+                turn.kept[s, angle, i] = tile.q[i, s]
+            if finite[s] and (careful[s] or tilted[s]):
+                guess[:] = 0.0
+                if angle > 0 and turn.status[s, angle - 1] == CONVERGED:
+                    guess[:] = turn.kept[s, angle - 1]
+                rotation, status, ratio, touching = solve_at_node(
+                    at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+                )
+                turn.rotation[s, angle], turn.status[s, angle] = rotation, status
+                turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
+                turn.kept[s, angle] = guess
+                for i in range(size):
+                    tile.q[i, s] = guess[i] if status == CONVERGED else 0.0
+        for s in range(samples, TILE):
+            for i in range(size):
+                tile.q[i, s] = tile.q[i, samples - 1]
+    for s in range(samples):
+        if not finite[s]:
+            _give_up(turn, s)
+
+
+@jit
+def solve_tile(first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
+    if design.law == LINEAR and tables.play_stiffness.shape[1] == 0:
+        _side_by_side(first, stride, tables, layout, design, values, finite, memory, turn)
+    else:
+        _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn)
+
+
+@jit
+def _curves_of_tile(number, first, stride, tables, layout, mapped, design, errors, torque, turn):
+    a, b = number * TILE, min((number + 1) * TILE, errors.shape[0])
+    values = np.empty((b - a, layout.end))
+    finite = values_of(errors[a:b], torque, layout, mapped, values)
+    part = Turn(turn.rotation[a:b], turn.kept[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
+    solve_tile(first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
+
+
+@parallel_jit
+def solve_curves(first, stride, tables, layout, mapped, design, errors, torque, turn):
+    """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on."""
+    for number in nb.prange((errors.shape[0] + TILE - 1) // TILE):
+        _curves_of_tile(np.int64(number), first, stride, tables, layout, mapped, design, errors, torque, turn)
