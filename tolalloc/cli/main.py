@@ -12,7 +12,8 @@ import typer
 
 from tolalloc.cli.console import UnitProgress, messages, screen
 from tolalloc.cli.study_script import load_study
-from tolalloc.cli.transmission_error import as_table, unit_answer
+from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
+from tolalloc.equivalent.solvers.compiled import is_kept
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.study.definition import Study, prepare
@@ -105,17 +106,22 @@ def te(
         float | None, typer.Option(help="Torque on the carrier [N·m], negative against the rotation.")
     ] = None,
     stiffness: Annotated[str, typer.Option(help="Identified stiffness: shipped name or TOML file.")] = "",
+    attributed: Annotated[bool, typer.Option("--attribute", help="Show which source makes which order.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Transmission error of one built unit over one output turn."""
     design = load_reducer(reducer)
     if stiffness:
         design = with_stiffness(design, load_identified_stiffness(stiffness))
-    answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"))
+    if not is_kept():
+        messages.print("Compiling the kernel for this machine: about a minute, once.", style="dim")
+    answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"), attributed)
     if as_json:
         sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
     else:
         screen.print(as_table(answer))
+        if attributed:
+            screen.print(attribution_table(answer))
 
 
 def main() -> None:

@@ -5,29 +5,31 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from rich.markup import escape
 from rich.table import Table
 
-from tolalloc.equivalent.outputs import order_spectrum, torsional_stiffness
+from tolalloc.equivalent.attribution import attribute
+from tolalloc.equivalent.hysteresis import LOOP_ANGLES, LOOP_ASSUMPTION, both_directions, hysteresis_loop
+from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.equivalent.outputs import OUTPUTS, Solved, order_spectrum
 from tolalloc.equivalent.status import Status, count_statuses
-from tolalloc.equivalent.transmission_error import EquivalentModel
 from tolalloc.exceptions import SolveError
 from tolalloc.reducer.design import Reducer
 from tolalloc.uncertainty.unit_file import BuiltUnit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 
-def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float) -> dict[str, Any]:
-    """Return peak-to-peak, orders, torsional stiffness and statuses of one unit, with units in the names."""
-    model, rated = EquivalentModel(reducer), reducer.load.rated_torque
+def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float, attributed: bool = False) -> dict[str, Any]:
+    """Return what a unit does over one output turn, with units of measurement in the names."""
+    model = EquivalentModel(reducer)
     errors = unit.errors(model.columns)
-    curves, extremes = model.curves(errors, torque), model.extremes(errors, torque)
-    worst = Status(max(extremes.status[0], curves.status.max()))
+    equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
+    worst = Status(max(extremes.status[0], equilibria.status.max()))
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
-    perfect = np.zeros_like(errors)
-    loads = (-0.03 * rated, -rated)
-    return {
+    solved = Solved.of(equilibria)
+    answer = {
         "reducer": reducer.name,
         "unit": unit.name,
         "torque_nm": torque,
@@ -37,21 +39,61 @@ def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float) -> dict[str, A
         "largest_at_deg": float(extremes.carrier_angle[0, 0] / DEGREE),
         "smallest_arcsec": float(extremes.smallest[0] / ARCSECOND),
         "smallest_at_deg": float(extremes.carrier_angle[0, 1] / DEGREE),
-        "mean_arcsec": float(curves.transmission_error.mean() / ARCSECOND),
         "main_orders": [
-            {"order": order, "amplitude_arcsec": amplitude / ARCSECOND}
-            for order, amplitude in order_spectrum(curves.transmission_error).main(8)
+            {"order": order, "amplitude_arcsec": amplitude / ARCSECOND, "phase_deg": phase / DEGREE}
+            for order, amplitude, phase in order_spectrum(equilibria.transmission_error).main(8)
         ],
-        "pins_in_contact": {"least": int(curves.pins_in_contact.min()), "most": int(curves.pins_in_contact.max())},
-        "torsional_stiffness_nm_per_arcmin": {
-            "perfect_reducer": float(torsional_stiffness(model, perfect, *loads)[0] * ARCMINUTE),
-            "this_unit": float(torsional_stiffness(model, errors, *loads)[0] * ARCMINUTE),
-            "between_torques_nm": list(loads),
-        },
+        "outputs": [
+            {"name": output.name, "unit": output.unit, "value": float(output.value(solved)[0])} for output in OUTPUTS
+        ],
+        **_loop_answer(model, errors, torque),
         "angles": {"equally_spaced": model.search.coarse, "solved_in_all": int(extremes.solves[0])},
         "largest_residual_of_largest_force": float(extremes.residual[0]),
-        "statuses": dict(count_statuses(curves.status)),
-        "assumptions": [*reducer.assumptions, *unit.assumptions],
+        "statuses": dict(count_statuses(equilibria.status)),
+        "assumptions": [*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION],
+    }
+    if attributed:
+        answer["attribution"] = _attribution_answer(model, errors, torque)
+    return answer
+
+
+def _loop_answer(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> dict[str, Any]:
+    """Return what the hysteresis loop and the two directions of rotation show; null where an angle has no answer."""
+    both = np.concatenate([errors, np.zeros_like(errors)])
+    loop = hysteresis_loop(model, both, LOOP_ANGLES)
+    reversed_by = both_directions(model, errors, torque).difference[0]
+
+    def pair(values: Float[np.ndarray, "2"], unit_of_measurement: float) -> dict[str, float | None]:
+        this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values)
+        return {"this_unit": this, "perfect_reducer": perfect}
+
+    return {
+        "lost_motion_arcmin": pair(loop.lost_motion, ARCMINUTE),
+        "backlash_arcmin": pair(loop.backlash, ARCMINUTE),
+        "torsional_stiffness_nm_per_arcmin": pair(loop.torsional_stiffness, 1 / ARCMINUTE),
+        "reversal_arcsec": {
+            "mean": float(reversed_by.mean() / ARCSECOND),
+            "peak_to_peak": float(np.ptp(reversed_by) / ARCSECOND),
+        },
+    }
+
+
+def _attribution_answer(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> dict[str, Any]:
+    """Return which source makes how much of each main order."""
+    attribution = attribute(model, errors, torque)
+    main = np.argsort(-attribution.amplitude)[:8]
+    span = np.ptp(attribution.contribution, axis=1)
+    return {
+        "orders": [int(order) for order in attribution.order[main]],
+        "amplitude_arcsec": [float(value / ARCSECOND) for value in attribution.amplitude[main]],
+        "sources": [
+            {
+                "source": attribution.sources[at],
+                "peak_to_peak_arcsec": float(span[at] / ARCSECOND),
+                "share_arcsec": [float(value / ARCSECOND) for value in attribution.share[at, main]],
+            }
+            for at in np.argsort(-span)
+        ],
     }
 
 
@@ -60,23 +102,58 @@ def as_table(answer: dict[str, Any]) -> Table:
     table = Table(title=f"{answer['reducer']}, unit {answer['unit']}, {answer['torque_nm']:g} N·m on the carrier")
     table.add_column("quantity")
     table.add_column("value", justify="right")
-    stiffness = answer["torsional_stiffness_nm_per_arcmin"]
+    reversal = answer["reversal_arcsec"]
     rows = [
         ("peak-to-peak over one output turn [arcsec]", f"{answer['peak_to_peak_arcsec']:.2f}"),
         ("finer angles may add [arcsec]", f"{answer['remaining_error_arcsec']:.3f}"),
         (f"largest, at {answer['largest_at_deg']:.2f}° [arcsec]", f"{answer['largest_arcsec']:.2f}"),
         (f"smallest, at {answer['smallest_at_deg']:.2f}° [arcsec]", f"{answer['smallest_arcsec']:.2f}"),
-        ("mean [arcsec]", f"{answer['mean_arcsec']:.2f}"),
         *(
-            (f"order {wave['order']} of the output turn, amplitude [arcsec]", f"{wave['amplitude_arcsec']:.2f}")
+            (
+                f"order {wave['order']} of the output turn, amplitude [arcsec] and phase",
+                f"{wave['amplitude_arcsec']:.2f} ∠ {wave['phase_deg']:.0f}°",
+            )
             for wave in answer["main_orders"]
         ),
-        ("pins in contact, least…most [-]", "{least}…{most}".format(**answer["pins_in_contact"])),
-        ("torsional stiffness, perfect reducer [N·m/arcmin]", f"{stiffness['perfect_reducer']:.0f}"),
-        ("torsional stiffness, this unit, 3…100 % of rated torque [N·m/arcmin]", f"{stiffness['this_unit']:.0f}"),
+        *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in answer["outputs"]),
+        *(
+            (f"{label}, {whose.replace('_', ' ')} [{unit}]", "not found" if value is None else _short(value))
+            for label, field, unit in (
+                ("lost motion at ±3 % of rated torque", "lost_motion_arcmin", "arcmin"),
+                ("backlash", "backlash_arcmin", "arcmin"),
+                ("torsional stiffness", "torsional_stiffness_nm_per_arcmin", "N·m/arcmin"),
+            )
+            for whose, value in answer[field].items()
+        ),
+        ("reversing the direction adds, mean [arcsec]", f"{reversal['mean']:.2f}"),
+        ("reversing the direction adds, peak-to-peak [arcsec]", f"{reversal['peak_to_peak']:.2f}"),
         *((f"angles: {outcome} [-]", str(count)) for outcome, count in answer["statuses"].items() if count),
         ("largest unbalanced force over largest force [-]", f"{answer['largest_residual_of_largest_force']:.1e}"),
     ]
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     return table
+
+
+def attribution_table(answer: dict[str, Any]) -> Table:
+    """Return which source makes which order, as a table for a person."""
+    found = answer["attribution"]
+    shown = found["orders"][:5]
+    table = Table(
+        title="What each source adds to the curve and to the main orders [arcsec]",
+        caption="Orders: component along the whole wave, minus cancels; columns sum to the amplitude. All: --json",
+    )
+    table.add_column("source", no_wrap=True)
+    table.add_column("curve", justify="right")
+    for order in shown:
+        table.add_column(f"{order}", justify="right")
+    for item in found["sources"]:
+        shares = (f"{value:.1f}" for value in item["share_arcsec"][: len(shown)])
+        table.add_row(escape(item["source"]), f"{item['peak_to_peak_arcsec']:.1f}", *shares)
+    table.add_row("together", "", *(f"{value:.1f}" for value in found["amplitude_arcsec"][: len(shown)]))
+    return table
+
+
+def _short(value: float) -> str:
+    """Return a number with four significant digits and no exponent for what users meet."""
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import Requirement
+from tolalloc.equivalent.answers import Equilibria
 from tolalloc.equivalent.outputs import Orders
-from tolalloc.equivalent.transmission_error import Curves
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.sensitivity.classical import ClassicalEstimate
@@ -32,7 +32,7 @@ class ExampleUnit:
     """
 
     label: str
-    curves: Curves
+    curves: Equilibria
     orders: Orders
 
 
@@ -62,6 +62,8 @@ class StudyResults:
         What the search found.
     unit
         The built unit that is shown, if any.
+    neglected
+        Patterns of the sources that are taken as zero.
     examples
         Units whose curves are shown.
     statuses
@@ -82,6 +84,7 @@ class StudyResults:
     unit_surrogate: Surrogate
     allocation: Allocation
     unit: BuiltUnit | None
+    neglected: tuple[str, ...]
     examples: tuple[ExampleUnit, ...]
     statuses: dict[str, int]
 
@@ -98,8 +101,23 @@ class StudyResults:
             "tooth modification costs nothing and is exact; nominal clearance "
             f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
             f"{clearances.radial[0] * 1e6:g}…{clearances.radial[1] * 1e6:g} µm at tip and root",
-            "pins share one diameter deviation, grooves share one radius deviation; single pins do not scatter",
-            "bearing clearance, tilt and errors of the first stage are left out",
+            *self._left_out,
+        )
+
+    @property
+    def _left_out(self) -> tuple[str, ...]:
+        """What the model could tell and this study does not ask for."""
+        sources = self.space.errors.sources
+        still = [source.name for source in sources if source.zone == 0.0]
+        free = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
+        return (
+            *(
+                (f"not in the tolerance table and taken as exact: {', '.join(self.neglected)}",)
+                if self.neglected
+                else ()
+            ),
+            *((f"in the tolerance table with zone 0 and taken as exact: {', '.join(still)}",) if still else ()),
+            *((f"without clearance: {', '.join(free).replace('_', ' ')}",) if free else ()),
         )
 
     @property

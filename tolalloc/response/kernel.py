@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducer.design import Modification
 from tolalloc.response.interface import Evaluation
@@ -84,12 +84,12 @@ class KernelResponse:
         for name in (*self.columns, *self.fixed):
             if name not in known:
                 raise UnknownNameError.among(f"errors of {self.model.reducer.name}", "source", name, known)
-        for name in self.model.columns:
-            if name not in given:
-                raise InputError(
-                    f"errors of {self.model.reducer.name}: {name} is not given; add its source to the tolerance table, "
-                    "with zone 0 and locked if it is to be neglected."
-                )
+        missing = [name for name in self.model.columns if name not in given]
+        if missing:
+            raise InputError(
+                f"errors of {self.model.reducer.name}: {missing[0]} (the first of {len(missing)} columns) is not "
+                "given; add its source to the tolerance table or name it under neglected in the study."
+            )
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -118,11 +118,11 @@ class KernelResponse:
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
         for rows in _chunks(x.shape[0]):
-            extremes, derivative = self.model.peak_to_peak_derivatives(self.errors(x[rows]), self.torque)
+            extremes, derivatives = self.model.peak_to_peak_derivatives(self.errors(x[rows]), self.torque)
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
-            by_column[rows] = derivative[:, varied] / ARCSECOND
-            by_modification[rows] = derivative[:, amounts] / ARCSECOND
+            by_column[rows] = derivatives.by_error[:, varied] / ARCSECOND
+            by_modification[rows] = derivatives.by_error[:, amounts] / ARCSECOND
             self.observe(extremes.status)
         return WithDerivatives(
             evaluation=Evaluation(values=values, status=status), by_column=by_column, by_modification=by_modification

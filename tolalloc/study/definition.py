@@ -12,17 +12,29 @@ from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
 from tolalloc.allocation.verification import Requirement
-from tolalloc.equivalent.transmission_error import EquivalentModel
+from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.kernel import MODIFICATION, KernelResponse
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
-from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.sources import ErrorModel, neglected_columns
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
 from tolalloc.units import MICROMETRE
+
+NEGLECTED = (
+    "sun.pitch",
+    "planet*.pitch",
+    "mesh*",
+    "*.phase",
+    "*.rotation",
+    "*.tilt",
+    "each_pin.*",
+    "*.each_tooth.*",
+)
+"""Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +81,8 @@ class Study:
         Name of the study and of its run folder.
     reducer, tolerances
         Shipped names or paths of the user's files.
+    neglected
+        Sources of the model that the tolerance table leaves out, taken as zero; ``*`` stands for anything.
     unit
         A built unit whose curve is shown, by shipped name or path; none if empty.
     stiffness
@@ -90,6 +104,7 @@ class Study:
     name: str
     reducer: str | Path = "rv20e"
     tolerances: str | Path = "rv20e_baseline"
+    neglected: tuple[str, ...] = NEGLECTED
     unit: str | Path = ""
     stiffness: str | Path = ""
     limit_arcsec: float = 60.0
@@ -154,6 +169,8 @@ class Prepared:
         Design variables and the requirement.
     kernel
         The real model at the reducer's own modification.
+    neglected
+        Patterns of the sources that are taken as zero because the tolerance table does not list them.
     """
 
     study: Study
@@ -163,6 +180,7 @@ class Prepared:
     space: DesignSpace
     requirement: Requirement
     kernel: KernelResponse
+    neglected: tuple[str, ...]
 
     @property
     def hash(self) -> str:
@@ -186,7 +204,16 @@ def prepare(study: Study) -> Prepared:
     errors = ErrorModel(load_tolerance_table(study.tolerances))
     model = EquivalentModel(reducer)
     amounts = (reducer.modification.equidistant, reducer.modification.shift)
-    fixed: Mapping[str, float] = {**errors.still, **dict(zip(MODIFICATION, amounts, strict=True))}
+    listed = {*errors.columns, *errors.still}
+    left_out = {
+        pattern: neglected_columns((pattern,), model.columns, f"study {study.name}") - listed
+        for pattern in study.neglected
+    }
+    fixed: Mapping[str, float] = {
+        **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
+        **errors.still,
+        **dict(zip(MODIFICATION, amounts, strict=True)),
+    }
     kernel = KernelResponse(
         model=model,
         torque=reducer.torque_on_carrier(study.torque_nm, f"study {study.name}"),
@@ -209,4 +236,5 @@ def prepare(study: Study) -> Prepared:
         ),
         requirement=Requirement(limit=study.limit_arcsec, target=study.yield_target),
         kernel=kernel,
+        neglected=tuple(pattern for pattern, columns in left_out.items() if columns),
     )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numba
 
-from tolalloc.equivalent.transmission_error import AngleSearch
+from tolalloc.equivalent.angle_search import AngleSearch
 from tolalloc.exceptions import RunFolderError
 from tolalloc.report import tables
 from tolalloc.report.excel import write_workbook

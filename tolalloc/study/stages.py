@@ -15,7 +15,8 @@ from jaxtyping import Float, UInt8
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
-from tolalloc.equivalent.outputs import order_spectrum, torsional_stiffness
+from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.equivalent.outputs import order_spectrum
 from tolalloc.equivalent.status import Status
 from tolalloc.report.results import ExampleUnit, StudyResults
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
@@ -142,6 +143,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             unit_surrogate=surrogate,
             allocation=allocation,
             unit=prepared.unit,
+            neglected=prepared.neglected,
             examples=_examples(
                 prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design
             ),
@@ -150,10 +152,10 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
 
 
 def _torsional_stiffness(prepared: Prepared) -> float:
-    """Return the torsional stiffness of the perfect reducer between test and rated torque [N·m/arcmin]."""
-    model, load = prepared.kernel.model, prepared.reducer.load
+    """Return the torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque [N·m/arcmin]."""
+    model = prepared.kernel.model
     perfect = np.zeros((1, len(model.columns)))
-    return float(torsional_stiffness(model, perfect, -0.03 * load.rated_torque, -load.rated_torque)[0] * ARCMINUTE)
+    return float(hysteresis_loop(model, perfect, LOOP_ANGLES).torsional_stiffness[0] * ARCMINUTE)
 
 
 def _unit_surrogate(kernel: KernelResponse, sample: MonteCarlo, sources: int) -> Surrogate:
@@ -174,7 +176,7 @@ def _examples(
     ]
     if prepared.unit:
         rows.insert(0, (f"unit {prepared.unit.name}", prepared.unit.errors(kernel.model.columns)))
-    curves = [(label, kernel.model.curves(errors, kernel.torque)) for label, errors in rows]
+    curves = [(label, kernel.model.equilibria(errors, kernel.torque)) for label, errors in rows]
     return tuple(
         ExampleUnit(label=label, curves=curve, orders=order_spectrum(curve.transmission_error))
         for label, curve in curves

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.exceptions import UnknownNameError
 from tolalloc.uncertainty.zones import (
     Distribution,
     Feature,
@@ -16,6 +19,23 @@ from tolalloc.uncertainty.zones import (
     standard_values,
 )
 from tolalloc.units import MICROMETRE
+
+
+def neglected_columns(patterns: Sequence[str], columns: Sequence[str], place: str) -> frozenset[str]:
+    """Return the columns that are taken as zero: those of a source that a pattern such as ``*.tilt`` names.
+
+    Raises
+    ------
+    UnknownNameError
+        A pattern that names no column of the model.
+    """
+    found: set[str] = set()
+    for pattern in patterns:
+        own = {name for name in columns if fnmatchcase(name, pattern) or fnmatchcase(name, f"{pattern}.*")}
+        if not own:
+            raise UnknownNameError.among(place, "neglected error", pattern, columns)
+        found |= own
+    return frozenset(found)
 
 
 @dataclass(frozen=True, kw_only=True)

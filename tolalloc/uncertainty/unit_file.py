@@ -14,6 +14,7 @@ from pydantic import Field
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.uncertainty.sources import neglected_columns
 from tolalloc.units import MICROMETRE
 
 DATA = Path(__file__).parent / "data"
@@ -47,7 +48,7 @@ class BuiltUnit:
     deviations
         Column → deviation [m].
     neglected
-        Names of sources that the unit leaves out, taken as zero.
+        Sources that the unit leaves out, taken as zero; ``*`` stands for anything.
     assumptions
         What the source does not print.
     """
@@ -72,14 +73,12 @@ class BuiltUnit:
         for column in self.deviations:
             if column not in names:
                 raise UnknownNameError.among(f"unit {self.name}", "error", column, names)
-        for source in self.neglected:
-            if not any(column == source or column.startswith(f"{source}.") for column in names):
-                raise UnknownNameError.among(f"unit {self.name}", "neglected error", source, names)
+        left_out = neglected_columns(self.neglected, names, f"unit {self.name}")
         for column in names:
-            left_out = any(column == source or column.startswith(f"{source}.") for source in self.neglected)
-            if column not in self.deviations and not left_out:
+            if column not in self.deviations and column not in left_out:
                 raise InputError(
-                    f"unit {self.name}: {column} is not stated; give its value or list its source under neglected."
+                    f"unit {self.name}: {column} is not stated; give its value or list its source under neglected, "
+                    "where * stands for anything, as in '*.tilt'."
                 )
         return np.array([[self.deviations.get(column, 0.0) for column in names]])
 
