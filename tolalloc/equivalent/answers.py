@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8, UInt16
 
 from tolalloc.equivalent.columns import Columns
 from tolalloc.equivalent.condensation import CondensedAngles
@@ -52,7 +52,7 @@ class Equilibria:
     kept: Float[np.ndarray, "sample angle coordinate"]
     status: UInt8[np.ndarray, "sample angle"]
     residual: Float[np.ndarray, "sample angle"]
-    pins_in_contact: UInt8[np.ndarray, "sample angle"]
+    pins_in_contact: UInt16[np.ndarray, "sample angle"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
 from tolalloc.equivalent.pins import Terms, pin_terms, tilt_terms, tooth_terms, wave_terms
+from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.springs import SpringGroup
 from tolalloc.reducer.design import Reducer
 
@@ -140,7 +141,8 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
     for disc in range(discs):
         add(wave + disc * waves, wave_terms(disc, orders))
         add(tooth + disc * 2 * teeth, tooth_terms(reducer, disc))
-        add(tilt + disc * 2, tilt_terms(disc))
+        if LAWS[reducer.stiffness.pin_contact_law] == LINEAR:
+            add(tilt + disc * 2, tilt_terms(disc))
     nominal, element = np.zeros(layout.end), clearance
     for group in played:
         add(element, {name: [(at, 1.0)] for at, name in enumerate(group.clearance_columns)})

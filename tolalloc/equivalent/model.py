@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import pi
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -42,6 +43,10 @@ class EquivalentModel:
     reducer: Reducer
     search: AngleSearch = field(default_factory=AngleSearch)
     orders: tuple[int, ...] = HARMONICS
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to another process without tables; there, every chunk of work finds the same model again."""
+        return _remembered, (self.reducer, self.search, self.orders)
 
     @cached_property
     def error_columns(self) -> Columns:
@@ -96,7 +101,7 @@ class EquivalentModel:
             np.empty((*shape, tables.load.shape[2])),
             np.empty(shape, np.uint8),
             np.empty(shape),
-            np.empty(shape, np.uint8),
+            np.empty(shape, np.uint16),
         )
         columns = self.error_columns
         solve_curves(0, 1, tables, columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque, turn)
@@ -234,3 +239,8 @@ class EquivalentModel:
             by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
             status=derivative.status,
         )
+
+
+@lru_cache(maxsize=2)
+def _remembered(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
+    return EquivalentModel(reducer, search, orders)

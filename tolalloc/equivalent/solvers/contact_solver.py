@@ -21,7 +21,8 @@ from tolalloc.equivalent.solvers.contact_law import LINEAR, pin_force
 
 CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
 
-TOLERANCE = 1e-11  # of the largest force; the promise to users is 1e-9
+TOLERANCE = 1e-11  # of the largest force
+_PROMISED = 1e-9  # the same where a bearing that just touches keeps the steps from settling
 ROUNDING = 2e-15  # of the terms that cancel in the balance of forces; below it a residual is noise
 PIVOT = 1e-12  # of the largest diagonal entry
 _ITERATIONS = 100
@@ -74,6 +75,7 @@ class Work(NamedTuple):
     gradient: Float[np.ndarray, " kept"]
     step: Float[np.ndarray, " kept"]
     tangent: Float[np.ndarray, "kept kept"]
+    best: Float[np.ndarray, " kept"]
 
 
 @jit
@@ -87,6 +89,7 @@ def make_work(kept, contacts, elements):
         np.empty(kept),
         np.empty(kept),
         np.empty((kept, kept)),
+        np.empty(kept),
     )
 
 
@@ -277,16 +280,21 @@ def _exact_step(problem, work, q):
 
 @jit
 def _newton(problem, q, work):
-    ratio, touching = np.inf, 0
+    ratio, touching, least, least_touching = np.inf, 0, np.inf, 0
     for _ in range(_ITERATIONS):
         compress(problem, q, work.compression, work.play)
-        largest, cancelling, touching = assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
+        largest, cancelling, touching = assemble(
+            problem, work.compression, work.play, q, work.gradient, work.tangent
+        )
         residual = 0.0
         for i in range(q.size):
             residual = max(residual, abs(work.gradient[i]))
         ratio = residual / largest if largest > 0.0 else 0.0
         if residual <= max(TOLERANCE * largest, ROUNDING * cancelling):
             return CONVERGED, ratio, touching
+        if ratio < least:
+            least, least_touching = ratio, touching
+            work.best[:] = q
         replaced = solve_tangent(work.tangent, work.gradient, work.step)
         _along(problem.by_disc, problem.play_by_kept, work.step, work.rate, work.play_rate)
         changed = work.play.shape[0] > 0 or problem.law != LINEAR
@@ -302,7 +310,8 @@ def _newton(problem, q, work):
             q[i] += length * work.step[i]
             if not abs(q[i]) < _REACH:
                 return NOT_RESISTED, ratio, touching
-    return NOT_CONVERGED, ratio, touching
+    q[:] = work.best
+    return CONVERGED if least <= _PROMISED else NOT_CONVERGED, least, least_touching
 
 
 @jit

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, UInt8, UInt16
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
 from tolalloc.equivalent.solvers.lane_solver import TILE, make_tile, nonzero_rows, nonzero_waves, solve_tile_at
@@ -57,7 +56,7 @@ class Turn(NamedTuple):
     kept: Float[np.ndarray, "sample angle coordinate"]
     status: UInt8[np.ndarray, "sample angle"]
     residual: Float[np.ndarray, "sample angle"]
-    touching: UInt8[np.ndarray, "sample angle"]
+    touching: UInt16[np.ndarray, "sample angle"]
 
 
 @jit
@@ -68,7 +67,7 @@ def make_turn(samples, angles, kept):
         np.empty((samples, angles, kept)),
         np.empty((samples, angles), np.uint8),
         np.empty((samples, angles)),
-        np.empty((samples, angles), np.uint8),
+        np.empty((samples, angles), np.uint16),
     )
 
 
@@ -161,5 +160,5 @@ def _curves_of_tile(number, first, stride, tables, layout, mapped, design, error
 @parallel_jit
 def solve_curves(first, stride, tables, layout, mapped, design, errors, torque, turn):
     """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on."""
-    for number in nb.prange((errors.shape[0] + TILE - 1) // TILE):
+    for number in prange((errors.shape[0] + TILE - 1) // TILE):
         _curves_of_tile(np.int64(number), first, stride, tables, layout, mapped, design, errors, torque, turn)
