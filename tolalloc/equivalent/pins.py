@@ -100,9 +100,9 @@ def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
     -----
     Outward, counter-clockwise or material added is positive unless said otherwise [m]. For all pins alike:
     ``pin.diameter`` d_k, ``housing.groove.radius`` r_k (a larger groove lets the pin sink),
-    ``modification.equidistant`` Δr_rp and ``modification.shift`` Δr_p. Along the ring: ``housing.runout`` radial, ``housing.pitch`` tangential.
-    One pin k alone: ``each_pin.position.{k}`` with x radial and y tangential, ``each_pin.diameter.{k}``,
-    ``each_pin.groove.{k}``.
+    ``modification.equidistant`` Δr_rp and ``modification.shift`` Δr_p. Along the ring: ``housing.runout`` radial,
+    ``housing.pitch`` tangential. One pin k alone: ``each_pin.position.{k}`` with x radial and y tangential,
+    ``each_pin.diameter.{k}``, ``each_pin.groove.{k}``.
     """
     pins = reducer.cycloid_stage.pin_count
     radial, tangential, radius = (range(first, first + pins) for first in (0, pins, 2 * pins))

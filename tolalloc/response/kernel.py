@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from tolalloc.equivalent.answers import Derivatives, Extremes
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducer.design import Modification
+from tolalloc.response.chunks import Mapper, map_chunks
 from tolalloc.response.interface import Evaluation
 from tolalloc.units import ARCSECOND
 
@@ -18,8 +20,6 @@ PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 
 MODIFICATION = ("modification.equidistant", "modification.shift")
 """Columns of the two modification amounts."""
-
-_SAMPLES_AT_ONCE = 1024
 
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
 """Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
@@ -64,6 +64,8 @@ class KernelResponse:
         Value of every other column of the model [m].
     observe
         Told the statuses of each chunk.
+    mapper
+        What solves the chunks, `tolalloc.response.chunks.map_chunks`.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class KernelResponse:
     columns: tuple[str, ...]
     fixed: Mapping[str, float]
     observe: Observer = _unobserved
+    mapper: Mapper = map
 
     def __post_init__(self) -> None:
         known, given = set(self.model.columns), {*self.columns, *self.fixed}
@@ -98,14 +101,12 @@ class KernelResponse:
 
     def with_modification(self, modification: Modification) -> KernelResponse:
         """Return the response of the same reducer with another tooth modification."""
-        amounts = dict(zip(MODIFICATION, (modification.equidistant, modification.shift), strict=True))
-        return replace(self, fixed={**self.fixed, **amounts})
+        return replace(self, fixed={**self.fixed, **modification.deviations})
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
-        for rows in _chunks(x.shape[0]):
-            extremes = self.model.extremes(self.errors(x[rows]), self.torque)
+        for rows, extremes in map_chunks(self._alone._extremes, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             self.observe(extremes.status)
@@ -117,8 +118,7 @@ class KernelResponse:
         amounts = [self.model.columns.index(name) for name in MODIFICATION]
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
-        for rows in _chunks(x.shape[0]):
-            extremes, derivatives = self.model.peak_to_peak_derivatives(self.errors(x[rows]), self.torque)
+        for rows, (extremes, derivatives) in map_chunks(self._alone._derivatives, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             by_column[rows] = derivatives.by_error[:, varied] / ARCSECOND
@@ -128,6 +128,17 @@ class KernelResponse:
             evaluation=Evaluation(values=values, status=status), by_column=by_column, by_modification=by_modification
         )
 
+    @property
+    def _alone(self) -> KernelResponse:
+        """The response without what must stay in this process."""
+        return replace(self, observe=_unobserved, mapper=map)
+
+    def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
+        return self.model.extremes(self.errors(x), self.torque)
+
+    def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[Extremes, Derivatives]:
+        return self.model.peak_to_peak_derivatives(self.errors(x), self.torque)
+
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m]."""
         where = {name: at for at, name in enumerate(self.model.columns)}
@@ -136,9 +147,3 @@ class KernelResponse:
             errors[:, where[name]] = value
         errors[:, [where[name] for name in self.columns]] = x
         return errors
-
-
-def _chunks(samples: int) -> Iterator[slice]:
-    """Yield the rows of each chunk."""
-    for start in range(0, samples, _SAMPLES_AT_ONCE):
-        yield slice(start, min(start + _SAMPLES_AT_ONCE, samples))

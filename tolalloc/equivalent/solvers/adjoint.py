@@ -12,11 +12,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_law import pin_force
 from tolalloc.equivalent.solvers.contact_solver import (
     CONVERGED,
@@ -233,12 +232,12 @@ def solve_peak_to_peak_derivatives(tables, layout, mapped, design, errors, torqu
 
     ``step`` is the distance in nodes within which the extremes were found.
     """
-    for s in nb.prange(errors.shape[0]):
+    for s in prange(errors.shape[0]):
         _of_peak_to_peak(np.int64(s), tables, layout, mapped, design, errors, torque, position, step, derivative)
 
 
 @parallel_jit
 def solve_rotation_derivatives(tables, layout, mapped, design, errors, torque, position, derivative):
     """Fill the derivatives of one sample's carrier rotation at every position, [position]."""
-    for s in nb.prange(position.size):
+    for s in prange(position.size):
         _of_rotation(np.int64(s), tables, layout, mapped, design, errors, torque, position, derivative)

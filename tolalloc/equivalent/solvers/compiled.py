@@ -12,6 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numba as nb
+from numba import prange
+
+__all__ = ["is_kept", "jit", "parallel_jit", "prange", "use_threads"]
 
 _ROOM = Path(__file__).parent
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_ROOM.glob("*.py")))).hexdigest()
@@ -30,6 +33,11 @@ def _compile(function: Callable[..., Any], parallel: bool) -> Any:
         return nb.njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(function)
     finally:
         nb.config.CACHE_DIR = others
+
+
+def use_threads(count: int) -> None:
+    """Let the loops of `parallel_jit` functions use this many threads of the process."""
+    nb.set_num_threads(count)
 
 
 def jit(function: Callable[..., Any]) -> Any:

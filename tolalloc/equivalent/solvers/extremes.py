@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
 from tolalloc.equivalent.solvers.lane_solver import TILE
 from tolalloc.equivalent.solvers.problem import make_memory, solve_anywhere, values_of
@@ -146,5 +145,5 @@ def _extremes_of_tile(number, tables, layout, mapped, design, errors, torque, ha
 @parallel_jit
 def solve_extremes(tables, layout, mapped, design, errors, torque, halving, found):
     """Fill the extremes of every sample."""
-    for number in nb.prange((errors.shape[0] + TILE - 1) // TILE):
+    for number in prange((errors.shape[0] + TILE - 1) // TILE):
         _extremes_of_tile(np.int64(number), tables, layout, mapped, design, errors, torque, halving, found)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_law import pin_force
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, compress, play_force
 from tolalloc.equivalent.solvers.problem import make_memory, problem_at_node, values_of
@@ -60,5 +59,5 @@ def _of_sample(s, tables, layout, mapped, design, errors, torque, turn_status, t
 @parallel_jit
 def solve_forces(tables, layout, mapped, design, errors, torque, status, kept, out):
     """Fill the forces of all samples at all nodes of the tables."""
-    for s in nb.prange(errors.shape[0]):
+    for s in prange(errors.shape[0]):
         _of_sample(np.int64(s), tables, layout, mapped, design, errors, torque, status, kept, out)
