@@ -74,7 +74,7 @@ def test_te_of_table_4():
 
 
 def test_te_for_a_person_names_units():
-    result = tolalloc("te")
+    result = tolalloc("te", "--unit", "table4")
     assert "peak-to-peak over one output turn [arcsec]" in result.stdout
     assert "N·m/arcmin" in result.stdout
 
@@ -165,6 +165,50 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path, change, words):
     out = tmp_path / "run"
     refused(tolalloc("run", script, "--quick", "--out", out), *words)
     assert not out.exists()
+
+
+def row(**cells: str):
+    """Return a change that adds a source with these cells, the others like those of a bore."""
+
+    def change(frame: pd.DataFrame) -> pd.DataFrame:
+        added = {**frame.iloc[0].to_dict(), "group": "", **cells}
+        return pd.concat([frame, pd.DataFrame([added])], ignore_index=True).fillna("")
+
+    return change
+
+
+ADDED = {"plus [unit]": "2", "min [unit]": "1", "max [unit]": "4"}
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ({"id": "each_pin.position", "each": "40"}, []),
+        ({"id": "each_pin.position", "each": "20"}, ["each_pin.position", "each", "20", "40"]),
+        ({"id": "each_pin.position", "each": "all"}, ["each", "all", "whole number"]),
+        ({"id": "crank1.tilt", "over": "30"}, []),
+        ({"id": "crank1.tilt"}, ["crank1.tilt", "over", "mm"]),
+        ({"id": "sun.pitch", "feature": "pitch", "spectrum [order:amplitude]": "1:1 3:0.5"}, []),
+    ],
+)
+def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
+    script = study_with(tmp_path, tolerances=table_with(tmp_path, row(**ADDED, **cells)))
+    if words:
+        refused(tolalloc("check", script), *words)
+    else:
+        result = tolalloc("check", script)
+        assert result.returncode == 0, result.stderr
+        assert cells["id"] in result.stdout
+
+
+@pytest.mark.parametrize("reducer", ["rv20e", "rv40e", "rv80e"])
+def test_every_preset_turns(reducer):
+    answer = json.loads(tolalloc("te", "--reducer", reducer, "--attribute", "--json").stdout)
+    assert answer["statuses"]["equilibrium found"] == 936
+    assert 0 < answer["peak_to_peak_arcsec"] < 5  # no errors: the modification and the elastic twist alone
+    assert answer["backlash_arcmin"]["this_unit"] > 10 * answer["backlash_arcmin"]["perfect_reducer"]
+    shares = sum(abs(source["share_arcsec"][0]) for source in answer["attribution"]["sources"])
+    assert shares >= answer["attribution"]["amplitude_arcsec"][0] > 0
 
 
 def test_a_truncated_workbook_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tolalloc.uncertainty.seeds import CHUNK, SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.sources import ErrorModel, Source
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
 from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.uncertainty.zones import Distribution, Feature, at_limit, standard_values
@@ -72,6 +72,30 @@ def test_baseline_zones_are_the_magnitudes_of_table_4():
         errors = np.array([[unit[column] for column in source.columns]])
         printed = measure(source.feature, source.spectrum, errors)[0]
         assert source.zone == pytest.approx(printed, abs=0.06e-6), source.name
+
+
+def test_like_features_deviate_alone_and_angles_are_taken_over_a_length(generator):
+    pins = Source(
+        name="each_pin.position",
+        part="",
+        feature=Feature.POSITION,
+        zone=4e-6,
+        minimum=0.0,
+        maximum=1.0,
+        cost=1.0,
+        each=40,
+    )
+    tilt = Source(
+        name="crank1.tilt", part="", feature=Feature.POSITION, zone=4e-6, minimum=0.0, maximum=1.0, cost=1.0, over=0.03
+    )
+    assert pins.columns[:3] == ("each_pin.position.1.x", "each_pin.position.1.y", "each_pin.position.2.x")
+    errors = ErrorModel((pins, tilt))
+    x = errors.deviations(errors.standard_values(generator.random((20_000, 82))), errors.zones)
+    assert np.abs(np.corrcoef(x.T) - np.eye(82)).max() < 5 / np.sqrt(20_000)
+    radius = np.hypot(x[:, 0::2], x[:, 1::2])
+    share = (radius <= [2e-6] * 40 + [2e-6 / 0.03]).mean(axis=0)
+    assert share == pytest.approx(0.9973, abs=4 * np.sqrt(0.0027 / 20_000))
+    np.testing.assert_allclose(np.hypot(*tilt.at_limit(generator.random((5, 2))).T) * 4e-6, 2e-6 / 0.03)
 
 
 def test_columns_are_linear_in_the_zones(generator):

@@ -11,7 +11,6 @@ from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Response
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import ErrorModel
-from tolalloc.uncertainty.zones import at_limit
 
 DIRECTIONS = 16
 
@@ -78,7 +77,7 @@ def classical_estimate(
         own = slice(start, start + len(source.columns))
         rows = np.repeat(middle, DIRECTIONS, axis=0)
         uniform = next(seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
-        rows[:, own] += zone * at_limit(source.feature, source.spectrum, uniform)
+        rows[:, own] += zone * source.at_limit(uniform)
         x.append(rows)
         start = own.stop
     evaluation = response(np.concatenate(x))

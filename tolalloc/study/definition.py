@@ -12,12 +12,14 @@ from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
 from tolalloc.allocation.verification import Requirement
+from tolalloc.equivalent.columns import source_name
+from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import IdentifiedStiffness
-from tolalloc.response.kernel import MODIFICATION, KernelResponse
+from tolalloc.response.kernel import KernelResponse
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
 from tolalloc.uncertainty.sources import ErrorModel, neglected_columns
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
@@ -189,6 +191,27 @@ class Prepared:
         return hashlib.sha256(repr(content).encode()).hexdigest()
 
 
+def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> list[str]:
+    """Return the columns of listed sources whose orders their spectra do not have.
+
+    Raises
+    ------
+    InputError
+        A source that lists only some of its pins or teeth.
+    """
+    absent = []
+    for source in errors.sources:
+        own = [column for column in model.columns if source_name(column) == source.name]
+        missing = [column for column in own if column not in source.columns]
+        if missing and not source.spectrum:
+            features = len({column.removesuffix(".x").removesuffix(".y") for column in own})
+            raise InputError.at(
+                f"{place}, tolerance table, {source.name}", "each", source.each, f"{features}, one per feature"
+            )
+        absent += missing
+    return absent
+
+
 def prepare(study: Study) -> Prepared:
     """Read and check everything a study needs; nothing is solved and nothing is written.
 
@@ -202,17 +225,20 @@ def prepare(study: Study) -> Prepared:
     if identified:
         reducer = with_stiffness(reducer, identified)
     errors = ErrorModel(load_tolerance_table(study.tolerances))
-    model = EquivalentModel(reducer)
-    amounts = (reducer.modification.equidistant, reducer.modification.shift)
+    unit = load_unit(study.unit) if study.unit else None
+    orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
+    model = EquivalentModel(reducer, orders=orders or HARMONICS)
     listed = {*errors.columns, *errors.still}
+    absent = _absent_orders(errors, model, f"study {study.name}")
     left_out = {
         pattern: neglected_columns((pattern,), model.columns, f"study {study.name}") - listed
         for pattern in study.neglected
     }
     fixed: Mapping[str, float] = {
         **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
+        **dict.fromkeys(absent, 0.0),
         **errors.still,
-        **dict(zip(MODIFICATION, amounts, strict=True)),
+        **reducer.modification.deviations,
     }
     kernel = KernelResponse(
         model=model,
@@ -220,9 +246,8 @@ def prepare(study: Study) -> Prepared:
         columns=errors.columns,
         fixed=fixed,
     )
-    unit = load_unit(study.unit) if study.unit else None
     if unit:
-        unit.errors(model.columns)
+        unit.errors(model.columns, reducer.modification.deviations)
     flank, radial = (
         (low * MICROMETRE, high * MICROMETRE) for low, high in (study.flank_clearance_um, study.radial_clearance_um)
     )

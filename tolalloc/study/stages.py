@@ -175,7 +175,13 @@ def _examples(
         ("median unit after", after.errors(chosen.unit_at(0.5))),
     ]
     if prepared.unit:
-        rows.insert(0, (f"unit {prepared.unit.name}", prepared.unit.errors(kernel.model.columns)))
+        rows.insert(
+            0,
+            (
+                f"unit {prepared.unit.name}",
+                prepared.unit.errors(kernel.model.columns, prepared.reducer.modification.deviations),
+            ),
+        )
     curves = [(label, kernel.model.equilibria(errors, kernel.torque)) for label, errors in rows]
     return tuple(
         ExampleUnit(label=label, curves=curve, orders=order_spectrum(curve.transmission_error))

@@ -15,10 +15,14 @@ from tolalloc.uncertainty.zones import (
     Distribution,
     Feature,
     Spectrum,
+    at_limit,
     standard_deviation_per_zone,
     standard_values,
 )
-from tolalloc.units import MICROMETRE
+from tolalloc.units import MICROMETRE, MILLIMETRE
+
+ANGULAR = ("tilt", "phase", "rotation")
+"""Last part of the name of a source whose columns are angles."""
 
 
 def neglected_columns(patterns: Sequence[str], columns: Sequence[str], place: str) -> frozenset[str]:
@@ -68,6 +72,10 @@ class Source:
         Mean shift over half the zone, for sizes only [-].
     spectrum
         Order → relative amplitude of pitch and run-out deviations [-].
+    each
+        Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
+    over
+        For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
     group
         Sources of one group keep the ratios of their zones, for example both discs of one drawing.
     locked
@@ -91,6 +99,8 @@ class Source:
     cp: float = 1.0
     shift: float = 0.0
     spectrum: Spectrum = ()
+    each: int = 1
+    over: float = 0.0
     group: str = ""
     locked: bool = False
     grade: str = ""
@@ -99,17 +109,38 @@ class Source:
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of the model's columns that this source moves."""
+        names = [f"{self.name}.{number + 1}" for number in range(self.each)] if self.each > 1 else [self.name]
         if self.feature is Feature.SIZE:
-            return (self.name,)
+            return tuple(names)
         if self.feature is Feature.POSITION:
-            return (f"{self.name}.x", f"{self.name}.y")
+            return tuple(f"{name}.{axis}" for name in names for axis in ("x", "y"))
         return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
+
+    @property
+    def lever(self) -> float:
+        """What divides a length inside the zone to give the column: 1, or the length that an angle is taken over."""
+        return self.over or 1.0
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return the columns per unit of zone for independent uniform numbers in (0, 1)."""
+        own = uniform.reshape(uniform.shape[0] * self.each, -1)
+        values = standard_values(self.feature, self.distribution, self.cp, self.shift, self.spectrum, own)
+        return np.asarray(values.reshape(uniform.shape) / self.lever)
+
+    def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return columns per unit of zone that fill the zone exactly, for independent uniform numbers in (0, 1)."""
+        own = uniform.reshape(uniform.shape[0] * self.each, -1)
+        return np.asarray(at_limit(self.feature, self.spectrum, own).reshape(uniform.shape) / self.lever)
 
     @property
     def mapping(self) -> str:
         """Sentence that says how the zone became a distribution."""
         zone = self.zone / MICROMETRE
         reading = f"{zone:.3g} µm, {self.feature.zone_meaning}"
+        if self.over:
+            reading += f" over a length of {self.over / MILLIMETRE:g} mm"
+        if self.each > 1:
+            reading += f", each of {self.each} on its own"
         if self.distribution is Distribution.UNIFORM:
             return f"{reading}: uniform magnitude up to the zone, any phase"
         deviation = standard_deviation_per_zone(self.feature, self.cp, self.spectrum) * zone
@@ -146,7 +177,17 @@ class ErrorModel:
     @cached_property
     def still(self) -> dict[str, float]:
         """Columns of the sources with zone zero, which stay in the middle of it [m]."""
-        return {column: source.middle for source in self.sources if source.zone == 0.0 for column in source.columns}
+        return {
+            column: source.middle / source.lever
+            for source in self.sources
+            if source.zone == 0.0
+            for column in source.columns
+        }
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of all spectra, ascending [-]."""
+        return tuple(sorted({order for source in self.sources for order, _ in source.spectrum}))
 
     @cached_property
     def source_of_column(self) -> tuple[str, ...]:
@@ -163,16 +204,14 @@ class ErrorModel:
         parts, start = [], 0
         for source in self.active:
             own = uniform[:, start : start + len(source.columns)]
-            parts.append(
-                standard_values(source.feature, source.distribution, source.cp, source.shift, source.spectrum, own)
-            )
+            parts.append(source.standard_values(own))
             start += len(source.columns)
         return np.concatenate(parts, axis=1)
 
     def deviations(
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
-        """Return the columns [m] that the standard values give at the zones [m]."""
+        """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
         counts = [len(source.columns) for source in self.active]
-        middle = np.repeat([source.middle for source in self.active], counts)
+        middle = np.repeat([source.middle / source.lever for source in self.active], counts)
         return np.asarray(standard * np.repeat(zones, counts) + middle)

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, shipped_or_path, validated
-from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.sources import ANGULAR, Source
 from tolalloc.uncertainty.unit_file import DATA
 from tolalloc.uncertainty.zones import Distribution, Feature, Spectrum
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -41,6 +41,8 @@ HEADERS = {
     "cost": "cost [cost units]",
     "grade": "grade",
     "spectrum": "spectrum [order:amplitude]",
+    "each": "each [-]",
+    "over": "over [mm]",
     "note": "note",
 }
 REQUIRED = ("id", "part", "feature", "plus", "minus", "unit", "min", "max", "cost")
@@ -66,6 +68,8 @@ class ToleranceRow(Record):
     cost: Annotated[float, Field(ge=0, le=1e9)]
     grade: str = ""
     spectrum: str = ""
+    each: Annotated[int, Field(ge=1, le=1000)] = 1
+    over: Annotated[float, Field(gt=0, le=1000)] | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -82,11 +86,19 @@ class ToleranceRow(Record):
             )
         if zone > 0 and not self.locked and self.cost == 0:
             raise ValueError("the cost must be above 0 for a zone that allocation may change; or lock it")
+        angular = self.id.rsplit(".", 1)[-1] in ANGULAR
+        if angular != (self.over is not None):
+            raise ValueError(
+                f"{self.id} {'is an angle and needs' if angular else 'is a length and has no'} over, the length in mm "
+                "over which the zone limits it"
+            )
         needs_spectrum = self.feature in (Feature.PITCH, Feature.RUNOUT)
         if needs_spectrum != bool(self.parsed_spectrum):
             raise ValueError(
                 f"feature {self.feature.value} {'needs' if needs_spectrum else 'has no'} spectrum such as '1:9.2 2:4.3'"
             )
+        if needs_spectrum and self.each > 1:
+            raise ValueError("each must be 1 for a feature with a spectrum; single teeth are sources of feature size")
         return self
 
     @property
@@ -114,6 +126,8 @@ class ToleranceRow(Record):
             cp=self.Cp,
             shift=self.shift,
             spectrum=self.parsed_spectrum,
+            each=self.each,
+            over=(self.over or 0.0) * MILLIMETRE,
             group=self.group or self.id,
             locked=self.locked,
             grade=self.grade,
@@ -176,12 +190,16 @@ def _cell(header: str, text: str, place: str) -> object:
     """Return a cell as the type that its column asks for."""
     value = str(text).strip()
     annotation = ToleranceRow.model_fields[header].annotation
+    if header == "each":
+        if not value.isdecimal():
+            raise InputError.at(place, header, value, "a whole number, 1 or more")
+        return int(value)
     if annotation is bool:
         answers = {"yes": True, "no": False, "true": True, "false": False}
         if value.lower() not in answers:
             raise InputError.at(place, header, value, "yes or no")
         return answers[value.lower()]
-    if annotation is float:
+    if annotation is float or header == "over":
         try:
             return float(value)
         except ValueError:
@@ -219,6 +237,8 @@ def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
                 "cost": round(source.cost, 6),
                 "grade": source.grade,
                 "spectrum": " ".join(f"{order}:{amplitude:g}" for order, amplitude in source.spectrum),
+                "each": source.each,
+                "over": source.over / MILLIMETRE if source.over else "",
                 "note": source.note,
             }
         )
