@@ -101,7 +101,7 @@ def check(script: Script, as_json: AsJson = False) -> None:
 @app.command()
 def te(
     reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv20e",
-    unit: Annotated[str, typer.Option(help="Shipped unit name or TOML file.")] = "table4",
+    unit: Annotated[str, typer.Option(help="Shipped unit (exact, table4 of an RV-20E) or TOML file.")] = "exact",
     torque: Annotated[
         float | None, typer.Option(help="Torque on the carrier [N·m], negative against the rotation.")
     ] = None,

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from tolalloc.equivalent.attribution import attribute
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, LOOP_ASSUMPTION, both_directions, hysteresis_loop
+from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.outputs import OUTPUTS, Solved, order_spectrum
 from tolalloc.equivalent.status import Status, count_statuses
@@ -22,8 +23,8 @@ from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float, attributed: bool = False) -> dict[str, Any]:
     """Return what a unit does over one output turn, with units of measurement in the names."""
-    model = EquivalentModel(reducer)
-    errors = unit.errors(model.columns)
+    model = EquivalentModel(reducer, orders=unit.orders or HARMONICS)
+    errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
     worst = Status(max(extremes.status[0], equilibria.status.max()))
     if worst is not Status.CONVERGED:

@@ -88,6 +88,11 @@ class Modification:
         return self.equidistant - self.shift * sqrt(1 - stage.shortening**2)
 
     @property
+    def deviations(self) -> dict[str, float]:
+        """The two amounts as error columns of the model [m]."""
+        return {"modification.equidistant": self.equidistant, "modification.shift": self.shift}
+
+    @property
     def radial_clearance(self) -> float:
         """The nominal gap at tooth tip and root, Δr_rp − Δr_p [m]."""
         return self.equidistant - self.shift
