@@ -1,13 +1,18 @@
-"""The adjoint derivative of the peak-to-peak, against central differences of the whole model."""
+"""The adjoint derivatives, against central differences of the whole model."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from tests.random_reducers import is_angle, random_case
 from tests.random_units import random_units
 from tolalloc.equivalent.angle_search import AngleSearch
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.status import Status
+from tolalloc.units import ARCSECOND
 
 
 def test_derivative_agrees_with_differences(rv20e, table4, generator):
@@ -40,3 +45,45 @@ def test_derivative_predicts_small_changes(rv20e, table4, generator):
     actual = moved.peak_to_peak - extremes.peak_to_peak
     predicted = (derivative * change).sum(axis=1)
     assert np.corrcoef(actual, predicted)[0, 1] > 0.99
+
+
+def moved(case, name, change):
+    """Return the case with one stiffness times 1 + change."""
+    stiffness = replace(case.reducer.stiffness, **{name: (1 + change) * getattr(case.reducer.stiffness, name)})
+    return replace(case, reducer=replace(case.reducer, stiffness=stiffness))
+
+
+def rotation_at_first_angle(case, errors, torque):
+    model = EquivalentModel(case.reducer, orders=case.orders)
+    return model.equilibria(errors, torque, np.zeros(1)).transmission_error[0, 0]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_rotation_derivatives_of_any_reducer_agree_with_differences(seed):
+    """By every error along a random direction, by the torque and by each stiffness, with any law, play and tilt."""
+    case, generator = random_case(seed), np.random.default_rng(seed)
+    model = EquivalentModel(case.reducer, AngleSearch(coarse=4, nodes_per_coarse=1), orders=case.orders)
+    errors = np.array([[case.units[0][name] for name in model.columns]])
+    derivatives = model.rotation_derivatives(errors, case.torque)
+    assert derivatives.status[0] == Status.CONVERGED
+    direction = generator.normal(size=errors.shape) * np.where([is_angle(name) for name in model.columns], 2e-10, 2e-11)
+    step = 1e-6 * case.torque
+    found = {
+        "errors": (
+            rotation_at_first_angle(case, errors + direction, case.torque)
+            - rotation_at_first_angle(case, errors - direction, case.torque),
+            2 * float(derivatives.by_error[0] @ direction[0]),
+        ),
+        "torque": (
+            rotation_at_first_angle(case, errors, case.torque + step)
+            - rotation_at_first_angle(case, errors, case.torque - step),
+            2 * step * float(derivatives.by_torque[0]),
+        ),
+    }
+    for name, values in derivatives.by_stiffness.items():
+        ahead, behind = (
+            rotation_at_first_angle(moved(case, name, change), errors, case.torque) for change in (1e-5, -1e-5)
+        )
+        found[name] = (ahead - behind, 2e-5 * float(values[0]))
+    for name, (change, exact) in found.items():
+        assert change == pytest.approx(exact, rel=2e-3, abs=1e-7 * ARCSECOND), name
