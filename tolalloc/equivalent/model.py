@@ -18,7 +18,7 @@ from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.solvers.adjoint import Derivative, solve_peak_to_peak_derivatives, solve_rotation_derivatives
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED
 from tolalloc.equivalent.solvers.extremes import Found, solve_extremes
-from tolalloc.equivalent.solvers.turn import Design, Turn, design_of, solve_curves
+from tolalloc.equivalent.solvers.turn import Design, Turn, design_of, solve_curves, tile_size
 from tolalloc.reducer.design import Reducer
 
 
@@ -63,6 +63,10 @@ class EquivalentModel:
         """The reducer as the solvers take it."""
         return design_of(self.reducer)
 
+    @property
+    def _discs(self) -> tuple[int, ...]:
+        return (0,) * self.reducer.disc_count
+
     @cached_property
     def _tables(self) -> CondensedAngles:
         return self.tables_at(self.search.node_angle)
@@ -104,7 +108,19 @@ class EquivalentModel:
             np.empty(shape, np.uint16),
         )
         columns = self.error_columns
-        solve_curves(0, 1, tables, columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque, turn)
+        solve_curves(
+            tile_size(errors.shape[0]),
+            self._discs,
+            0,
+            1,
+            tables,
+            columns.layout,
+            columns.map,
+            self.design,
+            np.ascontiguousarray(errors),
+            torque,
+            turn,
+        )
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(
             reducer=self.reducer,
@@ -140,7 +156,16 @@ class EquivalentModel:
             np.empty(samples),
         )
         solve_extremes(
-            self._tables, columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque, halving, found
+            tile_size(samples),
+            self._discs,
+            self._tables,
+            columns.layout,
+            columns.map,
+            self.design,
+            np.ascontiguousarray(errors),
+            torque,
+            halving,
+            found,
         )
         found.extreme[found.status != CONVERGED] = np.nan
         return Extremes(

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numba as nb
+from numba import get_num_threads as thread_count
 from numba import prange
 
-__all__ = ["is_kept", "jit", "parallel_jit", "prange", "use_threads"]
+__all__ = ["is_kept", "jit", "parallel_jit", "prange", "thread_count", "use_threads"]
 
 _ROOM = Path(__file__).parent
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_ROOM.glob("*.py")))).hexdigest()

@@ -283,9 +283,7 @@ def _newton(problem, q, work):
     ratio, touching, least, least_touching = np.inf, 0, np.inf, 0
     for _ in range(_ITERATIONS):
         compress(problem, q, work.compression, work.play)
-        largest, cancelling, touching = assemble(
-            problem, work.compression, work.play, q, work.gradient, work.tangent
-        )
+        largest, cancelling, touching = assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
         residual = 0.0
         for i in range(q.size):
             residual = max(residual, abs(work.gradient[i]))

@@ -13,7 +13,6 @@ from jaxtyping import Float, Int, UInt8
 
 from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
-from tolalloc.equivalent.solvers.lane_solver import TILE
 from tolalloc.equivalent.solvers.problem import make_memory, solve_anywhere, values_of
 from tolalloc.equivalent.solvers.turn import make_turn, solve_tile
 
@@ -114,14 +113,14 @@ def _refine(sign, rotation, kept, halving, tables, layout, design, values, memor
 
 
 @jit
-def _extremes_of_tile(number, tables, layout, mapped, design, errors, torque, halving, found):
-    a, b = number * TILE, min((number + 1) * TILE, errors.shape[0])
+def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, errors, torque, halving, found):
+    a, b = number * samples, min((number + 1) * samples, errors.shape[0])
     size, angles = tables.load.shape[2], halving.coarse + 2
     values = np.empty((b - a, layout.end))
     finite = values_of(errors[a:b], torque, layout, mapped, values)
     memory, turn = make_memory(design.law, tables), make_turn(b - a, angles, size)
     before = halving.first - halving.stride
-    solve_tile(before, halving.stride, tables, layout, design, values, finite, memory, turn)
+    solve_tile(discs, before, halving.stride, tables, layout, design, values, finite, memory, turn)
     for s in range(a, b):
         own = s - a
         found.solves[s], found.left_over[s] = angles, 0.0
@@ -143,7 +142,7 @@ def _extremes_of_tile(number, tables, layout, mapped, design, errors, torque, ha
 
 
 @parallel_jit
-def solve_extremes(tables, layout, mapped, design, errors, torque, halving, found):
+def solve_extremes(size, discs, tables, layout, mapped, design, errors, torque, halving, found):
     """Fill the extremes of every sample."""
-    for number in prange((errors.shape[0] + TILE - 1) // TILE):
-        _extremes_of_tile(np.int64(number), tables, layout, mapped, design, errors, torque, halving, found)
+    for number in prange((errors.shape[0] + size - 1) // size):
+        _extremes_of_tile(np.int64(number), size, discs, tables, layout, mapped, design, errors, torque, halving, found)

@@ -24,15 +24,20 @@ from tolalloc.equivalent.solvers.lanes import (
     load,
     magnitude,
     multiply,
+    newton_step,
     spread,
     store,
     subtract,
 )
 
-TILE = 32
-"""Samples that share one look at an angle's tables: four registers."""
+TILE = 128
+"""Largest number of samples that share one look at an angle's tables."""
 
-_STEPS = 8
+FOUR = 4 * WIDTH
+"""Samples in four registers; as many are worked on at a time."""
+
+_STEPS = 10
+_BEYOND = 1.000001  # of the way to the next contact
 _ALL = 2**WIDTH - 1
 
 
@@ -45,44 +50,58 @@ class Tile(NamedTuple):
         What the tables take, `tolalloc.equivalent.columns.Layout` [m, rad, N·m].
     undisturbed, force, rotation
         Pin compressions [m], forces on the discs [N] and carrier rotation [rad] at undisplaced discs.
-    q
-        Coordinates of the discs: guess, then equilibrium [m].
-    products
-        k·d_i and k·d_i·d_j of every contact at this angle [N/m].
-    gradient, step, tangent
-        Of one register's samples [N, m, N/m].
+    q, last
+        Coordinates of the discs: guess, then equilibrium, and the equilibrium at the last angle [m].
     ratio, touching
         Residual over the largest force; pins in contact [-].
+    weighted
+        k·d of every contact at this angle [N/m].
+    pins, stiffness
+        Of one register's samples: sums over the pressed contacts of each disc, of forces [N] and of k·d_i·d_j [N/m].
+    gradient, step
+        The same: unbalanced force, Newton's step [N, m].
     """
 
-    values: Float[np.ndarray, "value 32"]
-    undisturbed: Float[np.ndarray, "contact 32"]
-    force: Float[np.ndarray, "coordinate 32"]
-    rotation: Float[np.ndarray, "32"]
-    q: Float[np.ndarray, "coordinate 32"]
-    products: Float[np.ndarray, "9 contact"]
+    values: Float[np.ndarray, "value sample"]
+    undisturbed: Float[np.ndarray, "contact sample"]
+    force: Float[np.ndarray, "coordinate sample"]
+    rotation: Float[np.ndarray, " sample"]
+    q: Float[np.ndarray, "coordinate sample"]
+    last: Float[np.ndarray, "coordinate sample"]
+    ratio: Float[np.ndarray, " sample"]
+    touching: Float[np.ndarray, " sample"]
+    weighted: Float[np.ndarray, "3 contact"]
+    pins: Float[np.ndarray, "coordinate 8"]
+    stiffness: Float[np.ndarray, "entry 8"]
     gradient: Float[np.ndarray, "coordinate 8"]
     step: Float[np.ndarray, "coordinate 8"]
-    tangent: Float[np.ndarray, "coordinate coordinate 8"]
-    ratio: Float[np.ndarray, "32"]
-    touching: Float[np.ndarray, "32"]
+
+
+@jit
+def _aligned(rows, width):
+    """Return zeros whose rows start where a register does: a load across two lines of the cache takes twice as long."""
+    room = np.zeros(rows * width + WIDTH)
+    first = (-(room.ctypes.data >> 3)) % WIDTH
+    return room[first : first + rows * width].reshape(rows, width)
 
 
 @jit
 def make_tile(layout, size, contacts):
     """Return an empty tile."""
     return Tile(
-        np.empty((layout.end, TILE)),
-        np.empty((contacts + 1, TILE)),
-        np.empty((size, TILE)),
-        np.empty(TILE),
-        np.zeros((size, TILE)),
-        np.empty((9, contacts)),
-        np.empty((size, WIDTH)),
-        np.empty((size, WIDTH)),
-        np.empty((size, size, WIDTH)),
-        np.empty(TILE),
-        np.empty(TILE),
+        _aligned(layout.end, TILE),
+        _aligned(contacts, TILE),
+        _aligned(size, TILE),
+        _aligned(1, TILE).reshape(TILE),
+        _aligned(size, TILE),
+        _aligned(size, TILE),
+        _aligned(1, TILE).reshape(TILE),
+        _aligned(1, TILE).reshape(TILE),
+        np.empty((3, contacts)),
+        _aligned(size, WIDTH),
+        _aligned(2 * size, WIDTH),
+        _aligned(size, WIDTH),
+        _aligned(size, WIDTH),
     )
 
 
@@ -111,217 +130,212 @@ def nonzero_waves(layout, values):
 
 
 @jit
-def _forces(at, tables, rows, tile):
+def _forces(at, tables, rows, used, tile):
     """Set forces and carrier rotation at undisplaced discs."""
-    table, by_load = tables.load[at], tables.carrier_by_load[at]
-    for v in range(0, TILE, WIDTH):
+    table, by_load, values = tables.load[at], tables.carrier_by_load[at], tile.values
+    for v in range(0, used, WIDTH):
         total = spread(0.0)
         for m in rows:
-            total = fma(spread(by_load[m]), load(tile.values, m * TILE + v), total)
+            total = fma(spread(by_load[m]), load(values, m * TILE + v), total)
         store(tile.rotation, v, total)
     for i in range(table.shape[1]):
-        a, b, c, d = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
-        for m in rows:
-            factor, row = spread(table[m, i]), m * TILE
-            a = fma(factor, load(tile.values, row), a)
-            b = fma(factor, load(tile.values, row + WIDTH), b)
-            c = fma(factor, load(tile.values, row + 2 * WIDTH), c)
-            d = fma(factor, load(tile.values, row + 3 * WIDTH), d)
-        row = i * TILE
-        store(tile.force, row, a)
-        store(tile.force, row + WIDTH, b)
-        store(tile.force, row + 2 * WIDTH, c)
-        store(tile.force, row + 3 * WIDTH, d)
+        for v in range(0, used, FOUR):
+            a, b, c, d = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+            for m in rows:
+                factor, row = spread(table[m, i]), m * TILE + v
+                a = fma(factor, load(values, row), a)
+                b = fma(factor, load(values, row + WIDTH), b)
+                c = fma(factor, load(values, row + 2 * WIDTH), c)
+                d = fma(factor, load(values, row + 3 * WIDTH), d)
+            _store_four(tile.force, i * TILE + v, a, b, c, d)
 
 
 @jit
-def _add_product(factor, values, row, out, at):
-    """Add factor·(a tile's row) to a row of another array."""
-    for v in range(0, TILE, WIDTH):
-        store(out, at + v, fma(factor, load(values, row + v), load(out, at + v)))
+def _store_four(out, at, a, b, c, d):
+    store(out, at, a)
+    store(out, at + WIDTH, b)
+    store(out, at + 2 * WIDTH, c)
+    store(out, at + 3 * WIDTH, d)
 
 
 @jit
-def _undisturbed(at, tables, layout, waves, teeth_deviate, tile):
-    """Set the pin compressions at undisplaced discs; two contacts at a time share the harmonic amplitudes."""
+def _add_waves(table, values, first, waves, k, other, p, q, out):
+    """Add the disc's harmonic deviations to two contacts of four registers: both share the amplitudes."""
+    a, b, c, d = load(out, p), load(out, p + WIDTH), load(out, p + 2 * WIDTH), load(out, p + 3 * WIDTH)
+    e, f, g, h = load(out, q), load(out, q + WIDTH), load(out, q + 2 * WIDTH), load(out, q + 3 * WIDTH)
+    for m in waves:
+        one, two, row = spread(table[2 + m, k]), spread(table[2 + m, other]), first + m * TILE
+        w, x = load(values, row), load(values, row + WIDTH)
+        y, z = load(values, row + 2 * WIDTH), load(values, row + 3 * WIDTH)
+        a, b, c, d = fma(one, w, a), fma(one, x, b), fma(one, y, c), fma(one, z, d)
+        e, f, g, h = fma(two, w, e), fma(two, x, f), fma(two, y, g), fma(two, z, h)
+    _store_four(out, q, e, f, g, h)
+    _store_four(out, p, a, b, c, d)
+
+
+@jit
+def _undisturbed(at, tables, layout, waves, teeth_deviate, used, tile):
+    """Set the pin compressions at undisplaced discs."""
     pins, values, out = layout.pins, tile.values, tile.undisturbed
     radial, tangential, radius = layout.pin * TILE, (layout.pin + pins) * TILE, (layout.pin + 2 * pins) * TILE
     for d in range(tables.contact_by_error.shape[1]):
-        table = tables.contact_by_error[at, d]
+        table, contact, wave = tables.contact_by_error[at, d], d * pins, (layout.wave + d * layout.waves) * TILE
         for k in range(pins):
-            outward, along, row = spread(table[0, k]), spread(table[1, k]), (d * pins + k) * TILE
-            for v in range(0, TILE, WIDTH):
+            outward, along, row = spread(table[0, k]), spread(table[1, k]), (contact + k) * TILE
+            for v in range(0, used, WIDTH):
                 place = k * TILE + v
                 total = fma(outward, load(values, radial + place), load(values, radius + place))
                 store(out, row + v, fma(along, load(values, tangential + place), total))
         for k in range(0, pins, 2):
             other = min(k + 1, pins - 1)
-            p, q = (d * pins + k) * TILE, (d * pins + other) * TILE
-            a, b, c, e = load(out, p), load(out, p + WIDTH), load(out, p + 2 * WIDTH), load(out, p + 3 * WIDTH)
-            f, g, h, i = load(out, q), load(out, q + WIDTH), load(out, q + 2 * WIDTH), load(out, q + 3 * WIDTH)
-            for m in waves:
-                one, two = spread(table[2 + m, k]), spread(table[2 + m, other])
-                row = (layout.wave + d * layout.waves + m) * TILE
-                w, x = load(values, row), load(values, row + WIDTH)
-                y, z = load(values, row + 2 * WIDTH), load(values, row + 3 * WIDTH)
-                a, b, c, e = fma(one, w, a), fma(one, x, b), fma(one, y, c), fma(one, z, e)
-                f, g, h, i = fma(two, w, f), fma(two, x, g), fma(two, y, h), fma(two, z, i)
-            store(out, q, f)
-            store(out, q + WIDTH, g)
-            store(out, q + 2 * WIDTH, h)
-            store(out, q + 3 * WIDTH, i)
-            store(out, p, a)
-            store(out, p + WIDTH, b)
-            store(out, p + 2 * WIDTH, c)
-            store(out, p + 3 * WIDTH, e)
+            for v in range(0, used, FOUR):
+                p, q = (contact + k) * TILE + v, (contact + other) * TILE + v
+                _add_waves(table, values, wave + v, waves, k, other, p, q, out)
         if teeth_deviate:
-            first = layout.tooth + d * 2 * layout.teeth
             for k in range(pins):
                 for kind in range(2):
-                    factor = spread(table[2 + layout.waves + kind, k])
-                    row = (first + kind * layout.teeth + tables.tooth[at, d, k]) * TILE
-                    _add_product(factor, values, row, out, (d * pins + k) * TILE)
+                    factor, tooth = spread(table[2 + layout.waves + kind, k]), tables.tooth[at, d, k]
+                    row = (layout.tooth + (2 * d + kind) * layout.teeth + tooth) * TILE
+                    for v in range(0, used, WIDTH):
+                        place = (contact + k) * TILE + v
+                        store(out, place, fma(factor, load(values, row + v), load(out, place)))
 
 
 @jit
-def _products(at, tables, products):
-    """Set k·d_i and k·d_i·d_j of all contacts."""
+def _weigh(at, tables, weighted):
+    """Set k·d of all contacts."""
     by_disc, stiffness = tables.contact_by_disc[at], tables.contact_stiffness[at]
     discs, _, pins = by_disc.shape
     for d in range(discs):
-        row = 3
         for i in range(3):
             for k in range(pins):
-                products[i, d * pins + k] = stiffness[d * pins + k] * by_disc[d, i, k]
-            for j in range(i + 1):
-                for k in range(pins):
-                    products[row, d * pins + k] = products[i, d * pins + k] * by_disc[d, j, k]
-                row += 1
+                weighted[i, d * pins + k] = stiffness[d * pins + k] * by_disc[d, i, k]
 
 
 @jit
-def _assemble(at, tables, v, tile):
-    """Set gradient and lower tangent of one register; return residual, bound of a converged one, and ratio's parts."""
-    by_disc, stiffness, contact = tables.contact_by_disc[at], tables.stiffness[at], tables.contact_stiffness[at]
+def _press(by_disc, v, tile):
+    """Set force and stiffness of the contacts of one register; return how many are pressed."""
     discs, _, pins = by_disc.shape
-    size, zero, one, products = 3 * discs, spread(0.0), spread(1.0), tile.products
-    largest, cancelling, touching, residual = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+    zero, one, weighted, undisturbed = spread(0.0), spread(1.0), tile.weighted, tile.undisturbed
+    touching = zero
+    for d in range(discs):
+        first = 3 * d * TILE + v
+        x, y, turn = load(tile.q, first), load(tile.q, first + TILE), load(tile.q, first + 2 * TILE)
+        gx, gy, gt, xx, xy, yy, xt, yt, tt = zero, zero, zero, zero, zero, zero, zero, zero, zero
+        for k in range(pins):
+            c = d * pins + k
+            a, b, t = spread(by_disc[d, 0, k]), spread(by_disc[d, 1, k]), spread(by_disc[d, 2, k])
+            depth = fma(t, turn, fma(b, y, fma(a, x, load(undisturbed, c * TILE + v))))
+            pressed = above(depth, zero)
+            ka = choose(pressed, spread(weighted[0, c]), zero)
+            kb = choose(pressed, spread(weighted[1, c]), zero)
+            kt = choose(pressed, spread(weighted[2, c]), zero)
+            gx, gy, gt = fma(ka, depth, gx), fma(kb, depth, gy), fma(kt, depth, gt)
+            xx, xy, yy = fma(ka, a, xx), fma(ka, b, xy), fma(kb, b, yy)
+            xt, yt, tt = fma(ka, t, xt), fma(kb, t, yt), fma(kt, t, tt)
+            touching = choose(pressed, add(touching, one), touching)
+        for i, total in ((0, gx), (1, gy), (2, gt)):
+            store(tile.pins, (3 * d + i) * WIDTH, total)
+        for i, total in ((0, xx), (1, xy), (2, yy), (3, xt), (4, yt), (5, tt)):
+            store(tile.stiffness, (6 * d + i) * WIDTH, total)
+    return touching
+
+
+@jit
+def _balance(discs, stiffness, v, tile):
+    """Set the unbalanced force of one register; return residual, what it may be, and the largest force."""
+    size = 3 * len(discs)  # known when compiled, so these loops become straight code
+    largest, cancelling, residual = spread(0.0), spread(0.0), spread(0.0)
     for i in range(size):
-        applied = load(tile.force, i * TILE + v)
-        value, terms = subtract(zero, applied), zero
+        applied, pressing = load(tile.force, i * TILE + v), load(tile.pins, i * WIDTH)
+        value, terms = subtract(pressing, applied), spread(0.0)
         for j in range(size):
             factor, moved = spread(stiffness[i, j]), load(tile.q, j * TILE + v)
             value = fma(factor, moved, value)
             terms = fma(magnitude(factor), magnitude(moved), terms)
         store(tile.gradient, i * WIDTH, value)
-        largest, cancelling = larger(magnitude(applied), largest), larger(terms, cancelling)
-        for j in range(i + 1):
-            store(tile.tangent, (i * size + j) * WIDTH, spread(stiffness[i, j]))
-    for d in range(discs):
-        x, y = load(tile.q, 3 * d * TILE + v), load(tile.q, (3 * d + 1) * TILE + v)
-        turn = load(tile.q, (3 * d + 2) * TILE + v)
-        gx, gy, gt, xx, xy, yy, xt, yt, tt = zero, zero, zero, zero, zero, zero, zero, zero, zero
-        for k in range(pins):
-            c = d * pins + k
-            depth = load(tile.undisturbed, c * TILE + v)
-            depth = fma(spread(by_disc[d, 0, k]), x, depth)
-            depth = fma(spread(by_disc[d, 1, k]), y, depth)
-            depth = fma(spread(by_disc[d, 2, k]), turn, depth)
-            pressed = above(depth, zero)
-            depth = choose(pressed, depth, zero)
-            largest = larger(multiply(spread(contact[c]), depth), largest)
-            touching = choose(pressed, add(touching, one), touching)
-            gx = fma(spread(products[0, c]), depth, gx)
-            gy = fma(spread(products[1, c]), depth, gy)
-            gt = fma(spread(products[2, c]), depth, gt)
-            xx = choose(pressed, add(xx, spread(products[3, c])), xx)
-            xy = choose(pressed, add(xy, spread(products[4, c])), xy)
-            yy = choose(pressed, add(yy, spread(products[5, c])), yy)
-            xt = choose(pressed, add(xt, spread(products[6, c])), xt)
-            yt = choose(pressed, add(yt, spread(products[7, c])), yt)
-            tt = choose(pressed, add(tt, spread(products[8, c])), tt)
-        first = 3 * d
-        for i, sum_ in ((0, gx), (1, gy), (2, gt)):
-            row = (first + i) * WIDTH
-            store(tile.gradient, row, add(load(tile.gradient, row), sum_))
-        for i, j, sum_ in ((0, 0, xx), (1, 0, xy), (1, 1, yy), (2, 0, xt), (2, 1, yt), (2, 2, tt)):
-            row = ((first + i) * size + first + j) * WIDTH
-            store(tile.tangent, row, add(load(tile.tangent, row), sum_))
-    for i in range(size):
-        residual = larger(magnitude(load(tile.gradient, i * WIDTH)), residual)
+        largest = larger(larger(magnitude(applied), magnitude(pressing)), largest)
+        cancelling, residual = larger(terms, cancelling), larger(magnitude(value), residual)
     allowed = larger(multiply(spread(TOLERANCE), largest), multiply(spread(ROUNDING), cancelling))
-    return residual, allowed, largest, touching
+    return residual, allowed, largest
 
 
 @jit
-def _solve(size, tile):
-    """Solve tangent·step = −gradient by LDLᵀ in place; return one bit per lane whose pivot vanishes."""
-    tangent, step, zero = tile.tangent, tile.step, spread(0.0)
-    largest = zero
-    for i in range(size):
-        largest = larger(load(tangent, (i * size + i) * WIDTH), largest)
-    least, singular = multiply(spread(PIVOT), largest), 0
-    for i in range(size):
-        value = subtract(zero, load(tile.gradient, i * WIDTH))
-        pivot = load(tangent, (i * size + i) * WIDTH)
-        for j in range(i):
-            entry = load(tangent, (i * size + j) * WIDTH)
-            for m in range(j):
-                # Above the diagonal stand the factors times their pivots.
-                entry = subtract(
-                    entry,
-                    multiply(load(tangent, (m * size + i) * WIDTH), load(tangent, (j * size + m) * WIDTH)),
-                )
-            store(tangent, (j * size + i) * WIDTH, entry)
-            factor = multiply(entry, load(tangent, (j * size + j) * WIDTH))
-            store(tangent, (i * size + j) * WIDTH, factor)
-            pivot = subtract(pivot, multiply(entry, factor))
-            value = subtract(value, multiply(factor, load(step, j * WIDTH)))
-        singular |= _ALL ^ above(pivot, least)
-        store(tangent, (i * size + i) * WIDTH, divide(spread(1.0), pivot))
-        store(step, i * WIDTH, value)
-    for i in range(size - 1, -1, -1):
-        value = multiply(load(step, i * WIDTH), load(tangent, (i * size + i) * WIDTH))
-        for m in range(i + 1, size):
-            value = subtract(value, multiply(load(tangent, (m * size + i) * WIDTH), load(step, m * WIDTH)))
-        store(step, i * WIDTH, value)
-    return singular
+def _first_touch(by_disc, v, tile):
+    """Return how many steps away the next pin touches, and one bit per lane that meets one."""
+    zero, nowhere = spread(0.0), spread(-np.inf)
+    discs, _, pins = by_disc.shape
+    closest = nowhere  # minus the length
+    for d in range(discs):
+        row, first = 3 * d * WIDTH, 3 * d * TILE + v
+        x, y, turn = load(tile.q, first), load(tile.q, first + TILE), load(tile.q, first + 2 * TILE)
+        sx, sy, st = load(tile.step, row), load(tile.step, row + WIDTH), load(tile.step, row + 2 * WIDTH)
+        for k in range(pins):
+            a, b, t = spread(by_disc[d, 0, k]), spread(by_disc[d, 1, k]), spread(by_disc[d, 2, k])
+            depth = fma(t, turn, fma(b, y, fma(a, x, load(tile.undisturbed, (d * pins + k) * TILE + v))))
+            rate = fma(t, st, fma(b, sy, multiply(a, sx)))
+            meets = above(rate, zero) & (_ALL ^ above(depth, zero))
+            closest = larger(choose(meets, divide(depth, rate), nowhere), closest)
+    return subtract(zero, closest), above(closest, nowhere)
 
 
 @jit
-def _newton(at, tables, v, tile):
-    """Bring one register's samples to equilibrium by whole steps; return one bit per lane that needs more care."""
-    size = tables.load.shape[2]
+def _newton(discs, at, tables, v, tile):
+    """Bring one register's samples to equilibrium; return one bit per lane that needs more care.
+
+    Steps are whole. With too few pins in contact the tangent is singular: such a lane moves to where the next pin
+    touches and a hair beyond.
+    """
+    by_disc, stiffness, zero = tables.contact_by_disc[at], tables.stiffness[at], spread(0.0)
     done, careful = 0, 0
+    touching = _press(by_disc, v, tile)
     for _ in range(_STEPS):
-        residual, allowed, largest, touching = _assemble(at, tables, v, tile)
+        residual, allowed, largest = _balance(discs, stiffness, v, tile)
         fresh = (_ALL ^ above(residual, allowed)) & (_ALL ^ (done | careful))
         if fresh:
-            ratio = choose(above(largest, spread(0.0)), divide(residual, largest), spread(0.0))
+            ratio = choose(above(largest, zero), divide(residual, largest), zero)
             store(tile.ratio, v, choose(fresh, ratio, load(tile.ratio, v)))
             store(tile.touching, v, choose(fresh, touching, load(tile.touching, v)))
             done |= fresh
         if (done | careful) == _ALL:
             break
-        careful |= _solve(size, tile) & (_ALL ^ done)
+        # A vanishing pivot is replaced by a small one.
+        singular = newton_step(discs, stiffness, tile.stiffness, tile.gradient, tile.step, PIVOT)
+        singular &= _ALL ^ (done | careful)
+        length = spread(1.0)
+        if singular:
+            reach, met = _first_touch(by_disc, v, tile)
+            careful |= singular & (_ALL ^ met)
+            length = choose(singular, multiply(spread(_BEYOND), reach), length)
         moving = _ALL ^ (done | careful)
-        for i in range(size):
+        for i in range(3 * len(discs)):
             q = load(tile.q, i * TILE + v)
-            store(tile.q, i * TILE + v, choose(moving, add(q, load(tile.step, i * WIDTH)), q))
+            store(tile.q, i * TILE + v, choose(moving, fma(length, load(tile.step, i * WIDTH), q), q))
+        touching = _press(by_disc, v, tile)
     return _ALL ^ done
 
 
 @jit
-def solve_tile_at(at, tables, layout, rows, waves, teeth_deviate, tile, careful):
-    """Solve a tile at one node from the guesses in ``tile.q``; set which samples need more care."""
-    _forces(at, tables, rows, tile)
-    _undisturbed(at, tables, layout, waves, teeth_deviate, tile)
-    _products(at, tables, tile.products)
-    for v in range(0, TILE, WIDTH):
-        bits = _newton(at, tables, v, tile)
+def solve_tile_at(discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful):
+    """Solve the ``used`` samples of a tile at one node from the guesses in ``tile.q``; set which need more care."""
+    _forces(at, tables, rows, used, tile)
+    _undisturbed(at, tables, layout, waves, teeth_deviate, used, tile)
+    _weigh(at, tables, tile.weighted)
+    for v in range(0, used, WIDTH):
+        bits = _newton(discs, at, tables, v, tile)
         for lane in range(WIDTH):
             careful[v + lane] = (bits >> lane) & 1
         total = load(tile.rotation, v)
         for i in range(tile.q.shape[0]):
             total = fma(spread(tables.carrier_by_kept[at, i]), load(tile.q, i * TILE + v), total)
         store(tile.rotation, v, total)
+
+
+@jit
+def guess_next(used, tile):
+    """Go on from the equilibrium as far as it is from that of the last angle."""
+    for i in range(tile.q.shape[0]):
+        for s in range(used):
+            q = tile.q[i, s]
+            tile.q[i, s] = 2.0 * q - tile.last[i, s]
+            tile.last[i, s] = q

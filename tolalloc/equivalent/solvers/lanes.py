@@ -48,6 +48,11 @@ def _call(builder: Any, name: str, arguments: Any) -> Any:
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64"), arguments)
 
 
+def _splat(builder, number):
+    first = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), number, ir.IntType(32)(0))
+    return builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+
+
 @intrinsic
 def load(typing, array, at):
     """Return the eight numbers of a contiguous array from the flat index ``at`` on."""
@@ -73,8 +78,7 @@ def spread(typing, number):
     """Return one number in all lanes."""
 
     def emit(context, builder, signature, arguments):
-        first = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), arguments[0], ir.IntType(32)(0))
-        return builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+        return _splat(builder, arguments[0])
 
     return lanes(types.float64), emit
 
@@ -143,3 +147,61 @@ def choose(typing, bits, a, b):
         return builder.select(mask, arguments[1], arguments[2])
 
     return lanes(types.int64, lanes, lanes), emit
+
+
+@intrinsic
+def newton_step(typing, discs, stiffness, contact, gradient, step, least):
+    """Solve (S + contact stiffness)·step = −gradient in every lane; return one bit per lane with a vanishing pivot.
+
+    ``discs`` has one entry per disc, ``contact`` six rows per disc: the lower triangle of its 3×3 block by rows. A
+    pivot not above ``least`` of the largest diagonal entry is replaced by that. The factorisation LDLᵀ is written out
+    for the number of coordinates at hand, every factor a value of its own; loops through memory take three times as
+    long.
+    """
+    size = 3 * len(discs)
+
+    def emit(context, builder, signature, arguments):
+        kinds = dict(zip(("discs", "stiffness", "contact", "gradient", "step", "least"), signature.args, strict=True))
+        given = dict(zip(kinds, arguments, strict=True))
+
+        def at(name, row):
+            return _address(context, builder, kinds[name], given[name], ir.IntType(64)(row * WIDTH))
+
+        def multiply_subtract(value, a, b):
+            return _call(builder, "fma", (builder.fneg(a), b, value))
+
+        table = context.make_array(kinds["stiffness"])(context, builder, given["stiffness"]).data
+        entry = {}
+        for i in range(size):
+            for j in range(i + 1):
+                own = _splat(builder, builder.load(builder.gep(table, [ir.IntType(64)(i * size + j)])))
+                if i // 3 == j // 3:
+                    row = 6 * (i // 3) + (i % 3) * (i % 3 + 1) // 2 + j % 3
+                    own = builder.fadd(own, builder.load(at("contact", row), align=8))
+                entry[i, j] = own
+        smallest = entry[0, 0]
+        for i in range(1, size):
+            smallest = builder.select(builder.fcmp_ordered(">", entry[i, i], smallest), entry[i, i], smallest)
+        smallest = builder.fmul(smallest, _splat(builder, given["least"]))
+        value, inverse, factor, singular = {}, {}, {}, ir.Constant(_BITS, [0] * WIDTH)
+        for i in range(size):
+            for j in range(i):
+                for m in range(j):
+                    entry[i, j] = multiply_subtract(entry[i, j], entry[i, m], factor[j, m])
+                factor[i, j] = builder.fmul(entry[i, j], inverse[j])
+            pivot, value[i] = entry[i, i], builder.fneg(builder.load(at("gradient", i), align=8))
+            for j in range(i):
+                pivot = multiply_subtract(pivot, entry[i, j], factor[i, j])
+                value[i] = multiply_subtract(value[i], factor[i, j], value[j])
+            regular = builder.fcmp_ordered(">", pivot, smallest)
+            singular = builder.or_(singular, builder.not_(regular))
+            pivot = builder.select(regular, pivot, smallest)
+            inverse[i] = builder.fdiv(ir.Constant(_DOUBLES, [1.0] * WIDTH), pivot)
+        for i in reversed(range(size)):
+            value[i] = builder.fmul(value[i], inverse[i])
+            for m in range(i + 1, size):
+                value[i] = multiply_subtract(value[i], factor[m, i], value[m])
+            builder.store(value[i], at("step", i), align=8)
+        return builder.zext(builder.bitcast(singular, ir.IntType(WIDTH)), ir.IntType(64))
+
+    return types.int64(discs, stiffness, contact, gradient, step, least), emit

@@ -11,10 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, UInt8, UInt16
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
+from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange, thread_count
 from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
-from tolalloc.equivalent.solvers.lane_solver import TILE, make_tile, nonzero_rows, nonzero_waves, solve_tile_at
+from tolalloc.equivalent.solvers.lane_solver import (
+    FOUR,
+    TILE,
+    guess_next,
+    make_tile,
+    nonzero_rows,
+    nonzero_waves,
+    solve_tile_at,
+)
 from tolalloc.equivalent.solvers.problem import make_memory, solve_at_node, values_of
 from tolalloc.reducer.design import Reducer
 
@@ -97,68 +105,85 @@ def _one_by_one(first, stride, tables, layout, design, values, finite, memory, t
                 guess[:] = 0.0
 
 
+def tile_size(samples: int) -> int:
+    """Return how many samples go into a tile so that every thread has one: whole fours of registers, `TILE` at most."""
+    share = FOUR * thread_count()
+    return int(min(FOUR * max((samples + share - 1) // share, 1), TILE))
+
+
 @jit
-def _side_by_side(first, stride, tables, layout, design, values, finite, memory, turn):
-    """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
-    samples, size, contacts = values.shape[0], turn.kept.shape[2], tables.contact_stiffness.shape[1]
-    tile = make_tile(layout, size, contacts)
-    careful, tilted = np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
-    for s in range(TILE):
-        own = min(s, samples - 1)
+def _fill_tile(layout, values, finite, used, tile, tilted):
+    """Set the values of a tile, its last sample filling the room that is left; set which samples have tilted discs."""
+    for s in range(used):
+        own = min(s, values.shape[0] - 1)
         for m in range(layout.end):
             tile.values[m, s] = values[own, m] if finite[own] else 0.0
         tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
+
+
+@jit
+def _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
+    samples, size, contacts = values.shape[0], turn.kept.shape[2], tables.contact_stiffness.shape[1]
+    used = (samples + FOUR - 1) // FOUR * FOUR
+    tile, careful, tilted = make_tile(layout, size, contacts), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    _fill_tile(layout, values, finite, used, tile, tilted)
     rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
     teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
     guess = np.empty(size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
-        solve_tile_at(at, tables, layout, rows, waves, teeth_deviate, tile, careful)
+        solve_tile_at(discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
         for s in range(samples):
             turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
             turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
             for i in range(size):
                 turn.kept[s, angle, i] = tile.q[i, s]
             if finite[s] and (careful[s] or tilted[s]):
-                guess[:] = 0.0
-                if angle > 0 and turn.status[s, angle - 1] == CONVERGED:
-                    guess[:] = turn.kept[s, angle - 1]
+                guess[:] = tile.last[:, s]
                 rotation, status, ratio, touching = solve_at_node(
                     at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
                 )
                 turn.rotation[s, angle], turn.status[s, angle] = rotation, status
                 turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
                 turn.kept[s, angle] = guess
-                for i in range(size):
-                    tile.q[i, s] = guess[i] if status == CONVERGED else 0.0
-        for s in range(samples, TILE):
-            for i in range(size):
-                tile.q[i, s] = tile.q[i, samples - 1]
+                if status != CONVERGED:
+                    guess[:] = 0.0
+                tile.q[:, s] = guess
+        if angle == 0:
+            tile.last[:] = tile.q
+        guess_next(used, tile)
     for s in range(samples):
         if not finite[s]:
             _give_up(turn, s)
 
 
 @jit
-def solve_tile(first, stride, tables, layout, design, values, finite, memory, turn):
+def solve_tile(discs, first, stride, tables, layout, design, values, finite, memory, turn):
     """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
     if design.law == LINEAR and tables.play_stiffness.shape[1] == 0:
-        _side_by_side(first, stride, tables, layout, design, values, finite, memory, turn)
+        _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn)
     else:
         _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn)
 
 
 @jit
-def _curves_of_tile(number, first, stride, tables, layout, mapped, design, errors, torque, turn):
-    a, b = number * TILE, min((number + 1) * TILE, errors.shape[0])
+def _curves_of_tile(number, size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+    a, b = number * size, min((number + 1) * size, errors.shape[0])
     values = np.empty((b - a, layout.end))
     finite = values_of(errors[a:b], torque, layout, mapped, values)
     part = Turn(turn.rotation[a:b], turn.kept[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
-    solve_tile(first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
+    solve_tile(discs, first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
 
 
 @parallel_jit
-def solve_curves(first, stride, tables, layout, mapped, design, errors, torque, turn):
-    """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on."""
-    for number in prange((errors.shape[0] + TILE - 1) // TILE):
-        _curves_of_tile(np.int64(number), first, stride, tables, layout, mapped, design, errors, torque, turn)
+def solve_curves(size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+    """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on.
+
+    ``size`` is that of a tile, `tile_size`; the answer does not depend on it.
+    ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
+    """
+    for number in prange((errors.shape[0] + size - 1) // size):
+        _curves_of_tile(
+            np.int64(number), size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn
+        )
