@@ -183,7 +183,10 @@ def newton_step(typing, discs, stiffness, contact, gradient, step, least):
         for i in range(1, size):
             smallest = builder.select(builder.fcmp_ordered(">", entry[i, i], smallest), entry[i, i], smallest)
         smallest = builder.fmul(smallest, _splat(builder, given["least"]))
-        value, inverse, factor, singular = {}, {}, {}, ir.Constant(_BITS, [0] * WIDTH)
+        value: dict[int, Any] = {}
+        inverse: dict[int, Any] = {}
+        factor: dict[tuple[int, int], Any] = {}
+        singular = ir.Constant(_BITS, [0] * WIDTH)
         for i in range(size):
             for j in range(i):
                 for m in range(j):
