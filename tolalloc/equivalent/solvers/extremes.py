@@ -83,28 +83,30 @@ def _refine(sign, rotation, kept, halving, tables, layout, design, values, memor
     best_at = inside.argmax()
     best, position = inside[best_at], halving.first + best_at * float(halving.stride)
     left_over, solves, worst_status, worst_residual = 0.0, 0, CONVERGED, 0.0
-    q, sides = np.empty(kept.shape[1]), np.empty(2)
-    for i in np.argsort(-inside):
+    sides, here, at_side = np.empty(2), np.empty(kept.shape[1]), np.empty((2, kept.shape[1]))
+    peaks = np.flatnonzero((inside >= sign * rotation[:-2]) & (inside >= sign * rotation[2:]))
+    for i in peaks[np.argsort(-inside[peaks])]:
         left, centre, right = sign * rotation[i], inside[i], sign * rotation[i + 2]
-        if centre < left or centre < right:
-            continue
         at, step = halving.first + i * float(halving.stride), float(halving.stride)
+        here[:] = kept[i + 1]
         for _ in range(halving.levels):
             if centre + halving.safety * _gain(left, centre, right) <= best and centre < best:
                 break
             step *= 0.5
             for side in range(2):
-                q[:] = kept[i + 1]
+                at_side[side] = here
                 turned, status, ratio, _ = solve_anywhere(
-                    at + (2 * side - 1) * step, tables, layout, design.face_width, values, q, memory
+                    at + (2 * side - 1) * step, tables, layout, design.face_width, values, at_side[side], memory
                 )
                 sides[side] = sign * turned if status == CONVERGED else -np.inf
                 solves += 1
                 worst_status, worst_residual = max(worst_status, status), max(worst_residual, ratio)
             if sides[0] > centre and sides[0] >= sides[1]:
                 left, centre, right, at = left, sides[0], centre, at - step
+                here[:] = at_side[0]
             elif sides[1] > centre:
                 left, centre, right, at = centre, sides[1], right, at + step
+                here[:] = at_side[1]
             else:
                 left, right = sides[0], sides[1]
         if centre > best or at == position:

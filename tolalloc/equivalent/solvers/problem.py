@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.equivalent.solvers.contact_law import LINEAR
 from tolalloc.equivalent.solvers.contact_solver import Problem, equilibrium, make_work
 
 
@@ -47,6 +48,15 @@ def make_problem(law, tables):
 
 
 @jit
+def _deviates(values, first, last):
+    """Return whether any value from first to last differs from zero, without an array in between."""
+    for m in range(first, last):
+        if values[m] != 0.0:
+            return True
+    return False
+
+
+@jit
 def _undisturbed(at, tables, layout, values, out):
     """Set out to the pins' compression at undisplaced discs."""
     discs, pins = tables.contact_by_disc.shape[1], layout.pins
@@ -65,7 +75,7 @@ def _undisturbed(at, tables, layout, values, out):
         first = layout.tooth + d * 2 * layout.teeth
         for kind in range(2):
             start = first + kind * layout.teeth
-            if np.any(values[start : start + layout.teeth] != 0.0):
+            if _deviates(values, start, start + layout.teeth):
                 for k in range(pins):
                     row[k] += coefficient[2 + layout.waves + kind, k] * values[start + tables.tooth[at, d, k]]
 
@@ -96,6 +106,9 @@ def _sample_constants(problem, turn, face_width, layout, values):
     pins = layout.pins
     for d in range(problem.by_disc.shape[0]):
         x, y = values[layout.tilt + 2 * d], values[layout.tilt + 2 * d + 1]
+        if x == 0.0 and y == 0.0:
+            problem.half_tilt[d * pins : (d + 1) * pins] = 0.0
+            continue
         tilt_x, tilt_y = turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y
         for k in range(pins):
             along = tilt_y * problem.by_disc[d, 0, k] - tilt_x * problem.by_disc[d, 1, k]
@@ -210,7 +223,8 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
     blend(tables.contact_by_disc[here], weights, own.by_disc)
     blend(nodes.undisturbed[slot], weights, own.undisturbed)
     blend(tables.contact_stiffness[here], weights, own.contact)
-    blend(tables.contact_length[here], weights, own.length)
+    if own.law != LINEAR:
+        blend(tables.contact_length[here], weights, own.length)
     blend(tables.play_by_kept[here], weights, own.play_by_kept)
     blend(nodes.play_offset[slot], weights, own.play_offset)
     blend(tables.play_stiffness[here], weights, own.play_stiffness)
