@@ -17,15 +17,10 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_law import pin_force
-from tolalloc.equivalent.solvers.contact_solver import (
-    CONVERGED,
-    NOT_FINITE,
-    assemble,
-    compress,
-    play_force,
-    solve_tangent,
-)
-from tolalloc.equivalent.solvers.problem import interpolation, make_memory, solve_between, values_of
+from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE, solve_tangent
+from tolalloc.equivalent.solvers.energy import assemble, compress, play_force
+from tolalloc.equivalent.solvers.interpolation import interpolation, make_memory, solve_between
+from tolalloc.equivalent.solvers.problem import values_of
 
 
 class Derivative(NamedTuple):

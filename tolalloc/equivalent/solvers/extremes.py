@@ -13,7 +13,8 @@ from jaxtyping import Float, Int, UInt8
 
 from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
-from tolalloc.equivalent.solvers.problem import make_memory, solve_anywhere, values_of
+from tolalloc.equivalent.solvers.interpolation import make_memory, solve_anywhere
+from tolalloc.equivalent.solvers.problem import values_of
 from tolalloc.equivalent.solvers.turn import make_turn, solve_tile
 
 

@@ -9,8 +9,10 @@ from jaxtyping import Float
 
 from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_law import pin_force
-from tolalloc.equivalent.solvers.contact_solver import CONVERGED, compress, play_force
-from tolalloc.equivalent.solvers.problem import make_memory, problem_at_node, values_of
+from tolalloc.equivalent.solvers.contact_solver import CONVERGED
+from tolalloc.equivalent.solvers.energy import compress, play_force
+from tolalloc.equivalent.solvers.interpolation import make_memory
+from tolalloc.equivalent.solvers.problem import problem_at_node, values_of
 
 
 class Forced(NamedTuple):

@@ -14,16 +14,10 @@ from jaxtyping import Float, UInt8, UInt16
 from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange, thread_count
 from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
-from tolalloc.equivalent.solvers.lane_solver import (
-    FOUR,
-    TILE,
-    guess_next,
-    make_tile,
-    nonzero_rows,
-    nonzero_waves,
-    solve_tile_at,
-)
-from tolalloc.equivalent.solvers.problem import make_memory, solve_at_node, values_of
+from tolalloc.equivalent.solvers.interpolation import make_memory
+from tolalloc.equivalent.solvers.lane_solver import solve_tile_at
+from tolalloc.equivalent.solvers.problem import solve_at_node, values_of
+from tolalloc.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
 from tolalloc.reducer.design import Reducer
 
 
