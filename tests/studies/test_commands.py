@@ -201,6 +201,19 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
         assert cells["id"] in result.stdout
 
 
+def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
+    from tolalloc.reducer.files import PRESETS
+
+    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    path = tmp_path / "loose.toml"
+    path.write_text(text + "\n[clearances]\ncrank_disc_bearing_um = 2\ncarrier_bearing_um = 1\n", encoding="utf-8")
+    assert tolalloc("check", study_with(tmp_path, reducer=str(path), unit="table4")).returncode == 0
+    answer = json.loads(tolalloc("te", "--reducer", path, "--unit", "table4", "--torque", "-10", "--json").stdout)
+    tight = json.loads(tolalloc("te", "--unit", "table4", "--torque", "-10", "--json").stdout)
+    assert answer["statuses"]["equilibrium found"] == 936
+    assert answer["lost_motion_arcmin"]["this_unit"] > 2 * tight["lost_motion_arcmin"]["this_unit"]
+
+
 @pytest.mark.parametrize("reducer", ["rv20e", "rv40e", "rv80e"])
 def test_every_preset_turns(reducer):
     answer = json.loads(tolalloc("te", "--reducer", reducer, "--attribute", "--json").stdout)

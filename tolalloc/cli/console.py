@@ -8,8 +8,16 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
+from tolalloc.equivalent.solvers.compiled import is_kept
+
 screen = Console()
 messages = Console(stderr=True)
+
+
+def announce_compilation() -> None:
+    """Say what the next minute is spent on where this version has not run on this machine before."""
+    if not is_kept():
+        messages.print("Compiling the kernel for this machine: about a minute, once.", style="dim")
 
 
 class UnitProgress:

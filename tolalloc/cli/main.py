@@ -10,10 +10,9 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import UnitProgress, messages, screen
+from tolalloc.cli.console import UnitProgress, announce_compilation, messages, screen
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
-from tolalloc.equivalent.solvers.compiled import is_kept
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.study.definition import Study, prepare
@@ -49,6 +48,7 @@ def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
     from tolalloc.study.run import run_study
     from tolalloc.study.run_folder import summary
 
+    announce_compilation()
     folder = out or Path("runs") / study.name
     with UnitProgress() as progress:
         results = run_study(study, folder, progress, quick=quick)
@@ -113,8 +113,7 @@ def te(
     design = load_reducer(reducer)
     if stiffness:
         design = with_stiffness(design, load_identified_stiffness(stiffness))
-    if not is_kept():
-        messages.print("Compiling the kernel for this machine: about a minute, once.", style="dim")
+    announce_compilation()
     answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"), attributed)
     if as_json:
         sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")

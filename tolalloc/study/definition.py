@@ -33,6 +33,7 @@ NEGLECTED = (
     "*.phase",
     "*.rotation",
     "*.tilt",
+    "*.clearance",
     "each_pin.*",
     "*.each_tooth.*",
 )
@@ -230,10 +231,7 @@ def prepare(study: Study) -> Prepared:
     model = EquivalentModel(reducer, orders=orders or HARMONICS)
     listed = {*errors.columns, *errors.still}
     absent = _absent_orders(errors, model, f"study {study.name}")
-    left_out = {
-        pattern: neglected_columns((pattern,), model.columns, f"study {study.name}") - listed
-        for pattern in study.neglected
-    }
+    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in study.neglected}
     fixed: Mapping[str, float] = {
         **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
         **dict.fromkeys(absent, 0.0),

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.exceptions import UnknownNameError
 from tolalloc.uncertainty.zones import (
     Distribution,
     Feature,
@@ -25,21 +24,18 @@ ANGULAR = ("tilt", "phase", "rotation")
 """Last part of the name of a source whose columns are angles."""
 
 
-def neglected_columns(patterns: Sequence[str], columns: Sequence[str], place: str) -> frozenset[str]:
+def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozenset[str]:
     """Return the columns that are taken as zero: those of a source that a pattern such as ``*.tilt`` names.
 
-    Raises
-    ------
-    UnknownNameError
-        A pattern that names no column of the model.
+    A pattern may name nothing that this reducer has; a misspelt one leaves its column without a value, and that is
+    refused.
     """
-    found: set[str] = set()
-    for pattern in patterns:
-        own = {name for name in columns if fnmatchcase(name, pattern) or fnmatchcase(name, f"{pattern}.*")}
-        if not own:
-            raise UnknownNameError.among(place, "neglected error", pattern, columns)
-        found |= own
-    return frozenset(found)
+    return frozenset(
+        name
+        for name in columns
+        for pattern in patterns
+        if fnmatchcase(name, pattern) or fnmatchcase(name, f"{pattern}.*")
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

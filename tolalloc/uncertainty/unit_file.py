@@ -100,7 +100,7 @@ class BuiltUnit:
             match = _HARMONIC.fullmatch(column)
             if match and match[1] in harmonic:  # an order that a stated source does not list is not there
                 deviations.setdefault(column, 0.0)
-        left_out = neglected_columns(self.neglected, names, f"unit {self.name}")
+        left_out = neglected_columns(self.neglected, names)
         for column in names:
             if column not in deviations and column not in left_out:
                 raise InputError(
