@@ -51,7 +51,7 @@ class StudyResults:
     identified
         Identified stiffnesses that replaced the reducer's own, if any.
     torsional_stiffness
-        Of the perfect reducer between test and rated torque [N·m/arcmin].
+        Of the perfect reducer between 3 % and 100 % of rated torque [N·m/arcmin].
     space, requirement
         Design variables and the requirement.
     sobol, classical
