@@ -77,6 +77,11 @@ class EquivalentModel:
         angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
         return angle, self.tables_at(angle)
 
+    def _given(self, errors: Float[np.ndarray, "sample column"], torque: float) -> tuple[Any, ...]:
+        """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
+        columns = self.error_columns
+        return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
+
     def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
         """Return the condensed tables at the carrier angles [rad]."""
         return condense(self.reducer, self.orders, carrier_angle)
@@ -107,24 +112,11 @@ class EquivalentModel:
             np.empty(shape),
             np.empty(shape, np.uint16),
         )
-        columns = self.error_columns
-        solve_curves(
-            tile_size(errors.shape[0]),
-            self._discs,
-            0,
-            1,
-            tables,
-            columns.layout,
-            columns.map,
-            self.design,
-            np.ascontiguousarray(errors),
-            torque,
-            turn,
-        )
+        solve_curves(tile_size(errors.shape[0]), self._discs, 0, 1, tables, *self._given(errors, torque), turn)
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(
             reducer=self.reducer,
-            columns=columns,
+            columns=self.error_columns,
             tables=tables,
             errors=errors,
             torque=torque,
@@ -146,7 +138,7 @@ class EquivalentModel:
         torque
             Torque on the carrier; negative resists the rotation [N·m].
         """
-        samples, columns, halving = errors.shape[0], self.error_columns, self.search.halving
+        samples, halving = errors.shape[0], self.search.halving
         found = Found(
             np.empty((samples, 2)),
             np.empty((samples, 2)),
@@ -155,18 +147,8 @@ class EquivalentModel:
             np.empty(samples, np.uint8),
             np.empty(samples),
         )
-        solve_extremes(
-            tile_size(samples),
-            self._discs,
-            self._tables,
-            columns.layout,
-            columns.map,
-            self.design,
-            np.ascontiguousarray(errors),
-            torque,
-            halving,
-            found,
-        )
+        given = self._given(errors, torque)
+        solve_extremes(tile_size(samples), self._discs, self._tables, *given, halving, found)
         found.extreme[found.status != CONVERGED] = np.nan
         return Extremes(
             largest=found.extreme[:, 0],
@@ -195,20 +177,12 @@ class EquivalentModel:
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
         is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
         """
-        extremes, columns, halving = self.extremes(errors, torque), self.error_columns, self.search.halving
+        extremes, halving = self.extremes(errors, torque), self.search.halving
         derivative = self._derivative(errors.shape[0])
         derivative.status[:] = extremes.status
-        solve_peak_to_peak_derivatives(
-            self._tables,
-            columns.layout,
-            columns.map,
-            self.design,
-            np.ascontiguousarray(errors),
-            torque,
-            extremes.carrier_angle / self.search.node_step + halving.first,
-            halving.stride * 0.5**halving.levels,
-            derivative,
-        )
+        position, step = extremes.carrier_angle / self.search.node_step + halving.first, 0.5**halving.levels
+        given = self._given(errors, torque)
+        solve_peak_to_peak_derivatives(self._tables, *given, position, halving.stride * step, derivative)
         np.maximum(extremes.status, derivative.status, out=extremes.status)
         return extremes, self._derivatives(derivative)
 
@@ -226,19 +200,10 @@ class EquivalentModel:
         -----
         They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
         """
-        columns, halving = self.error_columns, self.search.halving
+        halving = self.search.halving
         derivative = self._derivative(halving.coarse)
         position = halving.first + halving.stride * np.arange(float(halving.coarse))
-        solve_rotation_derivatives(
-            self._tables,
-            columns.layout,
-            columns.map,
-            self.design,
-            np.ascontiguousarray(errors),
-            torque,
-            position,
-            derivative,
-        )
+        solve_rotation_derivatives(self._tables, *self._given(errors, torque), position, derivative)
         return self._derivatives(derivative)
 
     def _derivative(self, items: int) -> Derivative:

@@ -88,15 +88,20 @@ def _one_by_one(first, stride, tables, layout, design, values, finite, memory, t
             continue
         guess = np.zeros(turn.kept.shape[2])
         for angle in range(turn.rotation.shape[1]):
-            at = first + angle * stride
-            rotation, status, ratio, touching = solve_at_node(
-                at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
-            )
-            turn.rotation[s, angle], turn.status[s, angle] = rotation, status
-            turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
-            turn.kept[s, angle] = guess
-            if status != CONVERGED:
-                guess[:] = 0.0
+            _alone(s, angle, first + angle * stride, tables, layout, design, values, guess, memory, turn)
+
+
+@jit
+def _alone(s, angle, at, tables, layout, design, values, guess, memory, turn):
+    """Solve one sample at one node from the guess, which becomes the next one: the equilibrium, or zero without one."""
+    rotation, status, ratio, touching = solve_at_node(
+        at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+    )
+    turn.rotation[s, angle], turn.status[s, angle] = rotation, status
+    turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
+    turn.kept[s, angle] = guess
+    if status != CONVERGED:
+        guess[:] = 0.0
 
 
 def tile_size(samples: int) -> int:
@@ -135,14 +140,7 @@ def _side_by_side(discs, first, stride, tables, layout, design, values, finite, 
                 turn.kept[s, angle, i] = tile.q[i, s]
             if finite[s] and (careful[s] or tilted[s]):
                 guess[:] = tile.last[:, s]
-                rotation, status, ratio, touching = solve_at_node(
-                    at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
-                )
-                turn.rotation[s, angle], turn.status[s, angle] = rotation, status
-                turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
-                turn.kept[s, angle] = guess
-                if status != CONVERGED:
-                    guess[:] = 0.0
+                _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
                 tile.q[:, s] = guess
         if angle == 0:
             tile.last[:] = tile.q
