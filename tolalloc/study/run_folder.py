@@ -12,7 +12,6 @@ from typing import Any
 
 import numba
 
-from tolalloc.equivalent.angle_search import AngleSearch
 from tolalloc.exceptions import RunFolderError
 from tolalloc.report import tables
 from tolalloc.report.excel import write_workbook
@@ -71,7 +70,7 @@ def claimed(folder: Path) -> Iterator[None]:
 
 def manifest(prepared: Prepared, results: StudyResults, record: Record) -> dict[str, Any]:
     """Return what is needed to repeat the run and to trust it."""
-    search = AngleSearch()
+    search = prepared.kernel.model.search
     return {
         "study": prepared.study.name,
         "study hash": prepared.hash,
