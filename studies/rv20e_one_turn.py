@@ -1,8 +1,8 @@
-"""One turn of the RV-20E of liu2020's Table 4, as pictures: `python studies/rv20e_one_turn.py FOLDER`."""
+"""One turn of the RV-20E of liu2020's Table 4, as pictures: `python studies/rv20e_one_turn.py [FOLDER]`."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -167,8 +167,13 @@ def sources(model: EquivalentModel, unit: np.ndarray) -> Figure:
 
 def main() -> None:
     """Draw everything."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/rv20e_one_turn")
-    folder.mkdir(parents=True, exist_ok=True)
+    parser = argparse.ArgumentParser(description="One turn of the RV-20E of liu2020's Table 4, as pictures.")
+    parser.add_argument("folder", nargs="?", type=Path, default="runs/rv20e_one_turn", help="default: %(default)s")
+    folder = parser.parse_args().folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"{folder}: the folder cannot be made ({error.strerror}).")
     reducer = load_reducer("rv20e")
     model = EquivalentModel(reducer)
     unit = load_unit("table4").errors(model.columns, reducer.modification.deviations)

@@ -225,6 +225,9 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=4096, help="random units per measurement")
     parser.add_argument("--rounds", type=int, default=5, help="measurements of each")
     options = parser.parse_args()
+    for name in ("samples", "rounds"):
+        if getattr(options, name) < 1:
+            parser.error(f"--{name} is {getattr(options, name)}; allowed is 1 or more.")
     if OVERRIDE in os.environ:
         # An override keeps the BLAS from this processor's own code: neither (b) nor (c) would be at its best.
         progress(f"running without {OVERRIDE}={os.environ[OVERRIDE]}")

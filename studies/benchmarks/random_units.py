@@ -91,6 +91,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the units")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     asked = parser.parse_args()
+    if asked.units < 1:
+        parser.error(f"--units is {asked.units}; allowed is 1 or more.")
     answer = measure(asked.units, asked.seed)
     if asked.json:
         print(json.dumps(answer, ensure_ascii=False, indent=2))
