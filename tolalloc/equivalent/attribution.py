@@ -39,12 +39,6 @@ class Attribution:
     share: Float[np.ndarray, "source order"]
     amplitude: Float[np.ndarray, " order"]
 
-    def strongest(self, order: int, count: int) -> list[tuple[str, float]]:
-        """Return the sources that add most to an order, with what they add [rad], by magnitude."""
-        at = int(np.flatnonzero(self.order == order)[0])
-        found = np.argsort(-np.abs(self.share[:, at]))[:count]
-        return [(self.sources[source], float(self.share[source, at])) for source in found]
-
 
 def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> Attribution:
     """Return what every source of one unit adds to its transmission error and to each order.

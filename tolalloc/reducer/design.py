@@ -89,7 +89,7 @@ class Modification:
 
     @property
     def deviations(self) -> dict[str, float]:
-        """The two amounts as error columns of the model [m]."""
+        """The two amounts as error columns of the model, the equidistant first [m]."""
         return {"modification.equidistant": self.equidistant, "modification.shift": self.shift}
 
     @property

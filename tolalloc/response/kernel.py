@@ -18,9 +18,6 @@ from tolalloc.units import ARCSECOND
 
 PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 
-MODIFICATION = ("modification.equidistant", "modification.shift")
-"""Columns of the two modification amounts."""
-
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
 """Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
 
@@ -115,7 +112,7 @@ class KernelResponse:
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> WithDerivatives:
         """Return the peak-to-peak of every sample and its derivatives, at hardly more cost than without."""
         varied = [self.model.columns.index(name) for name in self.columns]
-        amounts = [self.model.columns.index(name) for name in MODIFICATION]
+        amounts = [self.model.columns.index(name) for name in self.model.reducer.modification.deviations]
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
         for rows, (extremes, derivatives) in map_chunks(self._alone._derivatives, x, self.mapper):

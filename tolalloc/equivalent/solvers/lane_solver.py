@@ -1,7 +1,8 @@
 """Equilibria of a tile of samples at one angle, eight samples to a register, for pins on linear springs alone.
 
-Whole Newton steps from the last angle's equilibrium find nine in ten solutions within four steps. Lanes that need a
-line search (a singular tangent, a contact set that does not settle) are left to the solver for one sample.
+Newton's steps start on the line through the last two angles' equilibria, and nearly all samples need whole ones only.
+Where the tangent is singular, a small pivot replaces the vanishing one and the step ends where the next pin touches.
+Samples not settled in ten steps, or that so meet no pin, need a line search and are left to the solver for one sample.
 """
 
 from __future__ import annotations
