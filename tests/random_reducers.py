@@ -10,7 +10,7 @@ import numpy as np
 
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
-from tolalloc.reducer.stiffness import Stiffness
+from tolalloc.reducer.stiffness import Material, Stiffness
 
 LAWS = ("constant", "table2", "logarithmic")
 SINGLE, DISC_TILT = r"^each_|\.each_", r"^disc\d+\.tilt"
@@ -64,6 +64,8 @@ def random_reducer(generator: np.random.Generator) -> Reducer:
             pressure_angle=np.radians(generator.uniform(14.5, 28)),
         ),
         cycloid_stage=stage,
+        disc_material=Material(elastic_modulus=206e9, poisson_ratio=0.3),
+        pin_material=Material(elastic_modulus=206e9, poisson_ratio=0.3),
         stiffness=Stiffness(
             sun_support=around(1e8),
             gear_mesh=around(2e8),

@@ -22,7 +22,8 @@ DOORS = {
     "matplotlib": "report",
     "jinja2": "report",
     "openpyxl": "report",
-    "numba": ("equivalent", "study"),
+    "numba": ("compiled.py", "equivalent", "study"),
+    "ezdxf": "report",
     "typer": "cli",
     "rich": "cli",
 }

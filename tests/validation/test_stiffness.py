@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tolalloc.cycloid.contact_stiffness import pin_contact_table2
+from tolalloc.reducer.design import CycloidStage
 from tolalloc.reducer.files import PRESETS, load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import (
     TAPER_ANGLE,
+    Material,
+    contact_modulus,
     gear_mesh,
     line_contact,
-    pin_contact_table2,
     roller_bearing,
     shaft_support,
 )
@@ -23,14 +26,23 @@ def test_bearings_of_table_5():
 
 
 def test_pin_contact_at_10_mm():
-    assert line_contact(0.010, 206e9, 0.3) == pytest.approx(1.78e9, rel=0.002)
+    steel = Material(elastic_modulus=206e9, poisson_ratio=0.3)
+    assert line_contact(0.010, contact_modulus(steel, steel)) == pytest.approx(1.78e9, rel=0.002)
 
 
 def test_concave_part_is_two_curvatures_in_contact():
     """On the concave part K = C(ρ − r)/(ρ + r), with ρ the concave radius of the profile; C elsewhere."""
-    shortening, pins, circle, pin = 0.9 * 40 / 52, 40, 0.052, 0.002
+    stage = CycloidStage(
+        pin_count=40,
+        disc_teeth=39,
+        pin_circle_radius=0.052,
+        pin_radius=0.002,
+        eccentricity=0.0009,
+        face_width=0.01,
+    )
+    shortening, pins, circle, pin = stage.shortening, 40, 0.052, 0.002
     angles = np.linspace(0.05, 3.0, 200)
-    stiffness = pin_contact_table2(1.0, shortening, pins, circle, pin, angles)
+    stiffness = pin_contact_table2(stage, 1.0, angles)
     root = 1 + shortening**2 - 2 * shortening * np.cos(angles)
     term = shortening * (1 + pins) * np.cos(angles) - (1 + pins * shortening**2)
     concave = term > 0

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 from scipy.special import lambertw
 
+from tolalloc.cycloid.contact_stiffness import equivalent_length
 from tolalloc.equivalent.condensation import spring_groups
 from tolalloc.equivalent.kinematics import HARMONICS, Coordinates
 from tolalloc.equivalent.springs import SpringGroup
 from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.stiffness import equivalent_length
 
 Response = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Energy [element], force [element, row] and its derivative [element, row, row] of an interface."""
@@ -45,12 +45,12 @@ def tilted_response(stiffness: np.ndarray, half_depth: np.ndarray, compression: 
 
 
 def logarithmic_response(stiffness: np.ndarray, length: np.ndarray, compression: np.ndarray) -> Response:
-    """δ = F/c·(ln(4cL/F) − 1) with c = 2·stiffness: with w = ln(4cL/F) − 1 it reads w·exp(−w) = e·δ/(4L), w > 1."""
+    """δ = F/c·ln(cλ/F) with c = 2·stiffness: with w = ln(cλ/F) it reads w·exp(−w) = δ/λ, w > 1."""
     scale, middle = 2 * stiffness, compression[:, 0]
-    straight = 8 * length * np.exp(-3.0)  # where w = 2; from there the tangent goes on
+    straight = 2 * length * np.exp(-2.0)  # where w = 2; from there the tangent goes on
     beyond, touching = np.maximum(middle - straight, 0.0), middle > 0
-    w = -lambertw(-np.e * np.clip(middle, 1e-200, straight) / (4 * length), -1).real
-    force = 4 * scale * length * np.exp(-w - 1)
+    w = -lambertw(-np.clip(middle, 1e-200, straight) / length, -1).real
+    force = scale * length * np.exp(-w)
     energy = force**2 / scale * (w / 2 - 0.25) + force * beyond + scale * beyond**2 / 2  # ∫F dδ
     force, slope = touching * (force + scale * beyond), touching * scale / (w - 1)
     return touching * energy, force[:, np.newaxis], slope[:, np.newaxis, np.newaxis]
@@ -64,7 +64,7 @@ def pin_law(
     if reducer.stiffness.pin_contact_law == "logarithmic":
         crank_direction = 2 * np.pi * discs / len(discs) - stage.disc_teeth * carrier_angle
         pin_angle = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count - crank_direction
-        length = equivalent_length(stage.shortening, stage.pin_count, stage.pin_circle_radius, pin_angle)
+        length = equivalent_length(stage, pin_angle)
         return logarithmic_response, length.ravel()
     x, y = ([[errors.get(f"disc{disc + 1}.tilt.{axis}", 0.0)] for disc in discs.ravel()] for axis in "xy")
     tilt = (np.array(x) + 1j * np.array(y)) * np.exp(1j * carrier_angle)  # the disc turns with the carrier

@@ -12,11 +12,11 @@ import pytest
 from tests.random_reducers import Case, random_case, variations
 from tests.random_units import random_units
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
+from tolalloc.cycloid.solvers.contact_law import LOGARITHMIC, pin_force
 from tolalloc.equivalent.angle_search import AngleSearch
 from tolalloc.equivalent.condensation import spring_groups
 from tolalloc.equivalent.kinematics import Coordinates
 from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.solvers.contact_law import LOGARITHMIC, pin_force
 from tolalloc.equivalent.status import Status
 from tolalloc.units import ARCSECOND
 
@@ -79,13 +79,16 @@ def test_the_twin_derives_its_forces_from_its_energy(seed):
 
 
 def test_the_logarithmic_law_is_hertz_line_contact_and_goes_on_straight():
-    stiffness, length = 1.3e9, 0.011
-    scale, largest = 2 * stiffness, 8 * stiffness * length * np.exp(-3.0)  # where ln(4cL/F) − 1 is 2
+    stiffness, pin, tooth = 1.3e9, 0.002, 0.009
+    length, scale = (pin + tooth) * np.exp(2 / 3), 2 * stiffness
+    largest = scale * length * np.exp(-2.0)
     forces = largest * np.array([1e-12, 1e-8, 1e-4, 0.1, 0.5, 1.0, 1.5, 3.0])
     curved = np.minimum(forces, largest)
-    compressions = curved / scale * (np.log(4 * scale * length / curved) - 1) + (forces - curved) / scale
+    half_width = np.sqrt(4 * curved / scale * pin * tooth / (pin + tooth))  # Hertz, with scale = π·b·E*
+    approach = curved / scale * (2 / 3 + np.log(16 * pin * tooth / (2 * half_width) ** 2))
+    compressions = approach + (forces - curved) / scale
     twin = logarithmic_response(np.full(8, stiffness), np.full(8, length), compressions[:, np.newaxis])
-    np.testing.assert_allclose(twin[1][:, 0], forces, rtol=1e-13)
+    np.testing.assert_allclose(twin[1][:, 0], forces, rtol=1e-12)
     kernel = [pin_force(LOGARITHMIC, stiffness, length, 0.0, compression) for compression in compressions]
     np.testing.assert_allclose(kernel, np.stack([twin[1][:, 0], twin[2][:, 0, 0]], axis=1), rtol=1e-12)
 

@@ -8,7 +8,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
-from tolalloc.equivalent.solvers.compiled import is_kept
+from tolalloc.compiled import is_kept
 
 screen = Console()
 messages = Console(stderr=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 
 TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
 

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
+from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.pins import Terms, pin_terms, tilt_terms, tooth_terms, wave_terms
-from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.springs import SpringGroup
 from tolalloc.reducer.design import Reducer
 

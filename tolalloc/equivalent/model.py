@@ -19,6 +19,7 @@ from tolalloc.equivalent.solvers.adjoint import Derivative, solve_peak_to_peak_d
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED
 from tolalloc.equivalent.solvers.extremes import Found, solve_extremes
 from tolalloc.equivalent.solvers.turn import Design, Turn, design_of, solve_curves, tile_size
+from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import Reducer
 
 
@@ -35,6 +36,11 @@ class EquivalentModel:
     orders
         Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
 
+    Raises
+    ------
+    InputError
+        The reducer's teeth have a rotation modification, which no column of the model can stand for.
+
     Notes
     -----
     The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
@@ -43,6 +49,12 @@ class EquivalentModel:
     reducer: Reducer
     search: AngleSearch = field(default_factory=AngleSearch)
     orders: tuple[int, ...] = HARMONICS
+
+    def __post_init__(self) -> None:
+        if self.reducer.modification.rotation != 0.0:
+            raise InputError.at(
+                self.reducer.name, "rotation modification", self.reducer.modification.rotation, "0 in this model"
+            )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process without tables; there, every chunk of work finds the same model again."""

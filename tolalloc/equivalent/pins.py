@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.cycloid.contact_stiffness import contact_stiffness
+from tolalloc.cycloid.mesh import normals
 from tolalloc.equivalent.kinematics import Positions
 from tolalloc.equivalent.springs import SpringGroup, harmonic_columns, harmonic_waves, vector_columns
 from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.stiffness import equivalent_length, pin_contact_table2
 
 Terms = dict[str, list[tuple[int, float]]]
 """Column → the entries of a table that it moves, and by how much each [m/m or -]."""
@@ -35,7 +36,7 @@ class PinContact:
     stiffness
         Contact stiffness of the pin at this tooth [N/m].
     equivalent_length
-        L of the logarithmic law, `tolalloc.reducer.stiffness.equivalent_length` [m].
+        λ of the logarithmic law, `tolalloc.cycloid.contact_stiffness.equivalent_length` [m].
     """
 
     by_disc: Float[np.ndarray, "angle disc 3 pin"]
@@ -55,41 +56,32 @@ def pin_contact(at: Positions) -> PinContact:
     A tooth reaches from one root to the next. Its number follows from the contact's place on the disc, so it is tracked
     through the whole turn; at a root, where it changes, a pitch deviation has no effect.
     """
-    stage, stiffness = at.reducer.cycloid_stage, at.reducer.stiffness
-    shortening, teeth = stage.shortening, stage.disc_teeth
+    stage, teeth = at.reducer.cycloid_stage, at.reducer.cycloid_stage.disc_teeth
     direction = np.stack([at.disc_direction(disc) for disc in range(at.reducer.disc_count)], axis=1)[..., np.newaxis]
     pin_angle = at.pin_direction - direction
-    cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
-    root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
-    towards_crank, towards_tangent = (shortening - cosine) / root, -sine / root
-    normal = direction + np.arctan2(towards_tangent, towards_crank)
+    cosine, sine, into = np.cos(pin_angle), np.sin(pin_angle), normals(stage.shortening, pin_angle)
+    normal = direction + np.arctan2(into.towards_tangent, into.towards_crank)
     # Contact point Q seen from the disc's centre, axes along and across the crank direction.
-    along = stage.pin_circle_radius * cosine + stage.pin_radius * towards_crank - stage.eccentricity
-    across = stage.pin_circle_radius * sine + stage.pin_radius * towards_tangent
+    along = stage.pin_circle_radius * cosine + stage.pin_radius * into.towards_crank - stage.eccentricity
+    across = stage.pin_circle_radius * sine + stage.pin_radius * into.towards_tangent
     radius = np.hypot(along, across)
     # Unwrapped, so that a whole pin pitch of crank angle is a whole tooth; rounding must not change the tooth.
     turned = np.arctan2(across, along) - np.arctan2(sine, cosine) + at.pin_direction + direction / teeth
-    if stiffness.pin_contact_law == "table2":
-        contact = pin_contact_table2(
-            stiffness.pin_contact, shortening, stage.pin_count, stage.pin_circle_radius, stage.pin_radius, pin_angle
-        )
-    else:
-        contact = np.full_like(pin_angle, stiffness.pin_contact)
-    lever = stage.disc_pitch_radius * towards_tangent
+    contact = contact_stiffness(stage, at.reducer.stiffness, pin_angle)
     return PinContact(
-        by_disc=np.stack([-np.cos(normal), -np.sin(normal), -lever], axis=2),
-        by_pin=np.stack([shortening * cosine - 1, -shortening * sine], axis=2) / root[:, :, np.newaxis],
+        by_disc=np.stack([-np.cos(normal), -np.sin(normal), stage.disc_pitch_radius * into.lever], axis=2),
+        by_pin=np.stack([-into.along_radius, -into.across_radius], axis=2),
         by_tooth=np.stack(
             [
-                (towards_crank * across - towards_tangent * along) / radius,
-                -(towards_crank * along + towards_tangent * across) / radius,
+                (into.towards_crank * across - into.towards_tangent * along) / radius,
+                -(into.towards_crank * along + into.towards_tangent * across) / radius,
             ],
             axis=2,
         ),
         tooth=np.floor(turned * teeth / (2 * np.pi) + 1e-9).astype(np.int64) % teeth,
         tooth_angle=turned,
-        stiffness=contact,
-        equivalent_length=equivalent_length(shortening, stage.pin_count, stage.pin_circle_radius, pin_angle),
+        stiffness=contact.stiffness,
+        equivalent_length=contact.length,
     )
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import cos, sqrt
+from dataclasses import dataclass, field, replace
+from math import cos, pi, sqrt
 
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.stiffness import Stiffness
+from tolalloc.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +67,36 @@ class CycloidStage:
         """Lever r_d = e·zc of the pin forces about the disc centre [m]."""
         return self.eccentricity * self.disc_teeth
 
+    @property
+    def flank_ratio(self) -> float:
+        """Q = √(1 − K1²), part of a shift that is felt on the flank where cos φ = K1 [-]."""
+        return sqrt(1 - self.shortening**2)
+
+    @property
+    def smallest_convex_radius(self) -> float:
+        """Smallest convex radius of the pin centre's path on the disc [m]; a larger pin undercuts the teeth.
+
+        It stands where the derivative of the curvature, theory page equation (33), vanishes, or else at the tip.
+        """
+        pins, shortening = self.pin_count, self.shortening
+        cosine = max((2 - pins + shortening**2 * (2 * pins - 1)) / (shortening * (1 + pins)), -1.0)
+        bend = 1 + pins * shortening**2 - shortening * (1 + pins) * cosine
+        return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
+
+    @property
+    def largest_pin_radius(self) -> float:
+        """Pin radius from which neighbouring pins overlap or the teeth are undercut [m]."""
+        return min(self.pin_circle_radius * pi / self.pin_count, self.smallest_convex_radius)
+
+
+SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
+"""Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
+(li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Modification:
-    """Tooth modification of the disc, in the sign convention of the theory page.
+    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34).
 
     Parameters
     ----------
@@ -78,14 +104,31 @@ class Modification:
         Δr_rp: the grinding pin radius is r_rp + Δr_rp [m].
     shift
         Δr_p: the pin circle radius at grinding is Rp + Δr_p [m].
+    rotation
+        δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad].
     """
 
     equidistant: float
     shift: float
+    rotation: float = 0.0
+
+    @classmethod
+    def from_convention(cls, convention: str, equidistant: float, shift: float) -> Modification:
+        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m].
+
+        Raises
+        ------
+        KeyError
+            Another convention.
+        """
+        return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift)
 
     def flank_clearance(self, stage: CycloidStage) -> float:
-        """Return the smallest nominal gap, on the flank where cos φ′ = K1: Δr_rp − Δr_p·√(1−K1²) [m]."""
-        return self.equidistant - self.shift * sqrt(1 - stage.shortening**2)
+        """Return the nominal gap on the flank where cos φ = K1: Δr_rp − Δr_p·√(1−K1²) + δ·r_d [m].
+
+        It is the smallest gap unless the shift is positive.
+        """
+        return self.equidistant - self.shift * stage.flank_ratio + self.rotation * stage.disc_pitch_radius
 
     @property
     def deviations(self) -> dict[str, float]:
@@ -100,7 +143,7 @@ class Modification:
     @classmethod
     def from_clearances(cls, flank: float, radial: float, stage: CycloidStage) -> Modification:
         """Return the two amounts that give a flank and a radial clearance [m]."""
-        shift = (flank - radial) / (1 - sqrt(1 - stage.shortening**2))
+        shift = (flank - radial) / (1 - stage.flank_ratio)
         return cls(equidistant=radial + shift, shift=shift)
 
 
@@ -132,7 +175,7 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Reducer:
-    """Nominal design, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
+    """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
 
     name: str
     source: str
@@ -140,6 +183,8 @@ class Reducer:
     disc_count: int
     first_stage: FirstStage
     cycloid_stage: CycloidStage
+    disc_material: Material
+    pin_material: Material
     stiffness: Stiffness
     modification: Modification
     load: Load
@@ -155,6 +200,24 @@ class Reducer:
     def planet_base_radius(self) -> float:
         """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
         return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of pins and discs [Pa]."""
+        return contact_modulus(self.disc_material, self.pin_material)
+
+    def with_face_width(self, width: float) -> Reducer:
+        """Return the reducer with discs of another loaded width [m]; the pin contact becomes that of Table 2."""
+        return replace(
+            self,
+            cycloid_stage=replace(self.cycloid_stage, face_width=width),
+            stiffness=replace(self.stiffness, pin_contact=line_contact(width, self.contact_modulus)),
+        )
+
+    def with_pin_span(self, span: float) -> Reducer:
+        """Return the reducer with pins that bend between two supports at a distance [m]."""
+        diameter, modulus = 2 * self.cycloid_stage.pin_radius, self.pin_material.elastic_modulus
+        return replace(self, stiffness=replace(self.stiffness, pin_bending=pin_bending(diameter, span, modulus)))
 
     def torque_on_carrier(self, asked: float | None, place: str) -> float:
         """Return the torque to use, the test torque unless one is asked for [N·m].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,9 +15,12 @@ from tolalloc.reducer.design import Clearances, CycloidStage, FirstStage, Load, 
 from tolalloc.reducer.stiffness import (
     TAPER_ANGLE,
     IdentifiedStiffness,
+    Material,
     Stiffness,
+    contact_modulus,
     gear_mesh,
     line_contact,
+    pin_bending,
     roller_bearing,
     shaft_support,
 )
@@ -56,17 +59,36 @@ class CycloidStageRecord(Record):
         shortening = self.eccentricity_mm * self.pin_count / self.pin_circle_radius_mm
         if not shortening < 1:
             raise ValueError(f"K1 = eccentricity·pin_count/pin_circle_radius must be below 1 and is {shortening:.3g}")
-        half_pitch = self.pin_circle_radius_mm * pi / self.pin_count
+        half_pitch, convex = self.pin_circle_radius_mm * pi / self.pin_count, self.stage().smallest_convex_radius
         if self.pin_radius_mm >= half_pitch:
             raise ValueError(f"pin_radius_mm must be below {half_pitch:.3g}, where neighbouring pins overlap")
+        if self.pin_radius_mm * MILLIMETRE >= convex:
+            raise ValueError(f"pin_radius_mm must be below {convex / MILLIMETRE:.3g}, where pins undercut the teeth")
         return self
+
+    def stage(self) -> CycloidStage:
+        """Return the cycloid stage in SI units."""
+        width = self.face_width_mm * MILLIMETRE
+        return CycloidStage(
+            pin_count=self.pin_count,
+            disc_teeth=self.disc_teeth,
+            pin_circle_radius=self.pin_circle_radius_mm * MILLIMETRE,
+            pin_radius=self.pin_radius_mm * MILLIMETRE,
+            eccentricity=self.eccentricity_mm * MILLIMETRE,
+            face_width=width,
+            disc_spacing=width if self.disc_spacing_mm is None else self.disc_spacing_mm * MILLIMETRE,
+        )
 
 
 class MaterialRecord(Record):
-    """Table ``[material]``."""
+    """Table ``[material]``, and ``[pin_material]`` where the pins are of another one."""
 
     elastic_modulus_gpa: Annotated[float, Field(ge=10, le=1000)]
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
+
+    def material(self) -> Material:
+        """Return the material in SI units."""
+        return Material(elastic_modulus=self.elastic_modulus_gpa * GIGAPASCAL, poisson_ratio=self.poisson_ratio)
 
 
 class ShaftRecord(Record):
@@ -92,7 +114,10 @@ class MeshRecord(Record):
 
 
 class StiffnessRecord(Record):
-    """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE/(4(1−µ²))."""
+    """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE*/2.
+
+    ``pin_span_mm`` is the distance of two supports between which the pins bend; without it they rest in half grooves.
+    """
 
     sun_support: NewtonPerMetre | ShaftRecord
     gear_mesh: NewtonPerMetre | MeshRecord
@@ -101,10 +126,11 @@ class StiffnessRecord(Record):
     carrier_bearing: NewtonPerMetre
     pin_contact: NewtonPerMetre | None = None
     pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
+    pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
 
-    def stiffness(self, material: MaterialRecord, face_width: float) -> Stiffness:
-        """Return all stiffnesses, given or by formula [N/m]; the disc's face width is in m."""
-        modulus, poisson = material.elastic_modulus_gpa * GIGAPASCAL, material.poisson_ratio
+    def stiffness(self, disc: Material, pin: Material, stage: CycloidStage) -> Stiffness:
+        """Return all stiffnesses, given or by formula [N/m]."""
+        modulus, poisson = disc.elastic_modulus, disc.poisson_ratio
         sun, mesh, journal, crank = (
             self.sun_support,
             self.gear_mesh,
@@ -127,8 +153,11 @@ class StiffnessRecord(Record):
             crank_disc_bearing=journal,
             crank_carrier_bearing=crank,
             carrier_bearing=self.carrier_bearing,
-            pin_contact=self.pin_contact or line_contact(face_width, modulus, poisson),
+            pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
             pin_contact_law=self.pin_contact_law,
+            pin_bending=inf
+            if self.pin_span_mm is None
+            else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
         )
 
 
@@ -151,10 +180,17 @@ class ClearancesRecord(Record):
 
 
 class ModificationRecord(Record):
-    """Table ``[modification]``."""
+    """Table ``[modification]``; the convention says whether the shift was written Rp + Δr_p or Rp − Δr_p."""
 
     equidistant_um: Annotated[float, Field(ge=-200, le=200)]
     shift_um: Annotated[float, Field(ge=-200, le=200)]
+    convention: Literal["plus", "minus"] = "plus"
+
+    def modification(self) -> Modification:
+        """Return the modification in SI units and in the program's convention."""
+        return Modification.from_convention(
+            self.convention, equidistant=self.equidistant_um * MICROMETRE, shift=self.shift_um * MICROMETRE
+        )
 
 
 class LoadRecord(Record):
@@ -174,6 +210,7 @@ class ReducerRecord(Record):
     first_stage: FirstStageRecord
     cycloid_stage: CycloidStageRecord
     material: MaterialRecord
+    pin_material: MaterialRecord | None = None
     stiffness: StiffnessRecord
     modification: ModificationRecord
     load: LoadRecord
@@ -182,8 +219,8 @@ class ReducerRecord(Record):
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        first, cycloid, stiffness = self.first_stage, self.cycloid_stage, self.stiffness
-        width = cycloid.face_width_mm * MILLIMETRE
+        first, stage, disc = self.first_stage, self.cycloid_stage.stage(), self.material.material()
+        pin = self.pin_material.material() if self.pin_material else disc
         return Reducer(
             name=self.name,
             source=self.source,
@@ -195,20 +232,11 @@ class ReducerRecord(Record):
                 module=first.module_mm * MILLIMETRE,
                 pressure_angle=first.pressure_angle_deg * DEGREE,
             ),
-            cycloid_stage=CycloidStage(
-                pin_count=cycloid.pin_count,
-                disc_teeth=cycloid.disc_teeth,
-                pin_circle_radius=cycloid.pin_circle_radius_mm * MILLIMETRE,
-                pin_radius=cycloid.pin_radius_mm * MILLIMETRE,
-                eccentricity=cycloid.eccentricity_mm * MILLIMETRE,
-                face_width=width,
-                disc_spacing=width if cycloid.disc_spacing_mm is None else cycloid.disc_spacing_mm * MILLIMETRE,
-            ),
-            stiffness=stiffness.stiffness(self.material, width),
-            modification=Modification(
-                equidistant=self.modification.equidistant_um * MICROMETRE,
-                shift=self.modification.shift_um * MICROMETRE,
-            ),
+            cycloid_stage=stage,
+            disc_material=disc,
+            pin_material=pin,
+            stiffness=self.stiffness.stiffness(disc, pin, stage),
+            modification=self.modification.modification(),
             load=Load(test_torque=self.load.test_torque_nm, rated_torque=self.load.rated_torque_nm),
             clearances=self.clearances.clearances(),
             assumptions=self.assumptions,
@@ -252,7 +280,7 @@ def load_identified_stiffness(name: str | Path) -> IdentifiedStiffness:
     """
     path = shipped_or_path(name, PRESETS, ".stiffness.toml", "stiffness")
     record = validated(IdentifiedStiffnessRecord, read_toml(path), path)
-    allowed = [field for field in StiffnessRecord.model_fields if field != "pin_contact_law"]
+    allowed = [field for field in StiffnessRecord.model_fields if field not in ("pin_contact_law", "pin_span_mm")]
     for field in record.stiffness:
         if field not in allowed:
             raise InputError.at(path, "stiffness", field, "one of " + ", ".join(allowed))

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, radians, sin
-
-import numpy as np
-from jaxtyping import Float
+from math import inf, pi, radians, sin
 
 TAPER_ANGLE = radians(80.0)
 """Contact angle of the taper roller bearings that liu2020 puts into K_b [rad]."""
@@ -33,6 +30,8 @@ class Stiffness:
     pin_contact_law
         ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part;
         ``logarithmic``: Hertzian line contact, softer under small forces, C of the flat flank as its scale.
+    pin_bending
+        One pin between its supports, in series with its contact; infinite where it rests in a half groove [N/m].
     """
 
     sun_support: float
@@ -42,6 +41,28 @@ class Stiffness:
     carrier_bearing: float
     pin_contact: float
     pin_contact_law: str = "constant"
+    pin_bending: float = inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Elastic constants.
+
+    Parameters
+    ----------
+    elastic_modulus
+        Young's modulus E [Pa].
+    poisson_ratio
+        Poisson's ratio µ [-].
+    """
+
+    elastic_modulus: float
+    poisson_ratio: float
+
+
+def contact_modulus(first: Material, second: Material) -> float:
+    """Return E* of two bodies in contact, 1/E* = (1 − µ1²)/E1 + (1 − µ2²)/E2 [Pa]."""
+    return 1.0 / sum((1.0 - body.poisson_ratio**2) / body.elastic_modulus for body in (first, second))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,90 +150,39 @@ def gear_mesh(contact_ratio: float, sun_virtual_teeth: float, planet_virtual_tee
     return (0.75 * contact_ratio + 0.25) / flexibility * (face_width * 1e3) * 1e6
 
 
-def line_contact(face_width: float, elastic_modulus: float, poisson_ratio: float) -> float:
-    """Return C = πbE/(4(1−µ²)), the stiffness of a pin on a flat or convex flank [N/m].
+def line_contact(face_width: float, contact_modulus: float) -> float:
+    """Return C = πbE*/2, the stiffness of a pin on a flat or convex flank [N/m].
+
+    Notes
+    -----
+    liu2020 prints πbE/(4(1−µ²)), which it is for pin and disc of one material.
 
     Parameters
     ----------
     face_width
         Loaded width b [m].
-    elastic_modulus
-        Young's modulus [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
+    contact_modulus
+        E* of pin and disc [Pa].
 
     References
     ----------
     liu2020, Table 2 (K_djk without its curvature factor).
     """
-    return pi * face_width * elastic_modulus / (4.0 * (1.0 - poisson_ratio**2))
+    return pi * face_width * contact_modulus / 2.0
 
 
-def pin_contact_table2(
-    convex_stiffness: float,
-    shortening: float,
-    pin_count: int,
-    pin_circle_radius: float,
-    pin_radius: float,
-    pin_angle: Float[np.ndarray, "..."],
-) -> Float[np.ndarray, "..."]:
-    """Return K_djk along the tooth: C(ρ−r)/(ρ+r) on the concave part, C on the convex part [N/m].
-
-    Notes
-    -----
-    The printed formula with its signed curvature term is singular or negative on the convex part for
-    pin radii above about 2.5 mm on an RV-20E, so only the concave part (T > 0) follows the print.
+def pin_bending(diameter: float, span: float, elastic_modulus: float) -> float:
+    """Return 64/31·48EJ/l³, a solid pin on two supports, its load spread over half the span [N/m].
 
     Parameters
     ----------
-    convex_stiffness
-        C of `line_contact` [N/m].
-    shortening
-        K1 [-].
-    pin_count
-        zp [-].
-    pin_circle_radius, pin_radius
-        Rp and r_rp [m].
-    pin_angle
-        Angle φ′ of the pin from the crank direction [rad].
+    diameter, span
+        Pin diameter and distance l of its supports [m].
+    elastic_modulus
+        Young's modulus [Pa].
 
     References
     ----------
-    liu2020, Table 2 (K_djk).
+    Li Lixing's method, as xi2015 uses it; the factor 31/64 is not printed there [A].
     """
-    cosine = np.cos(pin_angle)
-    curvature_term = shortening * (1 + pin_count) * cosine - (1 + pin_count * shortening**2)
-    length = pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
-    concave = convex_stiffness * length / (length + 2 * pin_radius * np.maximum(curvature_term, 0.0))
-    return np.where(curvature_term > 0, concave, convex_stiffness)
-
-
-def equivalent_length(
-    shortening: float,
-    pin_count: int,
-    pin_circle_radius: float,
-    pin_angle: Float[np.ndarray, "..."],
-) -> Float[np.ndarray, "..."]:
-    """Return L, the radius of curvature of the path of the pin's centre on the disc, at most Rp [m].
-
-    Notes
-    -----
-    It is the flank's radius plus r_rp where the flank is convex and minus r_rp where it is concave; with Hertz's half
-    width the approach of pin and flank depends on the radii by L alone. Near the inflection L grows without bound and
-    the approach only with its logarithm; Rp as the largest length is an assumption.
-
-    Parameters
-    ----------
-    shortening
-        K1 [-].
-    pin_count
-        zp [-].
-    pin_circle_radius
-        Rp [m].
-    pin_angle
-        Angle φ′ of the pin from the crank direction [rad].
-    """
-    cosine = np.cos(pin_angle)
-    curvature_term = np.abs(shortening * (1 + pin_count) * cosine - (1 + pin_count * shortening**2))
-    length = pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
-    return np.asarray(pin_circle_radius * length / np.maximum(length, pin_circle_radius * curvature_term))
+    return 64.0 / 31.0 * 48.0 * elastic_modulus * (pi * diameter**4 / 64.0) / span**3

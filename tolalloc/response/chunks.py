@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.equivalent.solvers.compiled import use_threads
+from tolalloc.compiled import use_threads
 
 Answer = TypeVar("Answer")
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
-from tolalloc.equivalent.solvers.contact_law import pin_force
+from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.cycloid.solvers.contact_law import pin_force
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE, solve_tangent
 from tolalloc.equivalent.solvers.energy import assemble, compress, play_force
 from tolalloc.equivalent.solvers.interpolation import interpolation, make_memory, solve_between

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.equivalent.solvers.compiled import jit
-from tolalloc.equivalent.solvers.contact_law import LINEAR, pin_force
+from tolalloc.compiled import jit
+from tolalloc.cycloid.solvers.contact_law import LINEAR, pin_force
 from tolalloc.equivalent.solvers.energy import Problem, along, assemble, compress, play_force
 
 CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.equivalent.solvers.compiled import jit
-from tolalloc.equivalent.solvers.contact_law import pin_force
+from tolalloc.compiled import jit
+from tolalloc.cycloid.solvers.contact_law import pin_force
 
 
 class Problem(NamedTuple):
@@ -17,7 +17,7 @@ class Problem(NamedTuple):
     Parameters
     ----------
     law
-        `tolalloc.equivalent.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+        `tolalloc.cycloid.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
     stiffness, force
         S [N/m] and f [N].
     by_disc, undisturbed

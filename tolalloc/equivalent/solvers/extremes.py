@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
+from tolalloc.compiled import jit, parallel_jit, prange
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
 from tolalloc.equivalent.solvers.interpolation import make_memory, solve_anywhere
 from tolalloc.equivalent.solvers.problem import values_of

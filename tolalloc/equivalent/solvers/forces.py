@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange
-from tolalloc.equivalent.solvers.contact_law import pin_force
+from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.cycloid.solvers.contact_law import pin_force
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED
 from tolalloc.equivalent.solvers.energy import compress, play_force
 from tolalloc.equivalent.solvers.interpolation import make_memory

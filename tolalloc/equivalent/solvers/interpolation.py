@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.equivalent.solvers.compiled import jit
-from tolalloc.equivalent.solvers.contact_law import LINEAR
+from tolalloc.compiled import jit
+from tolalloc.cycloid.solvers.contact_law import LINEAR
 from tolalloc.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.equivalent.solvers.energy import make_work
 from tolalloc.equivalent.solvers.problem import fill_loads, make_problem, sample_constants, solve_at_node

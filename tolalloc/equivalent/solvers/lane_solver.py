@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.compiled import jit
 from tolalloc.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
 from tolalloc.equivalent.solvers.lanes import (
     WIDTH,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.compiled import jit
 from tolalloc.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.equivalent.solvers.energy import Problem
 

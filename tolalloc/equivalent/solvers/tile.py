@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.compiled import jit
 from tolalloc.equivalent.solvers.lanes import WIDTH, fma, load, spread, store
 
 TILE = 128

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, UInt8, UInt16
 
-from tolalloc.equivalent.solvers.compiled import jit, parallel_jit, prange, thread_count
-from tolalloc.equivalent.solvers.contact_law import LAWS, LINEAR
+from tolalloc.compiled import jit, parallel_jit, prange, thread_count
+from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
 from tolalloc.equivalent.solvers.interpolation import make_memory
 from tolalloc.equivalent.solvers.lane_solver import solve_tile_at
@@ -27,7 +27,7 @@ class Design(NamedTuple):
     Parameters
     ----------
     law
-        `tolalloc.equivalent.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+        `tolalloc.cycloid.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
     face_width
         Loaded width of a disc [m].
     """

@@ -4,35 +4,35 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.equivalent.solvers.compiled import jit
+from tolalloc.compiled import jit
 
 LINEAR, LOGARITHMIC = 0, 1
 LAWS = {"constant": LINEAR, "table2": LINEAR, "logarithmic": LOGARITHMIC}
 """Law of each `Stiffness.pin_contact_law`; the linear ones differ in their stiffness along the tooth only."""
 
-_STIFFEST = 2.0  # w of the smallest force law's argument; beyond it the law goes on straight
+_STIFFEST = 2.0  # ln(cλ/F) at which the logarithmic law goes on straight: a force that no part carries
 
 
 @jit
 def _logarithmic(stiffness, length, compression):
     """Return force and its derivative of Hertzian line contact, theory page equation (30).
 
-    The approach is F/c·(ln(4cL/F) − 1) with c = 2·stiffness. With u = F·e/(4cL) it reads −u·ln u = e·compression/(4L),
-    which Newton's method solves for w = −ln u.
+    The approach is F/c·ln(cλ/F) with c = 2·stiffness. With u = F/(cλ) it reads −u·ln u = compression/λ, which Newton's
+    method solves for w = −ln u.
     """
     scale = 2.0 * stiffness
-    straight = 4.0 * length * _STIFFEST * np.exp(-_STIFFEST - 1.0)
+    straight = length * _STIFFEST * np.exp(-_STIFFEST)
     if compression >= straight:
-        force = 4.0 * scale * length * np.exp(-_STIFFEST - 1.0)
+        force = scale * length * np.exp(-_STIFFEST)
         return force + scale / (_STIFFEST - 1.0) * (compression - straight), scale / (_STIFFEST - 1.0)
-    goal = np.log(4.0 * length / compression) - 1.0
+    goal = np.log(length / compression)
     w = goal + np.log(goal + 1.0)
     for _ in range(8):
         change = (w - np.log(w) - goal) * w / (w - 1.0)
         w -= change
         if abs(change) <= 1e-15 * w:
             break
-    return 4.0 * scale * length * np.exp(-w - 1.0), scale / (w - 1.0)
+    return scale * length * np.exp(-w), scale / (w - 1.0)
 
 
 @jit
@@ -50,3 +50,10 @@ def pin_force(law, stiffness, length, half_tilt, compression):
     if law == LINEAR:
         return stiffness * compression, stiffness
     return _logarithmic(stiffness, length, compression)
+
+
+@jit
+def pin_forces(law, stiffness, length, compression, force):
+    """Fill the forces of several pins, [pin]."""
+    for k in range(compression.size):
+        force[k] = pin_force(law, stiffness[k], length[k], 0.0, compression[k])[0]

@@ -1,7 +1,8 @@
 """How the kernel's functions are compiled: without the interpreter's lock, without reordered sums, kept on disc.
 
 numba keeps a compiled function until its own file changes, although functions from other files are built into it. So
-what is kept stands in a folder named after a digest of this whole room: a change in any file compiles all anew.
+what is kept stands in a folder named after a digest of all rooms named ``solvers``, where every compiled function
+lives: a change in any of their files compiles all anew.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from numba import prange
 
 __all__ = ["is_kept", "jit", "parallel_jit", "prange", "thread_count", "use_threads"]
 
-_ROOM = Path(__file__).parent
-_DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_ROOM.glob("*.py")))).hexdigest()
-_KEPT = _ROOM / "__pycache__" / f"compiled-{_DIGEST[:16]}"
+_HERE = Path(__file__)
+_FILES = [_HERE, *sorted(_HERE.parent.glob("*/solvers/*.py"))]
+_DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()
+_KEPT = _HERE.parent / "__pycache__" / f"compiled-{_DIGEST[:16]}"
 
 
 def is_kept() -> bool:
