@@ -1,0 +1,117 @@
+"""Exact distance of pins from tooth profiles, many designs at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.compiled import jit, parallel_jit, prange
+
+# Fields of a design, `tolalloc.cycloid.clearance` fills them.
+CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, FIELDS = range(8)
+
+_GRID = 384  # points of the scan over a tooth and a part of its neighbours
+_BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
+
+
+@jit
+def _scan(design, x, y):
+    """Fill points of the profile on equally spaced parameters; return the first one and their distance."""
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    first, step = -np.pi - _BEYOND, 2.0 * (np.pi + _BEYOND) / (_GRID - 1)
+    for i in range(_GRID):
+        t = first + i * step
+        small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+        ratio = design[GROUND_PIN] / np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+        u = design[GROUND_CIRCLE] - design[ECCENTRICITY] * c + ratio * (shortening * c - 1.0)
+        v = design[ECCENTRICITY] * s - ratio * shortening * s
+        x[i] = u * np.cos(small) + v * np.sin(small)
+        y[i] = v * np.cos(small) - u * np.sin(small)
+    return first, step
+
+
+@jit
+def _slope(design, t, px, py):
+    """Return f = (P − w)·w′ and its derivative at parameter t, w the path of the grinding pin's centre.
+
+    f vanishes where P lies on the normal of the path, which is the profile's normal too.
+    """
+    teeth, circle, eccentricity = design[TEETH], design[GROUND_CIRCLE], design[ECCENTRICITY]
+    small, c, s = t / teeth, np.cos(t), np.sin(t)
+    cs, ss = np.cos(small), np.sin(small)
+    # P in the frame that turns with the pin, then minus the path.
+    u = px * cs - py * ss - (circle - eccentricity * c)
+    v = px * ss + py * cs - eccentricity * s
+    turns = (teeth + 1.0) / teeth
+    du, dv = eccentricity * turns * s, eccentricity * turns * c - circle / teeth
+    ddu, ddv = eccentricity * turns * turns * c - circle / (teeth * teeth), -eccentricity * turns * turns * s
+    return u * du + v * dv, u * ddu + v * ddv - du * du - dv * dv
+
+
+@jit
+def _foot(design, low, high, px, py):
+    """Return the parameter between low and high where f falls through zero: Newton's method kept in its bracket."""
+    t = 0.5 * (low + high)
+    for _ in range(60):
+        f, slope = _slope(design, t, px, py)
+        if f > 0.0:
+            low = t
+        else:
+            high = t
+        new = t - f / slope if slope < 0.0 else 0.5 * (low + high)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        change, t = abs(new - t), new
+        if change <= 1e-15 * (1.0 + abs(t)):
+            break
+    return t
+
+
+@jit
+def _distance(design, t, px, py):
+    """Return the distance of P from the profile along the normal at t, negative inside the disc."""
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+    cs, ss = np.cos(small), np.sin(small)
+    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
+    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    # The normal into the disc in the same frame.
+    nu, nv = (shortening * c - 1.0) / root, -shortening * s / root
+    return design[GROUND_PIN] - (u * nu + v * nv)
+
+
+@jit
+def _nearest(design, x, y, first, step, px, py):
+    """Return the smallest distance of P from the profile."""
+    best, before, here = np.inf, -1.0, np.inf
+    for i in range(_GRID):
+        dx, dy = px - x[i], py - y[i]
+        after = dx * dx + dy * dy
+        if here <= before and here <= after:  # the scan's ends are never a place of nearest approach
+            t = _foot(design, first + (i - 2) * step, first + i * step, px, py)
+            best = min(best, _distance(design, t, px, py))
+        before, here = here, after
+    return best
+
+
+@parallel_jit
+def pin_clearances(designs, pin_angle, turned, clearance):
+    """Fill the clearances [m] of pins at exact places on turned discs, [design, pin].
+
+    ``designs`` are [design, FIELDS], ``pin_angle`` [pin], ``turned`` the rotations of the discs [design, pin].
+    A tooth with rotation modification is what two profiles turned either way leave.
+    """
+    for d in prange(designs.shape[0]):
+        design = designs[np.int64(d)]
+        x, y = np.empty(_GRID), np.empty(_GRID)
+        first, step = _scan(design, x, y)
+        teeth, turns = design[TEETH], (design[TEETH] + 1.0) / design[TEETH]
+        sides = 2 if design[ROTATION] != 0.0 else 1
+        for k in range(pin_angle.size):
+            a, own = pin_angle[k], -np.inf
+            for side in range(sides):
+                by = (1.0 - 2.0 * side) * design[ROTATION] - turned[np.int64(d), k]
+                px = design[CIRCLE] * np.cos(by - a / teeth) - design[ECCENTRICITY] * np.cos(by - a * turns)
+                py = design[CIRCLE] * np.sin(by - a / teeth) - design[ECCENTRICITY] * np.sin(by - a * turns)
+                own = max(own, _nearest(design, x, y, first, step, px, py))
+            clearance[np.int64(d), k] = own - design[PIN]
