@@ -64,7 +64,8 @@ def pin_law(
     if reducer.stiffness.pin_contact_law == "logarithmic":
         crank_direction = 2 * np.pi * discs / len(discs) - stage.disc_teeth * carrier_angle
         pin_angle = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count - crank_direction
-        length = equivalent_length(stage, pin_angle)
+        bending = np.exp(2 * reducer.stiffness.pin_contact / reducer.stiffness.pin_bending)
+        length = equivalent_length(stage, pin_angle) * bending
         return logarithmic_response, length.ravel()
     x, y = ([[errors.get(f"disc{disc + 1}.tilt.{axis}", 0.0)] for disc in discs.ravel()] for axis in "xy")
     tilt = (np.array(x) + 1j * np.array(y)) * np.exp(1j * carrier_angle)  # the disc turns with the carrier

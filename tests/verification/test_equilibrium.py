@@ -48,6 +48,21 @@ def test_agrees_with_the_dense_twin(seed):
         assert abs(found[number, at] - twin.rotation) < 1e-6 * ARCSECOND, f"seed {seed}, unit {number}, angle {at}"
 
 
+@pytest.mark.parametrize("bending", [2e7, 5e8])
+@pytest.mark.parametrize("law", ["constant", "table2", "logarithmic"])
+def test_pins_that_bend_agree_with_the_dense_twin(law, bending):
+    """Down to pins a hundred times softer than their contact; rotations differ from those of rigid pins."""
+    case = random_case(1)
+    stiffness = replace(case.reducer.stiffness, pin_contact_law=law, pin_bending=bending)
+    bent = replace(case, reducer=replace(case.reducer, stiffness=stiffness))
+    stiff = replace(bent, reducer=replace(bent.reducer, stiffness=replace(stiffness, pin_bending=np.inf)))
+    found = rotations(bent)[0, 0]
+    twin = dense_equilibrium(bent.reducer, bent.units[0], bent.torque, float(bent.carrier_angle[0]), bent.orders)
+    assert twin.imbalance < 1e-10
+    assert abs(found - twin.rotation) < 1e-6 * ARCSECOND
+    assert abs(found - rotations(stiff)[0, 0]) > 1e-3 * ARCSECOND
+
+
 def test_what_the_twin_is_to_prove_occurs_and_matters():
     """In how many cases each kind occurs, and in what share of them it moves the answer by more than 0.001″."""
     changes: dict[str, list[float]] = defaultdict(list)
@@ -89,7 +104,7 @@ def test_the_logarithmic_law_is_hertz_line_contact_and_goes_on_straight():
     compressions = approach + (forces - curved) / scale
     twin = logarithmic_response(np.full(8, stiffness), np.full(8, length), compressions[:, np.newaxis])
     np.testing.assert_allclose(twin[1][:, 0], forces, rtol=1e-12)
-    kernel = [pin_force(LOGARITHMIC, stiffness, length, 0.0, compression) for compression in compressions]
+    kernel = [pin_force(LOGARITHMIC, stiffness, np.log(length), 0.0, compression) for compression in compressions]
     np.testing.assert_allclose(kernel, np.stack([twin[1][:, 0], twin[2][:, 0, 0]], axis=1), rtol=1e-12)
 
 

@@ -25,12 +25,12 @@ class ContactStiffness:
     ----------
     stiffness
         Of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m].
-    length
-        λ of the logarithmic law [m].
+    log_length
+        ln(λ/1 m) of the logarithmic law [-].
     """
 
     stiffness: Float[np.ndarray, "*angles"]
-    length: Float[np.ndarray, "*angles"]
+    log_length: Float[np.ndarray, "*angles"]
 
 
 def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> ContactStiffness:
@@ -48,13 +48,13 @@ def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angl
     contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
     if law == "table2":
         contact = pin_contact_table2(stage, stiffness.pin_contact, pin_angle)
-    length = equivalent_length(stage, pin_angle)
+    log_length = np.log(equivalent_length(stage, pin_angle))
     if law == "logarithmic":
         # A spring in series adds F/k to F/c·ln(cλ/F), which a longer λ does as well.
-        length = length * exp(2.0 * stiffness.pin_contact / stiffness.pin_bending)
+        log_length = log_length + 2.0 * stiffness.pin_contact / stiffness.pin_bending
     else:
         contact = contact / (1.0 + contact / stiffness.pin_bending)
-    return ContactStiffness(stiffness=contact, length=length)
+    return ContactStiffness(stiffness=contact, log_length=log_length)
 
 
 def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:

@@ -174,7 +174,7 @@ class _Press:
     def forces(self, deflection: float) -> Float[np.ndarray, " pin"]:
         compression, force = -self.gap(self.pin_angle, self.rotation(deflection)), np.empty(self.pin_angle.size)
         law = LAWS[self.discs.reducer.stiffness.pin_contact_law]
-        pin_forces(law, self.contact.stiffness, self.contact.length, compression, force)
+        pin_forces(law, self.contact.stiffness, self.contact.log_length, compression, force)
         return force
 
     def surplus(self, deflection: float) -> float:
@@ -292,7 +292,7 @@ def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.
     if LAWS[stiffness.pin_contact_law] == LINEAR:
         return np.asarray(force / contact.stiffness)
     scale = 2 * contact.stiffness
-    return np.asarray(force / scale * np.log(scale * contact.length / force))
+    return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))
 
 
 def _answer(

@@ -58,7 +58,7 @@ class CondensedAngles(NamedTuple):
         pitch and run-out of the tooth met [m/m].
     tooth
         Number of the tooth that each pin meets [-].
-    contact_stiffness, contact_length
+    contact_stiffness, contact_log_length
         Stiffness of each pin contact [N/m] and L of the logarithmic law [m].
     turn
         Cosine and sine of the carrier angle [-].
@@ -78,7 +78,7 @@ class CondensedAngles(NamedTuple):
     contact_by_error: Float[np.ndarray, "angle disc deviation pin"]
     tooth: Int[np.ndarray, "angle disc pin"]
     contact_stiffness: Float[np.ndarray, "angle contact"]
-    contact_length: Float[np.ndarray, "angle contact"]
+    contact_log_length: Float[np.ndarray, "angle contact"]
     turn: Float[np.ndarray, "angle 2"]
 
 
@@ -212,7 +212,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
         contact_by_error=_contact_by_error(contact, at.orders),
         tooth=contact.tooth,
         contact_stiffness=contact.stiffness.reshape(angles, -1),
-        contact_length=contact.equivalent_length.reshape(angles, -1),
+        contact_log_length=contact.log_length.reshape(angles, -1),
         turn=np.stack([np.cos(at.carrier_angle), np.sin(at.carrier_angle)], axis=1),
     )
 

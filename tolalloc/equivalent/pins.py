@@ -35,8 +35,8 @@ class PinContact:
         θ_b, where on the disc the contact is, in the disc's own frame [rad].
     stiffness
         Contact stiffness of the pin at this tooth [N/m].
-    equivalent_length
-        λ of the logarithmic law, `tolalloc.cycloid.contact_stiffness.equivalent_length` [m].
+    log_length
+        ln(λ/1 m) of the logarithmic law, `tolalloc.cycloid.contact_stiffness.contact_stiffness` [-].
     """
 
     by_disc: Float[np.ndarray, "angle disc 3 pin"]
@@ -45,7 +45,7 @@ class PinContact:
     tooth: Int[np.ndarray, "angle disc pin"]
     tooth_angle: Float[np.ndarray, "angle disc pin"]
     stiffness: Float[np.ndarray, "angle disc pin"]
-    equivalent_length: Float[np.ndarray, "angle disc pin"]
+    log_length: Float[np.ndarray, "angle disc pin"]
 
 
 def pin_contact(at: Positions) -> PinContact:
@@ -81,7 +81,7 @@ def pin_contact(at: Positions) -> PinContact:
         tooth=np.floor(turned * teeth / (2 * np.pi) + 1e-9).astype(np.int64) % teeth,
         tooth_angle=turned,
         stiffness=contact.stiffness,
-        equivalent_length=contact.length,
+        log_length=contact.log_length,
     )
 
 

@@ -14,29 +14,29 @@ _STIFFEST = 2.0  # ln(cλ/F) at which the logarithmic law goes on straight: a fo
 
 
 @jit
-def _logarithmic(stiffness, length, compression):
+def _logarithmic(stiffness, log_length, compression):
     """Return force and its derivative of Hertzian line contact, theory page equation (30).
 
-    The approach is F/c·ln(cλ/F) with c = 2·stiffness. With u = F/(cλ) it reads −u·ln u = compression/λ, which Newton's
-    method solves for w = −ln u.
+    The approach is F/c·ln(cλ/F) with c = 2·stiffness. With w = ln(cλ/F) it reads w − ln w = ln(λ/compression), which
+    Newton's method solves. λ is given by its logarithm, because a pin that bends easily makes it huge.
     """
     scale = 2.0 * stiffness
-    straight = length * _STIFFEST * np.exp(-_STIFFEST)
-    if compression >= straight:
-        force = scale * length * np.exp(-_STIFFEST)
-        return force + scale / (_STIFFEST - 1.0) * (compression - straight), scale / (_STIFFEST - 1.0)
-    goal = np.log(length / compression)
+    goal = log_length - np.log(compression)
+    if goal <= _STIFFEST - np.log(_STIFFEST):
+        force = scale * np.exp(log_length - _STIFFEST)
+        beyond = compression - force / scale * _STIFFEST
+        return force + scale / (_STIFFEST - 1.0) * beyond, scale / (_STIFFEST - 1.0)
     w = goal + np.log(goal + 1.0)
     for _ in range(8):
         change = (w - np.log(w) - goal) * w / (w - 1.0)
         w -= change
         if abs(change) <= 1e-15 * w:
             break
-    return scale * length * np.exp(-w), scale / (w - 1.0)
+    return scale * compression / w, scale / (w - 1.0)
 
 
 @jit
-def pin_force(law, stiffness, length, half_tilt, compression):
+def pin_force(law, stiffness, log_length, half_tilt, compression):
     """Return force [N] and its derivative [N/m] of one pin contact.
 
     ``half_tilt`` is how much deeper the tilted tooth's end lies than its middle, equation (31), for linear laws only.
@@ -49,11 +49,11 @@ def pin_force(law, stiffness, length, half_tilt, compression):
         return 0.0, 0.0
     if law == LINEAR:
         return stiffness * compression, stiffness
-    return _logarithmic(stiffness, length, compression)
+    return _logarithmic(stiffness, log_length, compression)
 
 
 @jit
-def pin_forces(law, stiffness, length, compression, force):
+def pin_forces(law, stiffness, log_length, compression, force):
     """Fill the forces of several pins, [pin]."""
     for k in range(compression.size):
-        force[k] = pin_force(law, stiffness[k], length[k], 0.0, compression[k])[0]
+        force[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])[0]

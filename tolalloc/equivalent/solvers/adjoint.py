@@ -60,7 +60,7 @@ def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
     for c in range(weight_of_pin.size):
         d, k = c // pins, c % pins
         force, slope = pin_force(
-            problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], work.compression[c]
+            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
         )
         lever = 0.0
         for i in range(3):

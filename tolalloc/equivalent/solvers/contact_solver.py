@@ -79,7 +79,7 @@ def _slope_at(problem, work, length, slope, curvature):
         if problem.law != LINEAR or problem.half_tilt[c] > 0.0:
             compression = work.compression[c] + length * work.rate[c]
             force, stiff = pin_force(
-                problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], compression
+                problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression
             )
             first += force * work.rate[c]
             second += stiff * work.rate[c] * work.rate[c]
@@ -180,7 +180,7 @@ def _softened(problem, factor):
         problem.by_disc,
         problem.undisturbed,
         problem.contact,
-        problem.length,
+        problem.log_length,
         problem.half_tilt,
         problem.play_by_kept,
         problem.play_offset,

@@ -22,7 +22,7 @@ class Problem(NamedTuple):
         S [N/m] and f [N].
     by_disc, undisturbed
         D [m/m] and compression h at undisplaced discs [m].
-    contact, length, half_tilt
+    contact, log_length, half_tilt
         Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m].
     play_by_kept, play_offset
         Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m].
@@ -36,7 +36,7 @@ class Problem(NamedTuple):
     by_disc: Float[np.ndarray, "disc 3 pin"]
     undisturbed: Float[np.ndarray, " contact"]
     contact: Float[np.ndarray, " contact"]
-    length: Float[np.ndarray, " contact"]
+    log_length: Float[np.ndarray, " contact"]
     half_tilt: Float[np.ndarray, " contact"]
     play_by_kept: Float[np.ndarray, "element 2 kept"]
     play_offset: Float[np.ndarray, "element 2"]
@@ -130,7 +130,7 @@ def assemble(problem, compression, play, q, gradient, tangent):
             if not compression[c] + problem.half_tilt[c] > 0.0:
                 continue
             force, slope = pin_force(
-                problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], compression[c]
+                problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression[c]
             )
             touching += 1
             largest = max(largest, force)

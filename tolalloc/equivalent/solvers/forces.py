@@ -43,7 +43,7 @@ def _of_sample(s, tables, layout, mapped, design, errors, torque, turn_status, t
             for k in range(count):
                 c = d * count + k
                 pins[at, d, k], _ = pin_force(
-                    problem.law, problem.contact[c], problem.length[c], problem.half_tilt[c], work.compression[c]
+                    problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
                 )
         for e in range(elements.shape[1]):
             elements[at, e, 0], elements[at, e, 1], _, _, _ = play_force(

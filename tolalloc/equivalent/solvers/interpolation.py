@@ -91,7 +91,7 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
     blend(nodes.undisturbed[slot], weights, own.undisturbed)
     blend(tables.contact_stiffness[here], weights, own.contact)
     if own.law != LINEAR:
-        blend(tables.contact_length[here], weights, own.length)
+        blend(tables.contact_log_length[here], weights, own.log_length)
     blend(tables.play_by_kept[here], weights, own.play_by_kept)
     blend(nodes.play_offset[slot], weights, own.play_offset)
     blend(tables.play_stiffness[here], weights, own.play_stiffness)

@@ -114,7 +114,7 @@ def problem_at_node(at, tables, layout, face_width, values, own):
         tables.contact_by_disc[at],
         own.undisturbed,
         tables.contact_stiffness[at],
-        tables.contact_length[at],
+        tables.contact_log_length[at],
         own.half_tilt,
         tables.play_by_kept[at],
         own.play_offset,
