@@ -28,6 +28,11 @@ def write_workbook(results: StudyResults, path: Path) -> None:
         "distributions": tables.mappings(results),
         "assumptions": pd.DataFrame({"assumption": results.assumptions}),
     }
+    write_sheets(sheets, path)
+
+
+def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
+    """Write one sheet per table, headers frozen, units in every header."""
     with pd.ExcelWriter(path, engine="openpyxl") as writer:
         for name, frame in sheets.items():
             frame.to_excel(writer, sheet_name=name, index=False)

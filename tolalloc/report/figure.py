@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import plotly.graph_objects as go
 from matplotlib.figure import Figure as Canvas
@@ -29,7 +29,7 @@ class Series:
     x, y
         Data; for ``bars`` the categories and the lengths, for ``histogram`` the values alone.
     low, high
-        Ends of the intervals around y of ``bars``.
+        Ends of the intervals around y of ``bars``, edges of the band around a ``line``.
     """
 
     label: str
@@ -56,6 +56,10 @@ class Figure:
         The data.
     vertical, horizontal
         Marked values on the axes, with their names.
+    logarithmic
+        Whether the y axis is logarithmic.
+    equal
+        Whether a length is the same on both axes, as in a drawing.
     """
 
     name: str
@@ -65,6 +69,8 @@ class Figure:
     series: tuple[Series, ...]
     vertical: tuple[tuple[float, str], ...] = ()
     horizontal: tuple[tuple[float, str], ...] = ()
+    logarithmic: bool = False
+    equal: bool = False
 
     @property
     def rows(self) -> int:
@@ -72,32 +78,46 @@ class Figure:
         return max((len(item.x) for item in self.series if item.kind == "bars"), default=0)
 
 
+def _draw_bars(axes: Any, figure: Figure, number: int) -> None:
+    """Draw one of several sets of horizontal bars."""
+    item, count = figure.series[number], sum(item.kind == "bars" for item in figure.series)
+    height = 0.8 / count
+    places = [row + height * (number - (count - 1) / 2) for row in range(len(item.x))]
+    error = None
+    if item.low:
+        error = [
+            [y - low for y, low in zip(item.y, item.low, strict=True)],
+            [high - y for y, high in zip(item.y, item.high, strict=True)],
+        ]
+    colour = COLOURS[number % len(COLOURS)]
+    axes.barh(places, item.y, height, xerr=error, label=item.label, color=colour, ecolor="#444444", capsize=2)
+    axes.set_yticks(range(len(item.x)), [str(name) for name in item.x])
+
+
+def _draw(axes: Any, figure: Figure, number: int) -> None:
+    """Draw one set of data by matplotlib."""
+    item, colour = figure.series[number], COLOURS[number % len(COLOURS)]
+    if item.kind == "line":
+        axes.plot(item.x, item.y, label=item.label, color=colour, linewidth=1.2)
+        if item.low:
+            axes.fill_between(item.x, item.low, item.high, color=colour, alpha=0.18, linewidth=0)
+    elif item.kind == "points":
+        axes.plot(item.x, item.y, "o", label=item.label, color=colour, markersize=7)
+    elif item.kind == "stems":
+        offset = 0.28 * (number - (len(figure.series) - 1) / 2)
+        axes.bar([float(x) + offset for x in item.x], item.y, 0.28, label=item.label, color=colour)
+    elif item.kind == "histogram":
+        axes.hist(item.x, bins=60, label=item.label, color=colour, alpha=0.55)
+    else:
+        _draw_bars(axes, figure, number)
+
+
 def save_png(figure: Figure, path: Path) -> None:
     """Draw the figure into a PNG file."""
     canvas = Canvas(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
     axes = canvas.subplots()
-    count = sum(item.kind == "bars" for item in figure.series)
-    for number, item in enumerate(figure.series):
-        colour = COLOURS[number % len(COLOURS)]
-        if item.kind == "line":
-            axes.plot(item.x, item.y, label=item.label, color=colour, linewidth=1.2)
-        elif item.kind == "points":
-            axes.plot(item.x, item.y, "o", label=item.label, color=colour, markersize=7)
-        elif item.kind == "stems":
-            offset = 0.28 * (number - (len(figure.series) - 1) / 2)
-            axes.bar([float(x) + offset for x in item.x], item.y, 0.28, label=item.label, color=colour)
-        elif item.kind == "histogram":
-            axes.hist(item.x, bins=60, label=item.label, color=colour, alpha=0.55)
-        else:
-            height = 0.8 / count
-            places = [row + height * (number - (count - 1) / 2) for row in range(len(item.x))]
-            error = (
-                [[y - low for y, low in zip(item.y, item.low, strict=True)],
-                 [high - y for y, high in zip(item.y, item.high, strict=True)]]
-                if item.low else None
-            )  # fmt: skip
-            axes.barh(places, item.y, height, xerr=error, label=item.label, color=colour, ecolor="#444444", capsize=2)
-            axes.set_yticks(range(len(item.x)), [str(name) for name in item.x])
+    for number in range(len(figure.series)):
+        _draw(axes, figure, number)
     for value, name in figure.vertical:
         axes.axvline(value, color="#b00020", linestyle="--", label=name)
     for value, name in figure.horizontal:
@@ -105,38 +125,60 @@ def save_png(figure: Figure, path: Path) -> None:
     if figure.rows:
         axes.invert_yaxis()
     axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
+    if figure.logarithmic:
+        axes.set_yscale("log")
+    if figure.equal:
+        axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
     axes.set_axisbelow(True)
     axes.legend()
     canvas.savefig(path, dpi=130)
 
 
+def _faint(colour: str) -> tuple[int, int, int, float]:
+    """Return red, green, blue and a small opacity of a colour."""
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return red, green, blue, 0.18
+
+
+def _interval(item: Series) -> dict[str, Any] | None:
+    """Return plotly's error bars around the lengths of bars."""
+    if not item.low:
+        return None
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": [high - y for y, high in zip(item.y, item.high, strict=True)],
+        "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
+        "color": "#444444",
+    }
+
+
+def _add(canvas: go.Figure, item: Series, colour: str) -> None:
+    """Add one set of data by plotly."""
+    if item.kind == "line":
+        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
+        if item.low:
+            band = {"x": item.x, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+            canvas.add_scatter(y=item.low, **band)
+            canvas.add_scatter(y=item.high, fill="tonexty", fillcolor=f"rgba{_faint(colour)}", **band)
+    elif item.kind == "points":
+        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="markers", marker={"color": colour, "size": 10})
+    elif item.kind == "stems":
+        canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
+    elif item.kind == "histogram":
+        canvas.add_histogram(x=item.x, name=item.label, marker_color=colour, opacity=0.6, nbinsx=80)
+    else:
+        canvas.add_bar(
+            y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=_interval(item)
+        )
+
+
 def as_html(figure: Figure) -> str:
     """Return the figure as a page fragment; the page itself carries plotly.js once."""
     canvas = go.Figure()
     for number, item in enumerate(figure.series):
-        colour = COLOURS[number % len(COLOURS)]
-        if item.kind == "line":
-            canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
-        elif item.kind == "points":
-            canvas.add_scatter(
-                x=item.x, y=item.y, name=item.label, mode="markers", marker={"color": colour, "size": 10}
-            )
-        elif item.kind == "stems":
-            canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
-        elif item.kind == "histogram":
-            canvas.add_histogram(x=item.x, name=item.label, marker_color=colour, opacity=0.6, nbinsx=80)
-        else:
-            interval = None
-            if item.low:
-                interval = {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [high - y for y, high in zip(item.y, item.high, strict=True)],
-                    "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
-                    "color": "#444444",
-                }
-            canvas.add_bar(y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=interval)
+        _add(canvas, item, COLOURS[number % len(COLOURS)])
     for value, name in figure.vertical:
         canvas.add_vline(x=value, line_dash="dash", line_color="#b00020", annotation_text=name)
     for value, name in figure.horizontal:
@@ -150,6 +192,10 @@ def as_html(figure: Figure) -> str:
         margin={"l": 60, "r": 30, "t": 30, "b": 60},
         legend={"orientation": "h", "y": 1.08},
     )
+    if figure.logarithmic:
+        canvas.update_yaxes(type="log")
+    if figure.equal:
+        canvas.update_yaxes(scaleanchor="x", scaleratio=1)
     if figure.rows:
         canvas.update_yaxes(autorange="reversed", automargin=True)
     return str(canvas.to_html(full_html=False, include_plotlyjs=False))

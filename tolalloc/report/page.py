@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from tolalloc.report import tables
+from tolalloc.report.document import environment, html_table
 from tolalloc.report.figure import as_html
 from tolalloc.report.figures import study_figures
 from tolalloc.report.results import StudyResults
@@ -31,26 +30,8 @@ _RANKING_COLUMNS = (
 )
 
 
-def _number(value: object) -> str:
-    """Return a cell as text with four significant digits at most."""
-    if isinstance(value, float):
-        if pd.isna(value):
-            return ""
-        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
-    return str(value)
-
-
-def _table(frame: pd.DataFrame) -> Markup:
-    """Return a frame as an HTML table."""
-    text = frame.map(_number)
-    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))
-
-
 def write_page(results: StudyResults, path: Path) -> None:
     """Write ``report.html``: text, tables and figures, plotly.js embedded once."""
-    environment = Environment(
-        loader=PackageLoader("tolalloc.report"), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
-    )
     ranked = tables.ranking(results)
     content: dict[str, Any] = {
         "results": results,
@@ -59,13 +40,13 @@ def write_page(results: StudyResults, path: Path) -> None:
         "figures": {figure.name: (figure.title, Markup(as_html(figure))) for figure in study_figures(results)},
         "first": ranked.iloc[0],
         "ninety": int((ranked["cumulative [%]"] < 90).sum()) + 1,
-        "ranking": _table(ranked[list(_RANKING_COLUMNS)]),
-        "before_after": _table(tables.before_after(results)),
-        "modification": _table(tables.modification(results)),
-        "capability": _table(tables.capability(results)),
-        "stack_up": _table(tables.stack_up(results)),
-        "verified": _table(tables.verified(results)),
-        "mappings": _table(tables.mappings(results)),
+        "ranking": html_table(ranked[list(_RANKING_COLUMNS)]),
+        "before_after": html_table(tables.before_after(results)),
+        "modification": html_table(tables.modification(results)),
+        "capability": html_table(tables.capability(results)),
+        "stack_up": html_table(tables.stack_up(results)),
+        "verified": html_table(tables.verified(results)),
+        "mappings": html_table(tables.mappings(results)),
     }
-    page = environment.get_template("report.html.j2").render(content)
+    page = environment().get_template("report.html.j2").render(content)
     path.write_text(page, encoding="utf-8")

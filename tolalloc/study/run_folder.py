@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import numba
 
 from tolalloc.exceptions import RunFolderError
 from tolalloc.report import tables
+from tolalloc.report.document import write_json
 from tolalloc.report.excel import write_workbook
 from tolalloc.report.figure import save_png
 from tolalloc.report.figures import study_figures
@@ -121,11 +121,6 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "torsional stiffness of the perfect reducer [N·m/arcmin]": results.torsional_stiffness,
         "warnings": list(results.warnings),
     }
-
-
-def write_json(content: dict[str, Any], path: Path) -> None:
-    """Write a JSON file."""
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def write_run(folder: Path, prepared: Prepared, results: StudyResults, record: Record) -> None:
