@@ -1,4 +1,4 @@
-"""The command line: ``tolalloc run``, ``tolalloc check``, ``tolalloc te``."""
+"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tolalloc.cli.console import UnitProgress, announce_compilation, messages, screen
+from tolalloc.cli.contact import asked_reducer, contact_answer, frame_table
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
 from tolalloc.exceptions import TolallocError
@@ -18,6 +19,10 @@ from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.cycloid.tooth_profile import ToothProfile
+    from tolalloc.report.document import Document
 
 app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
@@ -121,6 +126,63 @@ def te(
         screen.print(as_table(answer))
         if attributed:
             screen.print(attribution_table(answer))
+
+
+@app.command()
+def contact(
+    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv40e",
+    torque: Annotated[
+        float | None, typer.Option(help="Torque on the carrier [N·m]; the rated one unless given.")
+    ] = None,
+    width: Annotated[float | None, typer.Option(help="Loaded face width [mm].")] = None,
+    support: Annotated[
+        float | None, typer.Option(help="Distance of two supports between which the pins bend [mm].")
+    ] = None,
+    law: Annotated[str, typer.Option(help="Contact law: logarithmic (Hertz), constant, table2.")] = "logarithmic",
+    exact: Annotated[bool, typer.Option("--exact", help="Exact distances even for a small modification.")] = False,
+    phases: Annotated[int, typer.Option(help="Phases of the crank within one pin pitch.")] = 72,
+    profile: Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")] = None,
+    points: Annotated[int, typer.Option(help="Points per tooth of that file.")] = 200,
+    out: Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
+    design = asked_reducer(load_reducer(reducer), width, support)
+    announce_compilation()
+    found = contact_answer(design, torque, law, exact, phases)
+    # The report's libraries take half a second to import, and only these lines need them.
+    from tolalloc.report.contact import contact_document, contact_table, profile_table
+
+    document = contact_document(found)
+    _write_asked(document, out, found.profile, profile, points)
+    if as_json:
+        sys.stdout.write(json.dumps(document.summary, ensure_ascii=False, indent=2) + "\n")
+        return
+    screen.print(frame_table(profile_table(found), f"{design.name}: profile and clearance"))
+    screen.print(frame_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier"))
+    for sentence in document.answer:
+        screen.print(sentence, markup=False, highlight=False)
+    for warning in document.warnings:
+        screen.print(warning, style="yellow", markup=False)
+
+
+def _write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
+    """Write the report and the profile that were asked for, both checked before either is written."""
+    from tolalloc.cli.document_script import written
+    from tolalloc.report.profile_files import require_profile_file, write_profile
+
+    if file:
+        require_profile_file(file)
+    if out:
+        written(out, lambda: document)
+    if file:
+        made = write_profile(teeth, points, file)
+        messages.print(
+            f"Profile: {file}, {made.per_tooth} points per tooth, chord error at most "
+            f"{made.chord_error / MICROMETRE:.2g} µm.",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def main() -> None:
