@@ -165,14 +165,17 @@ def clearance_figure(found: Assessment) -> Figure:
     lever = normals(found.reducer.cycloid_stage.shortening, FLANK).lever
     angle = list(FLANK / DEGREE)
     low, high = found.single.zone.mean(axis=0) / DEGREE
+    formula = [Series(label="Li Lixing's formula", kind="line", x=angle, y=list(found.clearance.formula / MICROMETRE))]
+    if found.clearance.formula_error < 0.01 * MICROMETRE:  # the same line as the clearance
+        formula = []
     return Figure(
         name="clearance",
         title="Clearance after the first contact, and what the load closes",
         x_label="angle of the pin from the crank direction [°]",
-        y_label="[µm]",
+        y_label="clearance, deflection [µm]",
         series=(
             Series(label="clearance", kind="line", x=angle, y=list(found.clearance.after / MICROMETRE)),
-            Series(label="Li Lixing's formula", kind="line", x=angle, y=list(found.clearance.formula / MICROMETRE)),
+            *formula,
             *(
                 Series(
                     label=f"deflection, {name}",
