@@ -18,10 +18,10 @@ from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default
 from tolalloc.cycloid.mesh import normals
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer
-from tolalloc.report.contact import MEGAPASCAL, contact_sections, summary
+from tolalloc.report.contact import contact_sections, summary
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 TORQUE = 572.0
 SHARE = 0.55

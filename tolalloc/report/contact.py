@@ -14,9 +14,7 @@ from tolalloc.cycloid.mesh import normals
 from tolalloc.cycloid.tooth_profile import ToothProfile
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
-
-MEGAPASCAL = 1e6
+from tolalloc.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 
 def profile_summary(found: Assessment) -> dict[str, float | str | None]:

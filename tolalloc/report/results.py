@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import Requirement
+from tolalloc.cycloid.assessment import Assessment
 from tolalloc.equivalent.answers import Equilibria
 from tolalloc.equivalent.outputs import Orders
 from tolalloc.reducer.design import Reducer
@@ -64,6 +65,8 @@ class StudyResults:
         The built unit that is shown, if any.
     neglected
         Patterns of the sources that are taken as zero.
+    contacts
+        How the exact teeth carry the rated torque before and after; none where the modification interferes.
     examples
         Units whose curves are shown.
     statuses
@@ -85,6 +88,7 @@ class StudyResults:
     allocation: Allocation
     unit: BuiltUnit | None
     neglected: tuple[str, ...]
+    contacts: tuple[Assessment | None, Assessment | None]
     examples: tuple[ExampleUnit, ...]
     statuses: dict[str, int]
 
@@ -139,6 +143,11 @@ class StudyResults:
                 f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, "
                 f"below {NEEDED_Q2}: it was not used; the ranking ran on the real model."
             )
+        found += [
+            f"The modification {when} interferes with the pins, so its contact under load is not shown."
+            for when, contact in zip(("before", "after"), self.contacts, strict=True)
+            if contact is None
+        ]
         if self.sobol.dropped:
             found.append(f"{self.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")
         failed = sum(count for outcome, count in self.statuses.items() if outcome != "equilibrium found")

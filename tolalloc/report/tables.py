@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.cycloid.assessment import Assessment
 from tolalloc.report.results import StudyResults
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import with_zones
-from tolalloc.units import MICROMETRE
+from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
 
 
 def ranking(results: StudyResults) -> pd.DataFrame:
@@ -84,18 +87,29 @@ def before_after(results: StudyResults) -> pd.DataFrame:
 
 
 def modification(results: StudyResults) -> pd.DataFrame:
-    """Return the modification amounts and the clearances they leave, before and after."""
-    stage = results.reducer.cycloid_stage
-    before, after = results.reducer.modification, results.space.modification(results.allocation.chosen.design)
-    rows = [
-        ("equidistant Δr_rp [µm]", before.equidistant, after.equidistant),
-        ("shift Δr_p [µm]", before.shift, after.shift),
-        ("flank clearance, smallest nominal gap [µm]", before.flank_clearance(stage), after.flank_clearance(stage)),
-        ("radial clearance at tip and root [µm]", before.radial_clearance, after.radial_clearance),
-    ]
-    return pd.DataFrame(
-        [{"amount": name, "before": old / MICROMETRE, "after": new / MICROMETRE} for name, old, new in rows]
-    )
+    """Return the modification amounts, the clearances they leave and how exact teeth then carry, before and after."""
+    stage, micrometre = results.reducer.cycloid_stage, MICROMETRE
+    pairs = (results.reducer.modification, results.space.modification(results.allocation.chosen.design))
+    rows: dict[str, list[float]] = {
+        "equidistant Δr_rp [µm]": [amounts.equidistant / MICROMETRE for amounts in pairs],
+        "shift Δr_p [µm]": [amounts.shift / MICROMETRE for amounts in pairs],
+        "flank clearance, smallest nominal gap [µm]": [
+            amounts.flank_clearance(stage) / MICROMETRE for amounts in pairs
+        ],
+        "radial clearance at tip and root [µm]": [amounts.radial_clearance / MICROMETRE for amounts in pairs],
+    }
+    for name, value in _CONTACT.items():
+        rows[name] = [float("nan") if found is None else value(found) for found in results.contacts]
+    return pd.DataFrame([{"amount": name, "before": old, "after": new} for name, (old, new) in rows.items()])
+
+
+_CONTACT: dict[str, Callable[[Assessment], float]] = {
+    "backlash of teeth and pins [arcmin]": lambda found: found.clearance.backlash / ARCMINUTE,
+    "fewest pins in contact at rated torque [-]": lambda found: float(found.single.pins_in_contact.min()),
+    "largest pin force at rated torque [N]": lambda found: float(found.single.force.max()),
+    "peak pressure at rated torque [MPa]": lambda found: float(found.single.pressure.max()) / MEGAPASCAL,
+}
+"""What the more loaded disc does, exact parts and Hertzian line contact at every pin."""
 
 
 def _statistics(label: str, design: VerifiedDesign, limit: float) -> dict[str, object]:

@@ -15,9 +15,12 @@ from jaxtyping import Float, UInt8
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
+from tolalloc.cycloid.assessment import Assessment, assess
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.equivalent.outputs import order_spectrum
 from tolalloc.equivalent.status import Status
+from tolalloc.exceptions import InputError
+from tolalloc.reducer.design import Modification, Reducer
 from tolalloc.report.results import ExampleUnit, StudyResults
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.sensitivity.classical import classical_estimate
@@ -144,6 +147,10 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             allocation=allocation,
             unit=prepared.unit,
             neglected=prepared.neglected,
+            contacts=(
+                _contact(prepared.reducer, prepared.reducer.modification),
+                _contact(prepared.reducer, space.modification(allocation.chosen.design)),
+            ),
             examples=_examples(
                 prepared, allocation.baseline.sample, allocation.chosen.sample, allocation.chosen.design
             ),
@@ -156,6 +163,14 @@ def _torsional_stiffness(prepared: Prepared) -> float:
     model = prepared.kernel.model
     perfect = np.zeros((1, len(model.columns)))
     return float(hysteresis_loop(model, perfect, LOOP_ANGLES).torsional_stiffness[0] * ARCMINUTE)
+
+
+def _contact(reducer: Reducer, modification: Modification) -> Assessment | None:
+    """Return how the exact teeth carry the rated torque; none where they interfere before any load."""
+    try:
+        return assess(replace(reducer, modification=modification), reducer.load.rated_torque)
+    except InputError:
+        return None
 
 
 def _unit_surrogate(kernel: KernelResponse, sample: MonteCarlo, sources: int) -> Surrogate:
