@@ -24,9 +24,9 @@ _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdige
 _KEPT = _HERE.parent / "__pycache__" / f"compiled-{_DIGEST[:16]}"
 
 
-def is_kept() -> bool:
-    """Return whether functions of this version were compiled on this machine before."""
-    return _KEPT.exists()
+def is_kept(module: str) -> bool:
+    """Return whether functions of this version of a module were compiled on this machine before."""
+    return any(_KEPT.glob(f"*/{module}.*.nbi"))
 
 
 def _compile(function: Callable[..., Any], parallel: bool) -> Any:

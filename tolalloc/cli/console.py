@@ -14,22 +14,23 @@ screen = Console()
 messages = Console(stderr=True)
 
 
-def announce_compilation() -> None:
-    """Say what the next minute is spent on where this version has not run on this machine before."""
-    if not is_kept():
-        messages.print("Compiling the kernel for this machine: about a minute, once.", style="dim")
+def announce_compilation(room: str = "equivalent") -> None:
+    """Say what the next minute is spent on where a room of this version has not run on this machine before."""
+    module, lasts = {"equivalent": ("turn", "about a minute"), "cycloid": ("distance", "some seconds")}[room]
+    if not is_kept(module):
+        messages.print(f"Compiling the kernel for this machine: {lasts}, once.", style="dim")
 
 
 class UnitProgress:
-    """A line per stage with the number of solved units and their rate."""
+    """A line per stage with the number of solved units, or of other things, and their rate."""
 
-    def __init__(self) -> None:
+    def __init__(self, counted: str = "units") -> None:
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description:<24}"),
             BarColumn(bar_width=24),
-            TextColumn("{task.completed:>8.0f} units"),
-            TextColumn("{task.fields[rate]:>7.0f} units/s"),
+            TextColumn(f"{{task.completed:>8.0f}} {counted}"),
+            TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),
             TimeElapsedColumn(),
             console=messages,
         )

@@ -49,7 +49,7 @@ def run_document(name: str, build: Callable[[bool], Document]) -> None:
     parser.add_argument("--out", type=Path, default=Path("runs") / name, help="folder, new or empty")
     parser.add_argument("--quick", action="store_true", help="fewer seeds, wider bands")
     options = parser.parse_args()
-    announce_compilation()
+    announce_compilation("cycloid")
     try:
         document = written(options.out, lambda: build(options.quick))
     except TolallocError as error:
