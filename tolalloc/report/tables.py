@@ -88,7 +88,7 @@ def before_after(results: StudyResults) -> pd.DataFrame:
 
 def modification(results: StudyResults) -> pd.DataFrame:
     """Return the modification amounts, the clearances they leave and how exact teeth then carry, before and after."""
-    stage, micrometre = results.reducer.cycloid_stage, MICROMETRE
+    stage = results.reducer.cycloid_stage
     pairs = (results.reducer.modification, results.space.modification(results.allocation.chosen.design))
     rows: dict[str, list[float]] = {
         "equidistant Δr_rp [µm]": [amounts.equidistant / MICROMETRE for amounts in pairs],
