@@ -1,4 +1,4 @@
-"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``."""
+"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -21,6 +21,7 @@ from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
+    from tolalloc.allocation.modification.rotated_profile import Metric
     from tolalloc.cycloid.tooth_profile import ToothProfile
     from tolalloc.report.document import Document
 
@@ -148,7 +149,7 @@ def contact(
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
     design = asked_reducer(load_reducer(reducer), width, support)
-    announce_compilation()
+    announce_compilation("cycloid")
     found = contact_answer(design, torque, law, exact, phases)
     # The report's libraries take half a second to import, and only these lines need them.
     from tolalloc.report.contact import contact_document, contact_table, profile_table
@@ -160,6 +161,60 @@ def contact(
         return
     screen.print(frame_table(profile_table(found), f"{design.name}: profile and clearance"))
     screen.print(frame_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier"))
+    _say(document)
+
+
+@app.command()
+def modify(
+    method: Annotated[str, typer.Argument(help="song2019 (towards a rotated profile) or li2018 (least gap).")],
+    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv40e",
+    radial_um: Annotated[float, typer.Option("--radial", help="Least clearance at tip and root [µm].")] = 15.0,
+    rotation: Annotated[float, typer.Option(help="song2019: rotation of the profile to come close to [rad].")] = 0.005,
+    metric: Annotated[str, typer.Option(help="song2019: same_angle, normal or nearest.")] = "same_angle",
+    negative: Annotated[bool, typer.Option("--negative-shift", help="song2019: a negative shift.")] = False,
+    require_gap: Annotated[
+        bool, typer.Option("--require-gap", help="song2019: no interference after closing.")
+    ] = False,
+    torque: Annotated[float | None, typer.Option(help="Torque on the carrier [N·m]; rated unless given.")] = None,
+    seeds: Annotated[int, typer.Option(help="Searches of each algorithm.")] = 8,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 1,
+    profile: Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")] = None,
+    points: Annotated[int, typer.Option(help="Points per tooth of that file.")] = 200,
+    out: Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Choose equidistant and shift amount by a published method, beside a sure reference and other algorithms."""
+    from tolalloc.study.modification import ModificationStudy, choose
+
+    study = ModificationStudy(
+        method=method,
+        radial_clearance=radial_um * MICROMETRE,
+        rotation=rotation,
+        metric=cast("Metric", metric),
+        shift_sign=-1 if negative else 1,
+        require_gap=require_gap,
+        seeds=seeds,
+        seed=seed,
+    )
+    design = load_reducer(reducer)
+    asked = design.torque_on_carrier(design.load.rated_torque if torque is None else torque, "tolalloc modify")
+    announce_compilation("cycloid")
+    with UnitProgress("searches") as progress:
+        results = choose(study, design, asked, progress)
+    from tolalloc.report.modification import algorithms_table, delivered_table, modification_document
+
+    document = modification_document(results)
+    _write_asked(document, out, results.assessment.profile, profile, points)
+    if as_json:
+        sys.stdout.write(json.dumps(document.summary, ensure_ascii=False, indent=2) + "\n")
+        return
+    screen.print(frame_table(algorithms_table(results), f"{design.name}: {method}"))
+    screen.print(frame_table(delivered_table(results), "What the amounts deliver"))
+    _say(document)
+
+
+def _say(document: Document) -> None:
+    """Print answer and warnings."""
     for sentence in document.answer:
         screen.print(sentence, markup=False, highlight=False)
     for warning in document.warnings:

@@ -17,6 +17,8 @@ from tolalloc.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.reducer.design import Reducer
 from tolalloc.units import MICROMETRE
 
+_ROUNDING = 1e-12  # difference of amounts that counts as none [m]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Assessment:
@@ -63,7 +65,7 @@ class Assessment:
                 f"The modification is above {LARGE / MICROMETRE:g} µm, too large for the linear formula: "
                 + ("exact distances were taken." if self.clearance.exact else "ask for exact distances.")
             )
-        if amounts.shift > amounts.equidistant * stage.flank_ratio:
+        if amounts.shift > amounts.equidistant * stage.flank_ratio + _ROUNDING:
             found.append(
                 "Δr_rp·√(1−K1²) is below Δr_p: the first contact is not at arccos K1, where Li Lixing's formula "
                 f"closes the gap, and the formula is off by up to {self.clearance.formula_error / MICROMETRE:.2g} µm."

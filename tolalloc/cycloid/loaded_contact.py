@@ -23,6 +23,7 @@ PAIR_SHARE = 0.55
 """Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
 
 _ITERATIONS = 500
+_HALVINGS = 52  # from 180° down to rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,18 +137,18 @@ def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " pha
     return 2 * pi / reducer.cycloid_stage.pin_count * np.arange(count) / count
 
 
-def _zone(gap: Gap, rotation: float, flank: float) -> tuple[float, float]:
-    """Return where compression begins and ends around the first contact [rad]."""
-
-    def compression(angle: float) -> float:
-        return -float(gap(np.array([angle]), rotation)[0])
-
-    if compression(flank) <= 0:
-        return flank, flank
+def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], flank: float) -> Float[np.ndarray, "phase 2"]:
+    """Return where compression begins and ends around the first contact, by bisection of all phases at once [rad]."""
     edges = []
     for end in (0.0, pi):
-        edges.append(end if compression(end) >= 0 else float(brentq(compression, flank, end, xtol=1e-12)))
-    return edges[0], edges[1]
+        inside, outside = np.full(rotation.size, flank), np.full(rotation.size, end)
+        whole = gap(outside, rotation) <= 0
+        for _ in range(_HALVINGS):
+            middle = (inside + outside) / 2
+            pressed_there = gap(middle, rotation) <= 0
+            inside, outside = np.where(pressed_there, middle, inside), np.where(pressed_there, outside, middle)
+        edges.append(np.where(whole, end, inside))
+    return np.stack(edges, axis=1)
 
 
 @dataclass(frozen=True)
@@ -319,7 +320,7 @@ def _answer(
         force=force,
         pressure=peak_pressure(stage, reducer.contact_modulus, angles, force),
         torque=stage.disc_pitch_radius * (lever * force).sum(axis=2),
-        zone=np.array([_zone(gap, rotation, closed.first_contact) for rotation in rotations]),
+        zone=_zones(gap, rotations, closed.first_contact),
         iterations=0,
         exact=closed.exact,
     )

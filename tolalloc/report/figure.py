@@ -193,7 +193,7 @@ def as_html(figure: Figure) -> str:
         legend={"orientation": "h", "y": 1.08},
     )
     if figure.logarithmic:
-        canvas.update_yaxes(type="log")
+        canvas.update_yaxes(type="log", exponentformat="power")
     if figure.equal:
         canvas.update_yaxes(scaleanchor="x", scaleratio=1)
     if figure.rows:

@@ -1,0 +1,64 @@
+"""li2018's modification of an RV-40E: closed form, the patent's genetic algorithm, and others, over many seeds.
+
+python studies/li2018_modification.py [--quick] [--out FOLDER]
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from tolalloc.allocation.modification.reference import reference
+from tolalloc.allocation.modification.residual_gap import closed_form, residual_gap
+from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.document_script import run_document
+from tolalloc.reducer.files import load_reducer
+from tolalloc.report.document import Document, Section
+from tolalloc.report.modification import modification_document
+from tolalloc.study.modification import ModificationStudy, choose
+from tolalloc.units import MICROMETRE
+
+RADIAL_CLEARANCE = 15 * MICROMETRE
+
+
+def ladder() -> pd.DataFrame:
+    """Return closed form and reference for several reducers and radial clearances."""
+    rows = []
+    for name in ("rv20e", "rv40e", "rv80e"):
+        stage = load_reducer(name).cycloid_stage
+        for clearance_um in (5.0, 15.0, 30.0):
+            exact = closed_form(stage, clearance_um * MICROMETRE)
+            found = reference(residual_gap(stage, clearance_um * MICROMETRE, largest=200 * MICROMETRE))
+            rows.append(
+                {
+                    "reducer": name,
+                    "radial clearance [µm]": clearance_um,
+                    "equidistant amount, closed form [µm]": f"{exact.equidistant / MICROMETRE:.5f}",
+                    "shift amount, closed form [µm]": f"{exact.shift / MICROMETRE:.5f}",
+                    "reference differs by, relative [-]": float(
+                        max(abs(found.amounts / (exact.equidistant, exact.shift) - 1))
+                    ),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def build(quick: bool) -> Document:
+    """Return the report."""
+    reducer = load_reducer("rv40e")
+    study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE, seeds=2 if quick else 30, seed=0)
+    with UnitProgress("searches") as progress:
+        results = choose(study, reducer, reducer.load.rated_torque, progress)
+    section = Section(
+        heading="Closed form",
+        paragraphs=(
+            "Least mean gap with a radial clearance of j or more and no interference is a linear program whose optimum "
+            "is Δr_rp = j/(1 − q), Δr_p = j·q/(1 − q), whatever the work interval. The patent's formulas are lost; its "
+            "“difference of two curves” taken literally is least without any shift.",
+        ),
+        tables=(("closed form", ladder()),),
+    )
+    return modification_document(results, section)
+
+
+if __name__ == "__main__":
+    run_document("li2018_modification", build)

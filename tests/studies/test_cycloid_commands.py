@@ -1,0 +1,148 @@
+"""``tolalloc contact``, ``tolalloc modify`` and the studies of the cycloid stage, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import ezdxf
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.studies.test_commands import ROOT, refused, tolalloc
+from tolalloc.reducer.files import PRESETS
+
+
+def reducer_with(tmp_path, *changes: tuple[str, str]):
+    text = (PRESETS / "rv40e.reducer.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_contact_of_the_rv40e():
+    result = tolalloc("contact", "--reducer", "rv40e", "--torque", "572", "--phases", "1", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert answer["per tooth"]["largest pin force [N]"] == pytest.approx(1144, abs=1)
+    assert answer["per tooth"]["peak pressure [MPa]"] == pytest.approx(1569, abs=1)
+    assert answer["profile"]["radial clearance at tip and root [µm]"] == pytest.approx(6)
+
+
+def test_contact_for_a_person_names_units_and_takes_width_and_support():
+    result = tolalloc("contact", "--width", "16", "--support", "30.6", "--torque", "-572")
+    assert "backlash [arcmin]" in result.stdout
+    assert "16…17 pins" in result.stdout
+
+
+def test_contact_writes_report_and_profile(tmp_path):
+    folder, file = tmp_path / "report", tmp_path / "disc.dxf"
+    result = tolalloc("contact", "--out", folder, "--profile", file, "--points", "100")
+    assert result.returncode == 0, result.stderr
+    assert "chord error at most 0.61 µm" in result.stderr
+    names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    figures = {f"figures/{name}.png" for name in ("profile", "clearance", "forces", "pins_in_contact")}
+    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json"} | figures
+    drawing = ezdxf.readfile(file)
+    (outline,) = drawing.modelspace().query("LWPOLYLINE")
+    assert outline.closed
+    assert len(outline) == 39 * 100
+    radius = np.hypot(*np.array([point[:2] for point in outline.get_points()]).T)
+    assert radius.max() == pytest.approx(62.294, abs=1e-6)  # Rp + e − r, less 6 µm of radial clearance
+    assert radius.min() == pytest.approx(59.694, abs=1e-6)
+
+
+def test_profile_as_csv_carries_what_was_removed(tmp_path):
+    file = tmp_path / "disc.csv"
+    assert tolalloc("contact", "--profile", file).returncode == 0
+    frame = pd.read_csv(file)
+    assert len(frame) == 39 * 200
+    tip = frame["angle [deg]"] == -180
+    assert tip.sum() == 39
+    np.testing.assert_allclose(frame.loc[tip, "removed along the normal [µm]"], 6.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ([("pin_radius_mm = 3", "pin_radius_mm = 5.1")], ["pin_radius_mm", "5.03", "overlap"]),
+        ([("eccentricity_mm = 1.3", "eccentricity_mm = 1.6")], ["K1", "below 1"]),
+        ([("pin_radius_mm = 3", "pin_radius_mm = 4.7")], ["pin_radius_mm", "4.61", "undercut"]),
+        ([('convention = "minus"', 'convention = "plus"')], ["interference of 10 µm at tip and root", "convention"]),
+        ([('convention = "minus"', 'convention = "seed"')], ["convention", "seed"]),
+        ([("disc_teeth = 39", "disc_teeth = 40")], ["disc_teeth", "39"]),
+    ],
+)
+def test_a_stage_that_cannot_be_built_is_refused(tmp_path, changes, words):
+    refused(tolalloc("contact", "--reducer", reducer_with(tmp_path, *changes)), *words)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--torque", "0"], ["torque", "not 0"]),
+        (["--torque", "1e9"], ["torque", "5720"]),
+        (["--torque", "500", "--support", "500"], ["beyond any contact", "allowed is below"]),
+        (["--width", "0"], ["--width", "0.5 to 200"]),
+        (["--support", "-1"], ["--support", "1 to 500"]),
+        (["--law", "hertz"], ["hertz", "logarithmic"]),
+        (["--phases", "0"], ["--phases", "1 to 3600"]),
+        (["--profile", "disc.stl"], ["disc.stl", ".csv or .dxf"]),
+        (["--profile", "nowhere/disc.csv"], ["no folder", "nowhere"]),
+        (["--profile", "disc.csv", "--points", "7"], ["points per tooth", "7"]),
+        (["--reducer", "rv41"], ["rv41", "rv40e"]),
+    ],
+)
+def test_contact_refuses_in_one_sentence(options, words):
+    refused(tolalloc("contact", *options), *words)
+
+
+def test_nothing_is_overwritten(tmp_path):
+    file = tmp_path / "disc.csv"
+    file.write_text("mine", encoding="utf-8")
+    refused(tolalloc("contact", "--profile", file, "--out", tmp_path / "report"), "exists")
+    assert file.read_text(encoding="utf-8") == "mine"
+    assert not (tmp_path / "report").exists()
+    refused(tolalloc("contact", "--out", tmp_path), "not empty")
+
+
+@pytest.mark.parametrize("study", ["xi2015_contact", "song2019_modification", "li2018_modification"])
+def test_studies_of_the_cycloid_stage(study, tmp_path):
+    script, folder = ROOT / "studies" / f"{study}.py", tmp_path / "run"
+    command = [sys.executable, str(script), "--quick", "--out", str(folder)]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert result.returncode == 0, result.stderr
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("<h2>") >= 3
+    assert "nan" not in (folder / "summary.json").read_text(encoding="utf-8").lower()
+    again = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    refused(again, "not empty")
+
+
+def test_modify_li2018_gives_the_closed_form():
+    result = tolalloc("modify", "li2018", "--reducer", "rv40e", "--radial", "15", "--seeds", "1", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert answer["equidistant amount [µm]"] == pytest.approx(35.9679, abs=1e-4)
+    assert answer["shift amount [µm]"] == pytest.approx(20.9679, abs=1e-4)
+    assert answer["backlash [arcmin]"] == pytest.approx(3.220, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["li2017"], ["li2017", "li2018"]),
+        (["li2018", "--radial", "500"], ["meet the constraints", "radial clearance"]),
+        (["song2019", "--rotation", "0.5"], ["rotation", "0.5"]),
+        (["song2019", "--metric", "far"], ["far", "nearest"]),
+        (["song2019", "--seeds", "0"], ["seeds", "1 to 1000"]),
+        (["li2018", "--seed", "-1"], ["seed", "positive"]),
+    ],
+)
+def test_modify_refuses_in_one_sentence(arguments, words):
+    refused(tolalloc("modify", *arguments), *words)

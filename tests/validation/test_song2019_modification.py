@@ -1,0 +1,126 @@
+"""song2019's example against an independent minimisation of its equation (10); its own optima are none.
+
+Lengths in mm. The printed points are Δr_rp = 0.3205 with Δr_p = 0.0742 and −0.2929; every figure below that is not
+printed there was found by another program.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tolalloc.allocation.modification.reference import polish, reference
+from tolalloc.allocation.modification.rotated_profile import rotated_profile_fit
+from tolalloc.cycloid.clearance import clearance_of, formula_gap
+from tolalloc.cycloid.mesh import flank_angle
+from tolalloc.cycloid.tooth_profile import ToothProfile
+from tolalloc.exceptions import InputError
+from tolalloc.reducer.design import CycloidStage, Modification
+from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+
+STAGE = CycloidStage(
+    pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=0.0015, face_width=0.01
+)
+
+
+def distance(problem, *amounts: float) -> float:
+    return float(problem.objective(np.array([amounts]) * MILLIMETRE)[0]) / MILLIMETRE
+
+
+@pytest.fixture(scope="module")
+def optimum():
+    return reference(rotated_profile_fit(STAGE))
+
+
+@pytest.mark.parametrize(
+    ("sign", "metric", "points", "equidistant", "shift", "mean"),
+    [
+        (1, "same_angle", 180, 0.64986, 0.51982, 0.148119),
+        (-1, "same_angle", 180, 0.20054, 0.0, 0.337101),
+        (1, "normal", 180, 0.78938, 0.70327, 0.01845),
+        (1, "nearest", 60, 0.78474, 0.70280, 0.02203),
+        (1, "same_angle", 10, 0.68253, None, None),
+        (1, "same_angle", 36, 0.65101, None, None),
+        (1, "same_angle", 100, 0.65026, None, None),
+    ],
+)
+def test_optimum(sign, metric, points, equidistant, shift, mean):
+    found = reference(rotated_profile_fit(STAGE, sign, metric, points=points))
+    assert found.violation == 0
+    assert found.amounts[0] / MILLIMETRE == pytest.approx(equidistant, abs=5.1e-6)
+    if shift is not None:
+        assert found.amounts[1] / MILLIMETRE == pytest.approx(shift, abs=5.1e-6)
+        assert found.objective / MILLIMETRE == pytest.approx(mean, abs=5.1e-7 if metric == "same_angle" else 5.1e-6)
+
+
+def test_optimum_hardly_depends_on_more_points(optimum):
+    many = polish(rotated_profile_fit(STAGE, points=5000), optimum)
+    assert many.amounts[0] / MILLIMETRE == pytest.approx(0.64985, abs=5.1e-6)
+
+
+@pytest.mark.parametrize(
+    ("equidistant", "shift", "mean"), [(0.3205, 0.0742, 0.30885), (0.3205, -0.2929, 0.59907), (0.0, 0.0, 0.38892)]
+)
+def test_printed_points_are_no_optima(equidistant, shift, mean):
+    assert distance(rotated_profile_fit(STAGE), equidistant, shift) == pytest.approx(mean, abs=5.1e-6)
+
+
+def test_condition_of_the_source_is_no_clearance_for_a_negative_shift():
+    problem = rotated_profile_fit(STAGE, -1)
+    printed = np.array([[0.3205, 0.0742], [0.3205, -0.2929]]) * MILLIMETRE
+    radial = problem.constraints(printed)[:, 0] / MILLIMETRE
+    assert radial == pytest.approx([0.2463, 0.6134], abs=1e-12)
+    # Eq. (11), Δr_rp − |Δr_p| > 0, forbids this point, where nothing interferes.
+    forbidden = Modification(equidistant=0.2 * MILLIMETRE, shift=-0.25 * MILLIMETRE)
+    assert problem.evaluate(np.array([[forbidden.equidistant, forbidden.shift]])).violation[0] == 0
+    assert clearance_of(ToothProfile(stage=STAGE, modification=forbidden)).before.min() > 0.3 * MILLIMETRE
+
+
+def test_optimum_touches_elsewhere_than_the_formula_supposes(optimum):
+    angle = np.linspace(0, np.pi, 7201)
+    assert formula_gap(STAGE, optimum.modification, angle).min() / MICROMETRE == pytest.approx(-8.4, abs=0.05)
+    clearance = clearance_of(ToothProfile(stage=STAGE, modification=optimum.modification))
+    assert clearance.first_contact / DEGREE == pytest.approx(87.6, abs=0.05)
+    assert flank_angle(STAGE) / DEGREE == pytest.approx(43.0, abs=0.05)
+
+
+def test_required_gap_is_kept_and_costs_something(optimum):
+    kept = reference(rotated_profile_fit(STAGE, require_gap=True))
+    angle = np.linspace(0, np.pi, 7201)
+    assert formula_gap(STAGE, kept.modification, angle).min() > -1e-16
+    assert kept.objective > 1.1 * optimum.objective
+    assert kept.violation == 0
+
+
+def test_required_radial_clearance_is_kept():
+    kept = reference(rotated_profile_fit(STAGE, radial_clearance=0.2 * MILLIMETRE))
+    assert kept.modification.radial_clearance == pytest.approx(0.2 * MILLIMETRE, rel=1e-12)
+
+
+def test_most_of_the_distance_at_the_same_angle_is_slip(optimum):
+    normal = reference(rotated_profile_fit(STAGE, metric="normal"))
+    assert 7.5 < optimum.objective / normal.objective < 8.5
+
+
+@pytest.mark.parametrize("amounts", [(0.0, 0.0), (0.65, 0.52), (0.3, 0.9), (1.0, -1.0), (0.2, -0.4)])
+def test_distances_against_the_tooth_profile(amounts):
+    """The same from single profiles; the nearest point from a dense sample, which is never too near."""
+    equidistant, shift = np.array(amounts) * MILLIMETRE
+    modified = ToothProfile(stage=STAGE, modification=Modification(equidistant=equidistant, shift=shift))
+    turned = ToothProfile(stage=STAGE, modification=Modification(equidistant=0.0, shift=0.0, rotation=0.005))
+    angle = np.arange(1, 31) * np.pi / 30
+    apart = turned.points(angle) - modified.points(angle)
+    along = np.abs((apart * modified.normals(angle)).sum(axis=1)).mean()
+    # The other flanks continue the curve beyond root and tip.
+    dense = modified.points(np.linspace(-1.5, np.pi + 1.5, 200001))
+    sampled = np.mean([np.hypot(*(dense - point).T).min() for point in turned.points(angle)])
+    expected = {"same_angle": np.hypot(*apart.T).mean(), "normal": along, "nearest": sampled}
+    for metric, value in expected.items():
+        found = distance(rotated_profile_fit(STAGE, metric=metric, points=30), *amounts)
+        assert found == pytest.approx(value / MILLIMETRE, abs=1e-6 if metric == "nearest" else 1e-12), metric
+
+
+@pytest.mark.parametrize("rotation", [0.0, -0.005, 0.02])
+def test_rotation_beyond_reason_is_refused(rotation):
+    with pytest.raises(InputError, match="rotation"):
+        rotated_profile_fit(STAGE, rotation=rotation)
