@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.optimize import brentq, minimize_scalar
 
 from tolalloc.cycloid.mesh import Angles, normals
-from tolalloc.cycloid.solvers.distance import FIELDS, pin_clearances
+from tolalloc.cycloid.solvers.distance import FIELDS, design_clearances, pin_clearances
 from tolalloc.cycloid.tooth_profile import ToothProfile
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import CycloidStage, Modification
@@ -100,7 +100,10 @@ def exact_clearance(
             ground.pin_circle_radius, ground.pin_radius, profile.modification.rotation,
         )  # fmt: skip
     turned = np.ascontiguousarray(np.broadcast_to(rotation, clearance.shape), float)
-    pin_clearances(designs, np.ascontiguousarray(pin_angle), turned, clearance)
+    if len(profiles) == 1:  # waking the threads would take longer
+        design_clearances(designs[0], np.ascontiguousarray(pin_angle), turned[0], clearance[0])
+    else:
+        pin_clearances(designs, np.ascontiguousarray(pin_angle), turned, clearance)
     return clearance
 
 

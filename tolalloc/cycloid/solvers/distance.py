@@ -94,24 +94,30 @@ def _nearest(design, x, y, first, step, px, py):
     return best
 
 
+@jit
+def design_clearances(design, pin_angle, turned, clearance):
+    """Fill the clearances [m] of pins at exact places on a turned disc, [pin].
+
+    ``turned`` are the rotations of the disc, one for each pin. A tooth with rotation modification is what two profiles
+    turned either way leave.
+    """
+    x, y = np.empty(_GRID), np.empty(_GRID)
+    first, step = _scan(design, x, y)
+    teeth, turns = design[TEETH], (design[TEETH] + 1.0) / design[TEETH]
+    sides = 2 if design[ROTATION] != 0.0 else 1
+    for k in range(pin_angle.size):
+        a, own = pin_angle[k], -np.inf
+        for side in range(sides):
+            by = (1.0 - 2.0 * side) * design[ROTATION] - turned[k]
+            px = design[CIRCLE] * np.cos(by - a / teeth) - design[ECCENTRICITY] * np.cos(by - a * turns)
+            py = design[CIRCLE] * np.sin(by - a / teeth) - design[ECCENTRICITY] * np.sin(by - a * turns)
+            own = max(own, _nearest(design, x, y, first, step, px, py))
+        clearance[k] = own - design[PIN]
+
+
 @parallel_jit
 def pin_clearances(designs, pin_angle, turned, clearance):
-    """Fill the clearances [m] of pins at exact places on turned discs, [design, pin].
-
-    ``designs`` are [design, FIELDS], ``pin_angle`` [pin], ``turned`` the rotations of the discs [design, pin].
-    A tooth with rotation modification is what two profiles turned either way leave.
-    """
+    """Fill the clearances [m] of pins on the discs of many designs, [design, pin]; ``designs`` are [design, FIELDS]."""
     for d in prange(designs.shape[0]):
-        design = designs[np.int64(d)]
-        x, y = np.empty(_GRID), np.empty(_GRID)
-        first, step = _scan(design, x, y)
-        teeth, turns = design[TEETH], (design[TEETH] + 1.0) / design[TEETH]
-        sides = 2 if design[ROTATION] != 0.0 else 1
-        for k in range(pin_angle.size):
-            a, own = pin_angle[k], -np.inf
-            for side in range(sides):
-                by = (1.0 - 2.0 * side) * design[ROTATION] - turned[np.int64(d), k]
-                px = design[CIRCLE] * np.cos(by - a / teeth) - design[ECCENTRICITY] * np.cos(by - a * turns)
-                py = design[CIRCLE] * np.sin(by - a / teeth) - design[ECCENTRICITY] * np.sin(by - a * turns)
-                own = max(own, _nearest(design, x, y, first, step, px, py))
-            clearance[np.int64(d), k] = own - design[PIN]
+        own = np.int64(d)
+        design_clearances(designs[own], pin_angle, turned[own], clearance[own])
