@@ -18,7 +18,8 @@ from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default
 from tolalloc.cycloid.mesh import normals
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer
-from tolalloc.report.contact import contact_sections, summary
+from tolalloc.report.contact import contact_sections
+from tolalloc.report.contact_tables import summary
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE

@@ -152,7 +152,8 @@ def contact(
     announce_compilation("cycloid")
     found = contact_answer(design, torque, law, exact, phases)
     # The report's libraries take half a second to import, and only these lines need them.
-    from tolalloc.report.contact import contact_document, contact_table, profile_table
+    from tolalloc.report.contact import contact_document
+    from tolalloc.report.contact_tables import contact_table, profile_table
 
     document = contact_document(found)
     _write_asked(document, out, found.profile, profile, points)

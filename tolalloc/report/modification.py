@@ -11,7 +11,8 @@ import pandas as pd
 from tolalloc.allocation.modification.problem import ModificationProblem
 from tolalloc.allocation.modification.result import REACHED, SearchResult, Spread
 from tolalloc.cycloid.assessment import Assessment
-from tolalloc.report import contact
+from tolalloc.report import contact_tables
+from tolalloc.report.contact import contact_sections
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.units import ARCMINUTE, MICROMETRE
@@ -146,7 +147,7 @@ def answer(results: ModificationResults) -> tuple[str, ...]:
         f"Equidistant amount {equidistant:.4f} µm, shift amount {shift:.4f} µm (pin radius and pin circle radius plus "
         f"these at grinding): the least {problem.description}, {best.objective / MICROMETRE:.6g} µm.",
         f"In a reducer file: [modification] equidistant_um = {equidistant:.4f}, shift_um = {shift:.4f}.",
-        *contact.answer(results.assessment),
+        *contact_tables.answer(results.assessment),
     )
 
 
@@ -174,7 +175,7 @@ def summary(results: ModificationResults) -> dict[str, Any]:
             }
             for spread, polished in zip(results.spreads, results.polished, strict=True)
         ],
-        "contact": contact.summary(results.assessment),
+        "contact": contact_tables.summary(results.assessment),
         "warnings": [*results.warnings, *results.assessment.warnings],
     }
 
@@ -201,7 +202,7 @@ def modification_document(results: ModificationResults, *more: Section) -> Docum
         subtitle=f"{results.problem.name}; contact at {found.torque:g} N·m on the carrier; first seed {results.seed}.",
         answer=answer(results),
         warnings=(*results.warnings, *found.warnings),
-        sections=(choice_section(results), *more, *contact.contact_sections(found)),
+        sections=(choice_section(results), *more, *contact_sections(found)),
         assumptions=found.assumptions,
         summary=summary(results),
         seed=results.seed,
