@@ -14,7 +14,9 @@ from scipy.optimize import brentq
 from tolalloc.cli.document_script import run_document
 from tolalloc.cycloid.assessment import assess
 from tolalloc.cycloid.clearance import formula_gap
-from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases, pressed, pressed_linear
+from tolalloc.cycloid.law_at_every_pin import pressed
+from tolalloc.cycloid.linear_method import pressed_linear
+from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
 from tolalloc.cycloid.mesh import normals
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer

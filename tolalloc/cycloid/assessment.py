@@ -5,14 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from tolalloc.cycloid.clearance import LARGE, Clearance, clearance_of, is_large
-from tolalloc.cycloid.loaded_contact import (
-    PAIR_SHARE,
-    LoadedContact,
-    PressedDiscs,
-    default_phases,
-    pressed,
-    pressed_linear,
-)
+from tolalloc.cycloid.law_at_every_pin import pressed
+from tolalloc.cycloid.linear_method import pressed_linear
+from tolalloc.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
 from tolalloc.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.reducer.design import Reducer
 from tolalloc.units import MICROMETRE

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import brentq
 
 from tolalloc.cycloid.clearance import Clearance, Gap, clearance_of, gap_of
-from tolalloc.cycloid.contact_stiffness import ContactStiffness, contact_stiffness, peak_pressure
-from tolalloc.cycloid.mesh import flank_angle, normals, pin_angles
-from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR, pin_forces
+from tolalloc.cycloid.contact_stiffness import peak_pressure
+from tolalloc.cycloid.mesh import normals, pin_angles
 from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import Reducer
-from tolalloc.units import MICROMETRE
 
 PAIR_SHARE = 0.55
 """Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
 
-_ITERATIONS = 500
 _HALVINGS = 52  # from 180° down to rounding
 
 
@@ -151,158 +147,28 @@ def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], flank: float) -> Flo
     return np.stack(edges, axis=1)
 
 
-@dataclass(frozen=True)
-class _Press:
-    """All pins of one phase: from a deflection to compressions and forces."""
-
-    discs: PressedDiscs
-    gap: Gap
-    closing: float
-    pin_angle: Float[np.ndarray, " pin"]
-
-    @cached_property
-    def lever(self) -> Float[np.ndarray, " pin"]:
-        stage = self.discs.reducer.cycloid_stage
-        return np.asarray(stage.disc_pitch_radius * normals(stage.shortening, self.pin_angle).lever)
-
-    @cached_property
-    def contact(self) -> ContactStiffness:
-        return contact_stiffness(self.discs.reducer.cycloid_stage, self.discs.reducer.stiffness, self.pin_angle)
-
-    def rotation(self, deflection: float) -> float:
-        return self.closing + deflection / self.discs.reducer.cycloid_stage.disc_pitch_radius
-
-    def forces(self, deflection: float) -> Float[np.ndarray, " pin"]:
-        compression, force = -self.gap(self.pin_angle, self.rotation(deflection)), np.empty(self.pin_angle.size)
-        law = LAWS[self.discs.reducer.stiffness.pin_contact_law]
-        pin_forces(law, self.contact.stiffness, self.contact.log_length, compression, force)
-        return force
-
-    def surplus(self, deflection: float) -> float:
-        return float(self.lever @ self.forces(deflection)) - self.discs.torque
-
-    def balanced(self) -> float:
-        """Return the deflection at which the torques balance [m]."""
-        deepest, deflection = self.discs.reducer.cycloid_stage.pin_radius, MICROMETRE
-        while self.surplus(deflection) < 0:
-            if deflection >= deepest:
-                largest = self.surplus(deepest) + self.discs.torque
-                raise InputError(
-                    f"{self.discs.reducer.name}: torque {self.discs.torque:.6g} N·m on the discs is beyond any "
-                    f"contact: pins would be pressed in by more than their radius; allowed is below {largest:.3g} N·m."
-                )
-            deflection = min(2 * deflection, deepest)
-        return float(brentq(self.surplus, 0.0, deflection, xtol=1e-18, rtol=1e-13))
-
-
-def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
-    """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
-
-    Parameters
-    ----------
-    discs
-        What is pressed.
-    phase
-        Angles from the crank direction of disc 1 to the next pin [rad].
-
-    Raises
-    ------
-    InputError
-        The torque would press a pin in by more than its radius.
-
-    Notes
-    -----
-    Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
-    """
-    closed, angles = discs.clearance, discs.pin_angles(phase)
-    gap = gap_of(discs.profile, closed.exact)
-    presses = [_Press(discs, gap, closed.rotation, own) for own in angles.reshape(phase.size, -1)]
-    deflection = np.array([press.balanced() for press in presses])
-    force = np.stack([press.forces(depth) for press, depth in zip(presses, deflection, strict=True)])
-    law = discs.reducer.stiffness.pin_contact_law
-    return _answer(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
-
-
-def pressed_linear(
-    discs: PressedDiscs, phase: Float[np.ndarray, " phase"], deflection: float | None = None
-) -> LoadedContact:
-    """Return the contact by Li Lixing's method: forces in proportion to the compressions.
-
-    Parameters
-    ----------
-    discs
-        What is pressed.
-    phase
-        Angles from the crank direction of disc 1 to the next pin [rad].
-    deflection
-        δ_max where it is known [m]; otherwise it is iterated until it is the approach under the largest force, by the
-        reducer's law with the curvature at φ0.
-
-    Raises
-    ------
-    InputError
-        The deflection reaches no pin.
-    SolveError
-        The iteration does not settle.
-
-    Notes
-    -----
-    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
-
-    References
-    ----------
-    xi2015, equations (5)–(7); Li Lixing (1984).
-    """
-    stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
-    gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
-    lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
-
-    def shares(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
-        return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
-
-    def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
-        moment = stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))
-        if not (moment > 0).all():
-            raise InputError(
-                f"{discs.reducer.name}: a deflection of {depth.min() / MICROMETRE:.3g} µm reaches no pin; "
-                "allowed is a larger torque or smaller clearance."
-            )
-        return np.asarray(discs.torque / moment)
-
-    if deflection is not None:
-        depth = np.full(phase.size, deflection)
-        method = "Li Lixing's linear method, deflection given"
-        return _answer(discs, method, phase, depth, largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth))
-    force = np.full(phase.size, discs.torque / (stage.disc_pitch_radius * stage.pin_count / 4))
-    for iteration in range(1, _ITERATIONS + 1):
-        depth = _approach(discs.reducer, force)
-        new = largest_force(depth)
-        if np.abs(new - force).max() <= 1e-13 * new.max():
-            found = _answer(
-                discs, "Li Lixing's linear method", phase, depth, new[:, np.newaxis, np.newaxis] * shares(depth)
-            )
-            return replace(found, iterations=iteration)
-        force = 0.5 * (force + new)  # the plain iteration swings from too many pins to too few
-    raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
-
-
-def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
-    """Return how far pin and tooth at φ0 approach each other under forces [m]."""
-    stage, stiffness = reducer.cycloid_stage, reducer.stiffness
-    contact = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
-    if LAWS[stiffness.pin_contact_law] == LINEAR:
-        return np.asarray(force / contact.stiffness)
-    scale = 2 * contact.stiffness
-    return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))
-
-
-def _answer(
+def loaded(
     discs: PressedDiscs,
     method: str,
     phase: Float[np.ndarray, " phase"],
     deflection: Float[np.ndarray, " phase"],
     force: Float[np.ndarray, "phase disc pin"],
 ) -> LoadedContact:
+    """Return the contact whose deflection and forces a method has found.
+
+    Parameters
+    ----------
+    discs
+        What is pressed.
+    method
+        Name of the method.
+    phase
+        Angles from the crank direction of disc 1 to the next pin [rad].
+    deflection
+        δ_max [m].
+    force
+        Pin forces [N].
+    """
     reducer, stage, closed, angles = (
         discs.reducer,
         discs.reducer.cycloid_stage,

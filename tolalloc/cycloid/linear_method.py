@@ -1,0 +1,92 @@
+"""Loaded contact by Li Lixing's linear method."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.cycloid.clearance import gap_of
+from tolalloc.cycloid.contact_stiffness import contact_stiffness
+from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, loaded
+from tolalloc.cycloid.mesh import flank_angle, normals
+from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reducer.design import Reducer
+from tolalloc.units import MICROMETRE
+
+_ITERATIONS = 500
+
+
+def pressed_linear(
+    discs: PressedDiscs, phase: Float[np.ndarray, " phase"], deflection: float | None = None
+) -> LoadedContact:
+    """Return the contact by Li Lixing's method: forces in proportion to the compressions.
+
+    Parameters
+    ----------
+    discs
+        What is pressed.
+    phase
+        Angles from the crank direction of disc 1 to the next pin [rad].
+    deflection
+        δ_max where it is known [m]; otherwise it is iterated until it is the approach under the largest force, by the
+        reducer's law with the curvature at φ0.
+
+    Raises
+    ------
+    InputError
+        The deflection reaches no pin.
+    SolveError
+        The iteration does not settle.
+
+    Notes
+    -----
+    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
+
+    References
+    ----------
+    xi2015, equations (5)–(7); Li Lixing (1984).
+    """
+    stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
+    gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
+    lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
+
+    def shares(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
+        return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
+
+    def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+        moment = stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))
+        if not (moment > 0).all():
+            raise InputError(
+                f"{discs.reducer.name}: a deflection of {depth.min() / MICROMETRE:.3g} µm reaches no pin; "
+                "allowed is a larger torque or smaller clearance."
+            )
+        return np.asarray(discs.torque / moment)
+
+    if deflection is not None:
+        depth = np.full(phase.size, deflection)
+        method = "Li Lixing's linear method, deflection given"
+        return loaded(discs, method, phase, depth, largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth))
+    force = np.full(phase.size, discs.torque / (stage.disc_pitch_radius * stage.pin_count / 4))
+    for iteration in range(1, _ITERATIONS + 1):
+        depth = _approach(discs.reducer, force)
+        new = largest_force(depth)
+        if np.abs(new - force).max() <= 1e-13 * new.max():
+            found = loaded(
+                discs, "Li Lixing's linear method", phase, depth, new[:, np.newaxis, np.newaxis] * shares(depth)
+            )
+            return replace(found, iterations=iteration)
+        force = 0.5 * (force + new)  # the plain iteration swings from too many pins to too few
+    raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
+
+
+def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+    """Return how far pin and tooth at φ0 approach each other under forces [m]."""
+    stage, stiffness = reducer.cycloid_stage, reducer.stiffness
+    contact = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
+    if LAWS[stiffness.pin_contact_law] == LINEAR:
+        return np.asarray(force / contact.stiffness)
+    scale = 2 * contact.stiffness
+    return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))
