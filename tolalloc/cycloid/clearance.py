@@ -98,6 +98,7 @@ def exact_clearance(
         row[:] = (
             stage.pin_circle_radius, stage.pin_radius, stage.eccentricity, stage.disc_teeth,
             ground.pin_circle_radius, ground.pin_radius, profile.modification.rotation,
+            *profile.edges,
         )  # fmt: skip
     turned = np.ascontiguousarray(np.broadcast_to(rotation, clearance.shape), float)
     if len(profiles) == 1:  # waking the threads would take longer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.units import MICROMETRE
 
 _ITERATIONS = 500
+_SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
 
 
 def pressed_linear(
@@ -57,28 +59,44 @@ def pressed_linear(
         return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
 
     def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
-        moment = stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))
-        if not (moment > 0).all():
-            raise InputError(
-                f"{discs.reducer.name}: a deflection of {depth.min() / MICROMETRE:.3g} µm reaches no pin; "
-                "allowed is a larger torque or smaller clearance."
-            )
-        return np.asarray(discs.torque / moment)
+        return np.asarray(discs.torque / (stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))))
 
+    nearest = np.where(lever > _SHORTEST, distance / np.maximum(lever, _SHORTEST), np.inf).min(axis=(1, 2))
     if deflection is not None:
-        depth = np.full(phase.size, deflection)
-        method = "Li Lixing's linear method, deflection given"
-        return loaded(discs, method, phase, depth, largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth))
-    force = np.full(phase.size, discs.torque / (stage.disc_pitch_radius * stage.pin_count / 4))
-    for iteration in range(1, _ITERATIONS + 1):
-        depth = _approach(discs.reducer, force)
-        new = largest_force(depth)
-        if np.abs(new - force).max() <= 1e-13 * new.max():
-            found = loaded(
-                discs, "Li Lixing's linear method", phase, depth, new[:, np.newaxis, np.newaxis] * shares(depth)
+        if deflection <= nearest.max():
+            raise InputError(
+                f"{discs.reducer.name}: a deflection of {deflection / MICROMETRE:.3g} µm reaches no pin; "
+                f"allowed is above {nearest.max() / MICROMETRE:.3g} µm."
             )
-            return replace(found, iterations=iteration)
-        force = 0.5 * (force + new)  # the plain iteration swings from too many pins to too few
+        depth, steps = np.full(phase.size, deflection), 0
+        method = "Li Lixing's linear method, deflection given"
+    else:
+        depth, steps = _iterated(discs, nearest, largest_force)
+        method = "Li Lixing's linear method"
+    force = largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth)
+    return replace(loaded(discs, method, phase, depth, force), iterations=steps)
+
+
+def _iterated(
+    discs: PressedDiscs,
+    nearest: Float[np.ndarray, " phase"],
+    largest_force: Callable[[Float[np.ndarray, " phase"]], Float[np.ndarray, " phase"]],
+) -> tuple[Float[np.ndarray, " phase"], int]:
+    """Return the deflections that are the approach under their own largest force [m], and the steps it took.
+
+    The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
+    middle of what brackets the answer where that mean leaves it.
+    """
+    low, high = nearest, np.full(nearest.size, np.inf)
+    lever = discs.reducer.cycloid_stage.disc_pitch_radius
+    depth = nearest + _approach(discs.reducer, np.full(nearest.size, discs.torque / lever))
+    for step in range(1, _ITERATIONS + 1):
+        wanted = _approach(discs.reducer, largest_force(depth))
+        if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
+            return depth, step
+        low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
+        mean = 0.5 * (depth + wanted)
+        depth = np.where((low < mean) & (mean < high), mean, 0.5 * (low + np.minimum(high, 4 * depth)))
     raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
 
 

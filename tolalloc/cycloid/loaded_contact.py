@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.cycloid.clearance import Clearance, Gap, clearance_of, gap_of
+from tolalloc.cycloid.clearance import FLANK, Clearance, Gap, clearance_of, gap_of
 from tolalloc.cycloid.contact_stiffness import peak_pressure
 from tolalloc.cycloid.mesh import normals, pin_angles
 from tolalloc.cycloid.tooth_profile import ToothProfile
@@ -19,7 +19,7 @@ from tolalloc.reducer.design import Reducer
 PAIR_SHARE = 0.55
 """Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
 
-_HALVINGS = 52  # from 180° down to rounding
+_HALVINGS = 45  # from a quarter of a degree down to rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class LoadedContact:
     torque
         Torque of the pins on each disc [N·m].
     zone
-        First and last angle at which a pin would carry [rad].
+        First and last angle at which a pin would carry; where two places touch first, pins between may be free [rad].
     iterations
         Steps of Li Lixing's iteration; 0 where a bracket was searched [-].
     exact
@@ -133,17 +133,21 @@ def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " pha
     return 2 * pi / reducer.cycloid_stage.pin_count * np.arange(count) / count
 
 
-def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], flank: float) -> Float[np.ndarray, "phase 2"]:
-    """Return where compression begins and ends around the first contact, by bisection of all phases at once [rad]."""
+def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], contact: float) -> Float[np.ndarray, "phase 2"]:
+    """Return the first and the last angle of compression, tabulated and then bisected for all phases at once [rad]."""
+    table = np.sort(np.append(FLANK, contact))  # a light load may press nothing but the first contact
+    shape = (rotation.size, table.size)
+    pressed = gap(np.broadcast_to(table, shape), np.broadcast_to(rotation[:, np.newaxis], shape)) <= 0
+    pressed[:, table == contact] = True
+    first, last = pressed.argmax(axis=1), table.size - 1 - pressed[:, ::-1].argmax(axis=1)
     edges = []
-    for end in (0.0, pi):
-        inside, outside = np.full(rotation.size, flank), np.full(rotation.size, end)
-        whole = gap(outside, rotation) <= 0
+    for own, outer in ((first, np.maximum(first - 1, 0)), (last, np.minimum(last + 1, table.size - 1))):
+        inside, outside = table[own], table[outer]
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
-            pressed_there = gap(middle, rotation) <= 0
-            inside, outside = np.where(pressed_there, middle, inside), np.where(pressed_there, outside, middle)
-        edges.append(np.where(whole, end, inside))
+            there = gap(middle, rotation) <= 0
+            inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
+        edges.append(inside)
     return np.stack(edges, axis=1)
 
 

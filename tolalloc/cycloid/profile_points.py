@@ -40,11 +40,8 @@ class ProfilePoints:
 
 def _flank_angles(profile: ToothProfile, count: int) -> Float[np.ndarray, " point"]:
     """Return φ from root to tip such that all chords are about equally wrong [rad]."""
-    dense = np.linspace(0.0, pi, _DENSE)
+    dense = np.linspace(*profile.edges, _DENSE)
     place = profile.points(dense)
-    if profile.modification.rotation > 0.0:  # the flanks of a tooth cut each other before its middle
-        before = np.arctan2(-place[:, 1], place[:, 0]) <= pi / profile.stage.disc_teeth
-        dense, place = dense[before], place[before]
     length = np.hypot(*np.diff(place, axis=0).T)
     bend = np.sqrt(np.abs(profile.curvature((dense[1:] + dense[:-1]) / 2)))
     # A chord's error is curvature·length²/8; a fifth of the mean keeps points on the flat of the flank.
@@ -81,20 +78,14 @@ def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
     angle = _flank_angles(profile, per_tooth // 2 + 1)
     flank = profile.points(angle)
     mirrored = flank[::-1] * (1.0, -1.0)
-    error = _chord_error(profile, angle)
-    if profile.modification.rotation > 0.0:
-        # Both flanks end short of the root's middle; the chord between their ends stands for the root circle.
-        error = max(error, profile.root_radius * (1 - np.cos(profile.modification.rotation)))
-        root = slice(0, None)
-    else:
-        root = slice(1, None)  # the root's middle belongs to both flanks
-    space = np.concatenate([mirrored, flank[root]])[:-1]  # the tip is the next space's first point
-    angles = np.concatenate([-angle[::-1], angle[root]])[:-1]
+    # Root and tip belong to two flanks each; the tip is the next space's first point.
+    space = np.concatenate([mirrored, flank[1:]])[:-1]
+    angles = np.concatenate([-angle[::-1], angle[1:]])[:-1]
     turned = np.exp(-2j * pi * np.arange(profile.stage.disc_teeth) / profile.stage.disc_teeth)
     points = (turned[:, np.newaxis] * (space[:, 0] + 1j * space[:, 1])).ravel()
     return ProfilePoints(
         per_tooth=space.shape[0],
         place=np.stack([points.real, points.imag], axis=1),
         angle=np.tile(angles, profile.stage.disc_teeth),
-        chord_error=error,
+        chord_error=_chord_error(profile, angle),
     )

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import acos
+from math import acos, pi
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import brentq
 
 from tolalloc.cycloid.mesh import Angles, normals, path_curvature
 from tolalloc.exceptions import InputError
@@ -59,6 +60,23 @@ class ToothProfile:
         """φ where the flank turns from concave to convex, 0 where it is convex all over [rad]."""
         pins, shortening = self.ground.pin_count, self.ground.shortening
         return acos(min((1 + pins * shortening**2) / (shortening * (1 + pins)), 1.0))
+
+    @cached_property
+    def edges(self) -> tuple[float, float]:
+        """φ where a flank meets its mirror image at root and at tip: 0 and π unless a rotation turns it [rad]."""
+        if self.modification.rotation == 0.0:
+            return 0.0, pi
+
+        def beyond(angle: float, middle: float) -> float:
+            x, y = self.points(np.array([angle]))[0]
+            return float(np.arctan2(y, x)) + middle
+
+        half_tooth = pi / self.stage.disc_teeth
+        if not abs(self.modification.rotation) < half_tooth / 4:
+            raise InputError.at(
+                "modification", "rotation", self.modification.rotation, f"below {half_tooth / 4:.3g} rad"
+            )
+        return brentq(beyond, -pi / 2, pi / 2, args=(0.0,)), brentq(beyond, pi / 2, 3 * pi / 2, args=(half_tooth,))
 
     def points(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
         """Return x and y of the flank of 0 ≤ φ ≤ π [m]; the other flank is its mirror image about y = 0.

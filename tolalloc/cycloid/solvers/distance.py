@@ -7,25 +7,30 @@ import numpy as np
 from tolalloc.compiled import jit, parallel_jit, prange
 
 # Fields of a design, `tolalloc.cycloid.clearance` fills them.
-CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, FIELDS = range(8)
+CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, FIELDS = range(10)
 
 _GRID = 384  # points of the scan over a tooth and a part of its neighbours
 _BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 
 @jit
+def _point(design, t):
+    """Return x and y of the profile at parameter t, before its flanks are turned."""
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+    ratio = design[GROUND_PIN] / np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    # In the frame that turns with the pin, then in the disc's.
+    u = design[GROUND_CIRCLE] - design[ECCENTRICITY] * c + ratio * (shortening * c - 1.0)
+    v = design[ECCENTRICITY] * s - ratio * shortening * s
+    return u * np.cos(small) + v * np.sin(small), v * np.cos(small) - u * np.sin(small)
+
+
+@jit
 def _scan(design, x, y):
     """Fill points of the profile on equally spaced parameters; return the first one and their distance."""
-    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
     first, step = -np.pi - _BEYOND, 2.0 * (np.pi + _BEYOND) / (_GRID - 1)
     for i in range(_GRID):
-        t = first + i * step
-        small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
-        ratio = design[GROUND_PIN] / np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
-        u = design[GROUND_CIRCLE] - design[ECCENTRICITY] * c + ratio * (shortening * c - 1.0)
-        v = design[ECCENTRICITY] * s - ratio * shortening * s
-        x[i] = u * np.cos(small) + v * np.sin(small)
-        y[i] = v * np.cos(small) - u * np.sin(small)
+        x[i], y[i] = _point(design, first + i * step)
     return first, step
 
 
@@ -82,15 +87,20 @@ def _distance(design, t, px, py):
 
 @jit
 def _nearest(design, x, y, first, step, px, py):
-    """Return the smallest distance of P from the profile."""
-    best, before, here = np.inf, -1.0, np.inf
+    """Return the smallest distance of P from the whole profile, or from the flank between its edges if it is turned."""
+    best, before, here, turned = np.inf, -1.0, np.inf, design[ROTATION] > 0.0
     for i in range(_GRID):
         dx, dy = px - x[i], py - y[i]
         after = dx * dx + dy * dy
         if here <= before and here <= after:  # the scan's ends are never a place of nearest approach
             t = _foot(design, first + (i - 2) * step, first + i * step, px, py)
-            best = min(best, _distance(design, t, px, py))
+            if not turned or design[ROOT] <= t <= design[TIP]:
+                best = min(best, _distance(design, t, px, py))
         before, here = here, after
+    if turned:
+        for edge in range(2):
+            ex, ey = _point(design, design[ROOT + edge])
+            best = min(best, np.sqrt((px - ex) * (px - ex) + (py - ey) * (py - ey)))
     return best
 
 
@@ -98,20 +108,25 @@ def _nearest(design, x, y, first, step, px, py):
 def design_clearances(design, pin_angle, turned, clearance):
     """Fill the clearances [m] of pins at exact places on a turned disc, [pin].
 
-    ``turned`` are the rotations of the disc, one for each pin. A tooth with rotation modification is what two profiles
-    turned either way leave.
+    ``turned`` are the rotations of the disc, one for each pin. Flanks turned by a positive rotation modification leave
+    what both positions of the profile have in common: nearest is a flank, its mirror image across the root or across
+    the tooth, or an edge between them. A negative one leaves all that either position has.
     """
     x, y = np.empty(_GRID), np.empty(_GRID)
     first, step = _scan(design, x, y)
-    teeth, turns = design[TEETH], (design[TEETH] + 1.0) / design[TEETH]
-    sides = 2 if design[ROTATION] != 0.0 else 1
+    teeth, turns, rotation = design[TEETH], (design[TEETH] + 1.0) / design[TEETH], design[ROTATION]
+    c, s = np.cos(rotation), np.sin(rotation)
+    whole_c, whole_s = np.cos(rotation - 2.0 * np.pi / teeth), np.sin(rotation - 2.0 * np.pi / teeth)
     for k in range(pin_angle.size):
-        a, own = pin_angle[k], -np.inf
-        for side in range(sides):
-            by = (1.0 - 2.0 * side) * design[ROTATION] - turned[k]
-            px = design[CIRCLE] * np.cos(by - a / teeth) - design[ECCENTRICITY] * np.cos(by - a * turns)
-            py = design[CIRCLE] * np.sin(by - a / teeth) - design[ECCENTRICITY] * np.sin(by - a * turns)
-            own = max(own, _nearest(design, x, y, first, step, px, py))
+        a = pin_angle[k]
+        px = design[CIRCLE] * np.cos(a / teeth + turned[k]) - design[ECCENTRICITY] * np.cos(a * turns + turned[k])
+        py = design[ECCENTRICITY] * np.sin(a * turns + turned[k]) - design[CIRCLE] * np.sin(a / teeth + turned[k])
+        own = _nearest(design, x, y, first, step, px * c - py * s, px * s + py * c)
+        if rotation != 0.0:
+            own = min(own, _nearest(design, x, y, first, step, px * c + py * s, px * s - py * c))
+        if rotation > 0.0:
+            qx, qy = px * whole_c + py * whole_s, px * whole_s - py * whole_c
+            own = min(own, _nearest(design, x, y, first, step, qx, qy))
         clearance[k] = own - design[PIN]
 
 
