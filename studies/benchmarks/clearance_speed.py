@@ -10,10 +10,11 @@ teeth of random modifications, on all cores:
   fastest: threads, which share the memory (NumPy works without the interpreter's lock), or processes;
 * (c) the machine's bound, below.
 
-(a) scans a tooth and parts of its neighbours for every pin and refines each place of nearest approach, so it finds the
-nearest of several. (b) knows that amounts of micrometres leave the foot next to the pin's own angle and starts there;
-it stops when no foot of a block moves by more than 1e-6 rad, after which the distance changes by 1e-19 m. It needs no
-scan, which is an advantage that it is given: the answers are the same, and they are compared.
+(a) starts next to the pin's own angle where the pin is so close to its path that no other place can be as near, and
+scans a tooth and parts of its neighbours elsewhere, at the root above all. (b) knows that amounts of micrometres leave
+the foot next to the pin's own angle and starts there always; it stops when no foot of a block moves by more than
+1e-6 rad, after which the distance changes by 1e-19 m. It needs no scan, which is an advantage that it is given: the
+answers are the same, and they are compared.
 
 **The least flops of a distance.** However the foot is found, it is verified once: there (P − w)·w′ = 0, with P the pin
 and w the path of the grinding pin's centre, and the same numbers give the distance. In the frame that turns with the

@@ -146,7 +146,7 @@ def test_many_profiles_at_once_are_each_alone(generator):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_flanks_turned_towards_the_middle_of_their_tooth(seed):
-    """Away from root and tip, whose edges have a test of their own."""
+    """All around, the edges at root and tip included."""
     generator = np.random.default_rng([5, seed])
     stage = random_cycloid_stage(generator)
     amounts = Modification(
@@ -155,6 +155,7 @@ def test_flanks_turned_towards_the_middle_of_their_tooth(seed):
         rotation=generator.uniform(1, 50) * MICROMETRE / stage.disc_pitch_radius,
     )
     pins = generator.uniform(45, 160, 12) * DEGREE * generator.choice([-1, 1], 12)
+    pins = np.concatenate([pins, [0.0, 1e-3, 0.03, 0.2, 3.0, 3.14, np.pi]])
     profile = ToothProfile(stage=stage, modification=amounts)
     expected = searched_between(stage, amounts, pins)
     np.testing.assert_allclose(exact_clearance([profile], pins)[0], expected, rtol=0, atol=NANOMETRE_MILLIONTH)
@@ -257,7 +258,7 @@ def test_what_is_asked_for_is_delivered_and_nothing_overlaps(mode, seed):
         after = measured(stage, amounts, pins, direction * closing)
         assert (after > -allowed).all()
     # The first contact is where the flank clearance was asked for, if the flank is the narrowest place for a rotation.
-    if amounts.equidistant * stage.flank_ratio >= amounts.shift and not amounts.rotation:
+    if amounts.equidistant * stage.flank_ratio >= amounts.shift and radial > 0:
         assert closing == pytest.approx(flank / stage.disc_pitch_radius, rel=1e-9)
         at_flank = measured(stage, amounts, special[[1]], closing)
         assert np.abs(at_flank) < second_order(stage, amounts, closing, special[[1]])
@@ -306,6 +307,28 @@ def test_flanks_turned_away_from_the_middle_of_their_tooth():
     profile = ToothProfile(stage=stage, modification=amounts)
     require_sound(profile, "mine")
     assert clearance_of(profile, exact=True).rotation == pytest.approx(clearance_of(profile, False).rotation, rel=0.01)
+
+
+@pytest.mark.xfail(reason="no clearance at root and tip is taken for a disc that cannot turn")
+def test_backlash_of_turned_flanks_alone():
+    """Every pin of a flank touches when the disc has turned by δ; those at root and tip, which have no lever, do not."""
+    stage, turned = load_reducer("rv40e").cycloid_stage, 1e-4
+    profile = ToothProfile(stage=stage, modification=Modification(equidistant=0.0, shift=0.0, rotation=turned))
+    assert clearance_of(profile, exact=False).backlash == pytest.approx(2 * turned, rel=1e-9)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_backlash_of_turned_flanks_with_clearance_at_the_root(exact):
+    """The ridge between two positions of a root is 9.5 µm high here; 10 µm all around leave room for it."""
+    stage = load_reducer("rv40e").cycloid_stage
+    amounts = Modification(equidistant=10e-6, shift=0.0, rotation=200e-6 / stage.disc_pitch_radius)
+    found = clearance_of(ToothProfile(stage=stage, modification=amounts), exact=exact)
+    assert found.backlash * stage.disc_pitch_radius == pytest.approx(420e-6, abs=0.1e-6)
+    around = np.concatenate([[found.first_contact], found.pin_angle])
+    if exact:
+        after = searched_between(stage, amounts, around, found.rotation)
+        assert abs(after[0]) < NANOMETRE_MILLIONTH
+        assert after.min() > -NANOMETRE_MILLIONTH
 
 
 def test_conventions_of_the_sources():

@@ -98,13 +98,14 @@ def exact_clearance(
         row[:] = (
             stage.pin_circle_radius, stage.pin_radius, stage.eccentricity, stage.disc_teeth,
             ground.pin_circle_radius, ground.pin_radius, profile.modification.rotation,
-            *profile.edges,
+            *profile.edges, 1 / ground.smallest_convex_radius,
         )  # fmt: skip
     turned = np.ascontiguousarray(np.broadcast_to(rotation, clearance.shape), float)
+    angle = np.ascontiguousarray(np.remainder(pin_angle + pi, 2 * pi) - pi)
     if len(profiles) == 1:  # waking the threads would take longer
-        design_clearances(designs[0], np.ascontiguousarray(pin_angle), turned[0], clearance[0])
+        design_clearances(designs[0], angle, turned[0], clearance[0])
     else:
-        pin_clearances(designs, np.ascontiguousarray(pin_angle), turned, clearance)
+        pin_clearances(designs, angle, turned, clearance)
     return clearance
 
 

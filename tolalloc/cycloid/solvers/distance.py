@@ -7,9 +7,10 @@ import numpy as np
 from tolalloc.compiled import jit, parallel_jit, prange
 
 # Fields of a design, `tolalloc.cycloid.clearance` fills them.
-CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, FIELDS = range(10)
+CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
 
 _GRID = 384  # points of the scan over a tooth and a part of its neighbours
+_NEAR = 0.3  # distance from the path over its radius, and slip along it [rad], up to which the nearest point is plain
 _BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 
@@ -105,6 +106,48 @@ def _nearest(design, x, y, first, step, px, py):
 
 
 @jit
+def _largest_bend(design, angle, convex):
+    """Return the largest curvature of the grinding pin's path from an angle away from the root [1/m].
+
+    The path bends most at the root and less and less up to the inflection; beyond, ``convex`` is its largest.
+    """
+    pins = design[TEETH] + 1.0
+    shortening = design[ECCENTRICITY] * pins / design[GROUND_CIRCLE]
+    c = np.cos(angle)
+    s = 1.0 + shortening * shortening - 2.0 * shortening * c
+    bend = shortening * (1.0 + pins) * c - 1.0 - pins * shortening * shortening
+    return max(bend / (design[GROUND_CIRCLE] * s * np.sqrt(s)), convex)
+
+
+@jit
+def _near(design, convex, angle, px, py):
+    """Return the distance of P from the profile next to an angle; nan where another place could be as near.
+
+    Around P, which is off the path by much less than the path's radius, the path has one nearest point. Newton's method
+    finds it; a step below a microradian leaves an error that the distance does not feel.
+    """
+    small, c, s = angle / design[TEETH], np.cos(angle), np.sin(angle)
+    cs, ss = np.cos(small), np.sin(small)
+    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
+    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    off = np.sqrt(u * u + v * v)
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    slip = off * design[TEETH] / (design[GROUND_CIRCLE] * root)
+    inner = max(abs(angle) - 2.0 * slip, 0.0)
+    if slip > _NEAR or off * _largest_bend(design, inner, convex) > _NEAR:
+        return np.nan
+    t = angle
+    for _ in range(12):
+        f, slope = _slope(design, t, px, py)
+        change = f / slope
+        t -= change
+        if abs(change) < 1e-6:
+            return _distance(design, t, px, py)
+    return np.nan
+
+
+@jit
 def design_clearances(design, pin_angle, turned, clearance):
     """Fill the clearances [m] of pins at exact places on a turned disc, [pin].
 
@@ -113,7 +156,7 @@ def design_clearances(design, pin_angle, turned, clearance):
     the tooth, or an edge between them. A negative one leaves all that either position has.
     """
     x, y = np.empty(_GRID), np.empty(_GRID)
-    first, step = _scan(design, x, y)
+    first, step, scanned = 0.0, 0.0, False
     teeth, turns, rotation = design[TEETH], (design[TEETH] + 1.0) / design[TEETH], design[ROTATION]
     c, s = np.cos(rotation), np.sin(rotation)
     whole_c, whole_s = np.cos(rotation - 2.0 * np.pi / teeth), np.sin(rotation - 2.0 * np.pi / teeth)
@@ -121,6 +164,15 @@ def design_clearances(design, pin_angle, turned, clearance):
         a = pin_angle[k]
         px = design[CIRCLE] * np.cos(a / teeth + turned[k]) - design[ECCENTRICITY] * np.cos(a * turns + turned[k])
         py = design[ECCENTRICITY] * np.sin(a * turns + turned[k]) - design[CIRCLE] * np.sin(a / teeth + turned[k])
+        own = np.nan
+        if rotation == 0.0:
+            own = _near(design, design[BEND], a, px, py)
+            if own == own:
+                clearance[k] = own - design[PIN]
+                continue
+        if not scanned:
+            first, step = _scan(design, x, y)
+            scanned = True
         own = _nearest(design, x, y, first, step, px * c - py * s, px * s + py * c)
         if rotation != 0.0:
             own = min(own, _nearest(design, x, y, first, step, px * c + py * s, px * s - py * c))
