@@ -27,6 +27,9 @@ LARGE = 50 * MICROMETRE
 FLANK = np.linspace(0.0, pi, 721)
 """Angles φ at which the clearance of a flank is tabulated [rad]."""
 
+_TURNED = FLANK[4:-4]
+"""The same without the pins within 1° of root and tip, whose clearance a rotation of the disc does not close [rad]."""
+
 
 def is_large(stage: CycloidStage, modification: Modification) -> bool:
     """Return whether the modification is too large for the linear formula."""
@@ -170,17 +173,17 @@ class Clearance:
         return float(np.abs(self.formula - self.after).max())
 
 
-def _narrowest(gap: Gap, rotation: float) -> tuple[float, float]:
+def _narrowest(gap: Gap, rotation: float, angles: Angles = FLANK) -> tuple[float, float]:
     """Return the angle of the pin with the smallest clearance on a rotated disc, and that clearance [rad, m]."""
-    gaps = gap(FLANK, rotation)
+    gaps = gap(angles, rotation)
     at = int(np.argmin(gaps))
     found = minimize_scalar(
         lambda angle: gap(np.array([angle]), rotation)[0],
-        bounds=(FLANK[max(at - 1, 0)], FLANK[min(at + 1, FLANK.size - 1)]),
+        bounds=(angles[max(at - 1, 0)], angles[min(at + 1, angles.size - 1)]),
         method="bounded",
         options={"xatol": 1e-10},
     )
-    return (float(found.x), float(found.fun)) if found.fun < gaps[at] else (float(FLANK[at]), float(gaps[at]))
+    return (float(found.x), float(found.fun)) if found.fun < gaps[at] else (float(angles[at]), float(gaps[at]))
 
 
 def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
@@ -208,18 +211,19 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
             "allowed is a clearance of 0 or more at every pin."
         )
     one_sided = max(gap(FLANK, 0.0).max(), MICROMETRE) / stage.disc_pitch_radius
-    while _narrowest(gap, one_sided)[1] > 0:
+    while _narrowest(gap, one_sided, _TURNED)[1] > 0:
         one_sided *= 2
-    rotation = 0.0
-    if narrowest > _ROUNDING:
-        rotation = float(brentq(lambda by: _narrowest(gap, by)[1], 0.0, one_sided, xtol=1e-15, rtol=1e-12))
+    rotation, first_contact = 0.0, _narrowest(gap, 0.0, _TURNED)
+    if first_contact[1] > _ROUNDING:
+        rotation = float(brentq(lambda by: _narrowest(gap, by, _TURNED)[1], 0.0, one_sided, xtol=1e-15, rtol=1e-12))
+        first_contact = _narrowest(gap, rotation, _TURNED)
     return Clearance(
         pin_angle=FLANK,
         before=gap(FLANK, 0.0),
         after=gap(FLANK, rotation),
         formula=formula_gap(stage, modification, FLANK),
         rotation=rotation,
-        first_contact=_narrowest(gap, rotation)[0],
+        first_contact=first_contact[0],
         radial=modification.radial_clearance,
         exact=exact,
     )

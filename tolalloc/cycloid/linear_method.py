@@ -85,7 +85,7 @@ def _iterated(
     """Return the deflections that are the approach under their own largest force [m], and the steps it took.
 
     The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
-    middle of what brackets the answer where that mean leaves it.
+    middle of what brackets the answer where that mean leaves it and at every third step, as the mean may creep.
     """
     low, high = nearest, np.full(nearest.size, np.inf)
     lever = discs.reducer.cycloid_stage.disc_pitch_radius
@@ -95,8 +95,8 @@ def _iterated(
         if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
             return depth, step
         low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
-        mean = 0.5 * (depth + wanted)
-        depth = np.where((low < mean) & (mean < high), mean, 0.5 * (low + np.minimum(high, 4 * depth)))
+        mean, middle = 0.5 * (depth + wanted), 0.5 * (low + np.minimum(high, 4 * depth))
+        depth = np.where((low < mean) & (mean < high) & (step % 3 != 0), mean, middle)
     raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
 
 
