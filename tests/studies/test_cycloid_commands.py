@@ -111,6 +111,16 @@ def test_nothing_is_overwritten(tmp_path):
     refused(tolalloc("contact", "--out", tmp_path), "not empty")
 
 
+def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
+    path = reducer_with(tmp_path, ("equidistant_um = -2", "equidistant_um = 80"), ("shift_um = 8", "shift_um = -50"))
+    result = tolalloc("te", "--reducer", path, "--json")
+    assert result.returncode == 0, result.stderr
+    assert "above 50 µm" in json.loads(result.stdout)["warnings"][0]
+    exact = json.loads(tolalloc("contact", "--reducer", path, "--json").stdout)
+    assert exact["profile"]["distances"] == "exact"
+    assert "exact distances were taken" in exact["warnings"][0]
+
+
 @pytest.mark.parametrize("study", ["xi2015_contact", "song2019_modification", "li2018_modification"])
 def test_studies_of_the_cycloid_stage(study, tmp_path):
     script, folder = ROOT / "studies" / f"{study}.py", tmp_path / "run"

@@ -125,6 +125,8 @@ def te(
         sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
     else:
         screen.print(as_table(answer))
+        for warning in answer["warnings"]:
+            screen.print(warning, style="yellow", markup=False)
         if attributed:
             screen.print(attribution_table(answer))
 

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from rich.markup import escape
 from rich.table import Table
 
+from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.equivalent.attribution import attribute
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, LOOP_ASSUMPTION, both_directions, hysteresis_loop
 from tolalloc.equivalent.kinematics import HARMONICS
@@ -51,6 +52,7 @@ def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float, attributed: bo
         "angles": {"equally_spaced": model.search.coarse, "solved_in_all": int(extremes.solves[0])},
         "largest_residual_of_largest_force": float(extremes.residual[0]),
         "statuses": dict(count_statuses(equilibria.status)),
+        "warnings": list(linear_model_warnings(reducer.cycloid_stage, reducer.modification)),
         "assumptions": [*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION],
     }
     if attributed:

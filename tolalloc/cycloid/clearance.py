@@ -37,6 +37,16 @@ def is_large(stage: CycloidStage, modification: Modification) -> bool:
     return max(abs(amount) for amount in amounts) > LARGE
 
 
+def linear_model_warnings(stage: CycloidStage, modification: Modification) -> tuple[str, ...]:
+    """Return what a reader of a model with linear gaps must know of a modification, if anything."""
+    if not is_large(stage, modification):
+        return ()
+    return (
+        f"The modification is above {LARGE / MICROMETRE:g} µm, where the linear gaps of the equivalent model are no "
+        "longer good to 0.3 µm; tolalloc contact takes exact distances.",
+    )
+
+
 def linear_clearance(
     stage: CycloidStage, modification: Modification, pin_angle: Angles
 ) -> Float[np.ndarray, "*angles"]:

@@ -8,6 +8,7 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import Requirement
 from tolalloc.cycloid.assessment import Assessment
+from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.equivalent.answers import Equilibria
 from tolalloc.equivalent.outputs import Orders
 from tolalloc.reducer.design import Reducer
@@ -148,6 +149,8 @@ class StudyResults:
             for when, contact in zip(("before", "after"), self.contacts, strict=True)
             if contact is None
         ]
+        stage, amounts = self.reducer.cycloid_stage, self.space.modification(chosen.design)
+        found += linear_model_warnings(stage, amounts)
         if self.sobol.dropped:
             found.append(f"{self.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")
         failed = sum(count for outcome, count in self.statuses.items() if outcome != "equilibrium found")
