@@ -38,8 +38,8 @@ class ModificationResults:
         What the optimum does on the reducer.
     seed
         First seed of each algorithm [-].
-    warnings
-        What the method itself must warn of.
+    warnings, assumptions
+        What the method itself must warn of, and what its source does not print.
     """
 
     method: str
@@ -50,6 +50,7 @@ class ModificationResults:
     assessment: Assessment
     seed: int
     warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
 
 _NONE = 1e-11  # clearance that counts as none [m]
@@ -177,6 +178,7 @@ def summary(results: ModificationResults) -> dict[str, Any]:
         ],
         "contact": contact_tables.summary(results.assessment),
         "warnings": [*results.warnings, *results.assessment.warnings],
+        "assumptions": list(results.assumptions),
     }
 
 
@@ -203,7 +205,7 @@ def modification_document(results: ModificationResults, *more: Section) -> Docum
         answer=answer(results),
         warnings=(*results.warnings, *found.warnings),
         sections=(choice_section(results), *more, *contact_sections(found)),
-        assumptions=found.assumptions,
+        assumptions=(*results.assumptions, *found.assumptions),
         summary=summary(results),
         seed=results.seed,
     )

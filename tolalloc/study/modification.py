@@ -22,6 +22,19 @@ from tolalloc.units import ARCMINUTE, MICROMETRE
 
 METHODS = ("song2019", "li2018")
 
+ASSUMPTIONS = {
+    "song2019": (
+        "song2019 prints no box, generations or care for bounds: 0…1 mm, 0…±1 mm, 400 generations, pymoo's repair",
+        "song2019's condition Δr_rp − |Δr_p| > 0 is none for a negative shift; Δr_rp − Δr_p keeps the radial clearance",
+    ),
+    "li2018": (
+        "li2018's formulas are lost: least mean gap, radial clearance kept, no interference, is a well-posed reading",
+        "work interval 25…100° in 100 steps, amounts 0…100 µm: li2018 prints none",
+        "li2018's algorithm: crossover 0.8, best fitness twice the mean, penalty and extrapolation by SUMT: unprinted",
+    ),
+}
+"""What the methods' sources do not print."""
+
 Searcher = Callable[[ModificationProblem, int], SearchResult]
 
 
@@ -142,6 +155,7 @@ def choose(study: ModificationStudy, reducer: Reducer, torque: float, progress: 
         assessment=assess(replace(reducer, modification=best.modification), torque),
         seed=study.seed,
         warnings=_warnings(study, reducer),
+        assumptions=(*ASSUMPTIONS[study.method], "sizes of the genetic algorithm and of CMA-ES: ours"),
     )
 
 
