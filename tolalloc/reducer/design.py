@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, pi, sqrt
+from math import cos, sqrt
 
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
@@ -82,11 +82,6 @@ class CycloidStage:
         cosine = max((2 - pins + shortening**2 * (2 * pins - 1)) / (shortening * (1 + pins)), -1.0)
         bend = 1 + pins * shortening**2 - shortening * (1 + pins) * cosine
         return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
-
-    @property
-    def largest_pin_radius(self) -> float:
-        """Pin radius from which neighbouring pins overlap or the teeth are undercut [m]."""
-        return min(self.pin_circle_radius * pi / self.pin_count, self.smallest_convex_radius)
 
 
 SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
