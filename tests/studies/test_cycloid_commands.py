@@ -109,6 +109,9 @@ def test_nothing_is_overwritten(tmp_path):
     assert file.read_text(encoding="utf-8") == "mine"
     assert not (tmp_path / "report").exists()
     refused(tolalloc("contact", "--out", tmp_path), "not empty")
+    refused(tolalloc("contact", "--profile", tmp_path / "new.csv", "--points", "7", "--out", tmp_path / "report"), "7")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["disc.csv"]
+    refused(tolalloc("modify", "li2018", "--profile", file), "exists")
 
 
 def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
@@ -147,7 +150,8 @@ def test_modify_li2018_gives_the_closed_form():
     ("arguments", "words"),
     [
         (["li2017"], ["li2017", "li2018"]),
-        (["li2018", "--radial", "500"], ["meet the constraints", "radial clearance"]),
+        (["li2018", "--radial", "500"], ["meet the constraints", "0…100 µm", "radial clearance"]),
+        (["li2018", "--radial", "-5"], ["radial clearance", "-5 µm", "0 to 1000 µm"]),
         (["song2019", "--rotation", "0.5"], ["rotation", "0.5"]),
         (["song2019", "--metric", "far"], ["far", "nearest"]),
         (["song2019", "--seeds", "0"], ["seeds", "1 to 1000"]),

@@ -150,6 +150,7 @@ def contact(
     as_json: AsJson = False,
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
+    _require_writable(out, profile, points)
     design = asked_reducer(load_reducer(reducer), width, support)
     announce_compilation("cycloid")
     found = contact_answer(design, torque, law, exact, phases)
@@ -199,6 +200,7 @@ def modify(
         seeds=seeds,
         seed=seed,
     )
+    _require_writable(out, profile, points)
     design = load_reducer(reducer)
     asked = design.torque_on_carrier(design.load.rated_torque if torque is None else torque, "tolalloc modify")
     announce_compilation("cycloid")
@@ -224,13 +226,22 @@ def _say(document: Document) -> None:
         screen.print(warning, style="yellow", markup=False)
 
 
-def _write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
-    """Write the report and the profile that were asked for, both checked before either is written."""
-    from tolalloc.cli.document_script import written
-    from tolalloc.report.profile_files import require_profile_file, write_profile
+def _require_writable(out: Path | None, file: Path | None, points: int) -> None:
+    """Refuse a report or a profile that could not be written, before anything long runs."""
+    from tolalloc.report.profile_files import require_profile_file
+    from tolalloc.study.run_folder import require_usable
 
+    if out:
+        require_usable(out)
     if file:
-        require_profile_file(file)
+        require_profile_file(file, points)
+
+
+def _write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
+    """Write the report and the profile that were asked for."""
+    from tolalloc.cli.document_script import written
+    from tolalloc.report.profile_files import write_profile
+
     if out:
         written(out, lambda: document)
     if file:

@@ -58,6 +58,18 @@ def _chord_error(profile: ToothProfile, angle: Float[np.ndarray, " point"]) -> f
     return float(np.abs(offset[..., 0] * along[:, 1:] - offset[..., 1] * along[:, :1]).max())
 
 
+def require_points(per_tooth: int) -> None:
+    """Raise unless a drawing can use so many points per tooth.
+
+    Raises
+    ------
+    InputError
+        Too few, too many, or an odd number.
+    """
+    if not FEWEST <= per_tooth <= MOST or per_tooth % 2:
+        raise InputError.at("profile", "points per tooth", per_tooth, f"an even number from {FEWEST} to {MOST}")
+
+
 def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
     """Return the points of a whole disc.
 
@@ -73,8 +85,7 @@ def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
     InputError
         A number of points that no drawing can use.
     """
-    if not FEWEST <= per_tooth <= MOST or per_tooth % 2:
-        raise InputError.at("profile", "points per tooth", per_tooth, f"an even number from {FEWEST} to {MOST}")
+    require_points(per_tooth)
     angle = _flank_angles(profile, per_tooth // 2 + 1)
     flank = profile.points(angle)
     mirrored = flank[::-1] * (1.0, -1.0)

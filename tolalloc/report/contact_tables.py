@@ -79,8 +79,10 @@ def profile_table(found: Assessment) -> pd.DataFrame:
     return pd.DataFrame({"quantity": profile_summary(found).keys(), "value": profile_summary(found).values()})
 
 
-def _span(low: float, high: float) -> str:
-    return f"{low:.4g}…{high:.4g}" if f"{low:.4g}" != f"{high:.4g}" else f"{low:.4g}"
+def span(low: float, high: float) -> str:
+    """Return a range of numbers as text, one number where both ends are alike."""
+    first, last = f"{low:.5g}", f"{high:.5g}"
+    return first if first == last else f"{first}…{last}"
 
 
 def contact_table(found: Assessment) -> pd.DataFrame:
@@ -95,8 +97,8 @@ def contact_table(found: Assessment) -> pd.DataFrame:
         pins = own["share of phases with so many pins in contact [-]"]
         columns[title] = {
             "torque [N·m]": f"{float(contact.torque[0].sum()):.4g}",
-            "deflection over the phases [µm]": _span(*own["deflection over the phases [µm]"]),
-            "loaded zone [deg]": _span(*own["loaded zone [deg]"]),
+            "deflection over the phases [µm]": span(*own["deflection over the phases [µm]"]),
+            "loaded zone [deg]": span(*own["loaded zone [deg]"]),
             "pins in contact on a disc, share of phases": ", ".join(f"{pin}: {at:.1%}" for pin, at in pins.items()),
             "largest pin force [N], at [deg]": f"{own['largest pin force [N]']:.1f}, "
             f"{own['largest pin force at [deg]']:.1f}",
@@ -131,7 +133,7 @@ def answer(found: Assessment) -> tuple[str, ...]:
         f"Backlash {found.clearance.backlash / ARCMINUTE:.2f} arcmin, radial clearance "
         f"{found.clearance.radial / MICROMETRE:.1f} µm; the first pin touches at "
         f"{found.clearance.first_contact / DEGREE:.1f}°.",
-        f"At {found.torque:g} N·m {_span(pins.min(), pins.max())} pins of the more loaded disc carry, the most loaded "
+        f"At {found.torque:g} N·m {span(pins.min(), pins.max())} pins of the more loaded disc carry, the most loaded "
         f"one {single.force.max():.0f} N at {single.most_loaded / DEGREE:.0f}°, and the largest pressure is "
         f"{single.pressure.max() / MEGAPASCAL:.0f} MPa at {single.most_pressed / DEGREE:.0f}°.",
     )

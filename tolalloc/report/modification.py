@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 
 from tolalloc.allocation.modification.problem import ModificationProblem
 from tolalloc.allocation.modification.result import REACHED, SearchResult, Spread
@@ -56,9 +57,9 @@ class ModificationResults:
 _NONE = 1e-11  # clearance that counts as none [m]
 
 
-def _span(values: np.ndarray) -> str:
-    low, high = f"{values.min():.5g}", f"{values.max():.5g}"
-    return low if low == high else f"{low}…{high}"
+def _ends(lengths: Float[np.ndarray, " seed"]) -> tuple[float, float]:
+    """Return the smallest and the largest of lengths [µm]."""
+    return float(lengths.min() / MICROMETRE), float(lengths.max() / MICROMETRE)
 
 
 def algorithms_table(results: ModificationResults) -> pd.DataFrame:
@@ -84,9 +85,9 @@ def algorithms_table(results: ModificationResults) -> pd.DataFrame:
                 "seeds [-]": len(spread.results),
                 "reached it [-]": spread.share,
                 "polished [-]": polished,
-                "Δr_rp [µm]": _span(spread.amounts[:, 0] / MICROMETRE),
-                "Δr_p [µm]": _span(spread.amounts[:, 1] / MICROMETRE),
-                "objective [µm]": _span(objectives / MICROMETRE),
+                "Δr_rp [µm]": contact_tables.span(*_ends(spread.amounts[:, 0])),
+                "Δr_p [µm]": contact_tables.span(*_ends(spread.amounts[:, 1])),
+                "objective [µm]": contact_tables.span(*_ends(objectives)),
                 "evaluations [-]": int(np.median([result.evaluations for result in spread.results])),
             }
         )
@@ -161,6 +162,7 @@ def summary(results: ModificationResults) -> dict[str, Any]:
         "equidistant amount [µm]": best.amounts[0] / MICROMETRE,
         "shift amount [µm]": best.amounts[1] / MICROMETRE,
         "objective [µm]": best.objective / MICROMETRE,
+        "status": best.status,
         "violation [µm]": best.violation / MICROMETRE,
         "backlash [arcmin]": results.assessment.clearance.backlash / ARCMINUTE,
         "algorithms": [

@@ -10,7 +10,7 @@ from ezdxf import units
 from ezdxf.filemanagement import new
 
 from tolalloc.cycloid.clearance import linear_clearance
-from tolalloc.cycloid.profile_points import ProfilePoints, profile_points
+from tolalloc.cycloid.profile_points import ProfilePoints, profile_points, require_points
 from tolalloc.cycloid.tooth_profile import ToothProfile
 from tolalloc.exceptions import InputError
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
@@ -48,14 +48,22 @@ def _write_dxf(profile: ToothProfile, points: ProfilePoints, path: Path) -> None
 WRITERS = {".csv": _write_csv, ".dxf": _write_dxf}
 
 
-def require_profile_file(path: Path) -> None:
-    """Raise unless a profile can be written there.
+def require_profile_file(path: Path, per_tooth: int) -> None:
+    """Raise unless a profile of so many points per tooth can be written there.
+
+    Parameters
+    ----------
+    path
+        New file, ``.csv`` or ``.dxf``.
+    per_tooth
+        Points of one tooth [-].
 
     Raises
     ------
     InputError
-        An unknown kind of file, or one that exists.
+        An unknown kind of file, one that exists, or a number of points that no drawing can use.
     """
+    require_points(per_tooth)
     if path.suffix.lower() not in WRITERS:
         raise InputError.at("profile file", "ending", path.name, " or ".join(WRITERS))
     if path.exists():
@@ -79,9 +87,12 @@ def write_profile(profile: ToothProfile, per_tooth: int, path: Path) -> ProfileP
     Raises
     ------
     InputError
-        An unknown kind of file, one that exists, or a number of points that no drawing can use.
+        An unknown kind of file, one that exists or cannot be written, or a number of points that no drawing can use.
     """
-    require_profile_file(path)
+    require_profile_file(path, per_tooth)
     points = profile_points(profile, per_tooth)
-    WRITERS[path.suffix.lower()](profile, points, path)
+    try:
+        WRITERS[path.suffix.lower()](profile, points, path)
+    except OSError as error:
+        raise InputError(f"{path}: the profile cannot be written ({error.strerror}); name another file.") from None
     return points

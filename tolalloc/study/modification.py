@@ -80,7 +80,12 @@ class ModificationStudy:
         for name, value, good, allowed in (
             ("seeds", self.seeds, 1 <= self.seeds <= 1000, "1 to 1000"),
             ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
-            ("radial clearance [m]", self.radial_clearance, 0 <= self.radial_clearance <= 1e-3, "0 to 1 mm"),
+            (
+                "radial clearance",
+                f"{self.radial_clearance / MICROMETRE:g} µm",
+                0 <= self.radial_clearance <= 1e-3,
+                "0 to 1000 µm",
+            ),
         ):
             if not good:
                 raise InputError.at(place, name, value, allowed)
@@ -132,8 +137,12 @@ def choose(study: ModificationStudy, reducer: Reducer, torque: float, progress: 
     best = reference(problem)
     progress.advance(1)
     if best.violation > 0:
+        equidistant, shift = (
+            f"{low / MICROMETRE:g}…{high / MICROMETRE:g} µm"
+            for low, high in zip(problem.lower, problem.upper, strict=True)
+        )
         raise InputError(
-            f"{reducer.name}: no amounts from {problem.lower / MICROMETRE} to {problem.upper / MICROMETRE} µm meet the "
+            f"{reducer.name}: no equidistant amount of {equidistant} with a shift of {shift} will meet the "
             f"constraints; the nearest miss them by {best.violation / MICROMETRE:.3g} µm; "
             "allowed is less radial clearance."
         )
