@@ -32,11 +32,8 @@ reaches it; beside it stands (d), what two pairs of sine and cosine alone would 
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import platform
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
@@ -50,7 +47,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from jaxtyping import Float
-from kernel_speed import OVERRIDE, SEED, figures, product_rate, progress
+from kernel_speed import SEED, figures, product_rate, progress, run_benchmark
 from numpy_cores import CORES, timed
 
 from tolalloc.cycloid.clearance import exact_clearance
@@ -324,25 +321,12 @@ def table(found: dict[str, Any]) -> str:
     )
 
 
-def main() -> int:
-    """Run the benchmark; 1 if the distances disagree."""
-    parser = argparse.ArgumentParser(description="Speed of exact clearances against NumPy and the machine's bound.")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--designs", type=int, default=1000, help="random modifications per measurement")
-    parser.add_argument("--rounds", type=int, default=5, help="measurements of each")
-    options = parser.parse_args()
-    for name in ("designs", "rounds"):
-        if getattr(options, name) < 1:
-            parser.error(f"--{name} is {getattr(options, name)}; allowed is 1 or more.")
-    if OVERRIDE in os.environ:
-        # An override keeps the BLAS from this processor's own code: the matrix product would not be at its best.
-        progress(f"running without {OVERRIDE}={os.environ[OVERRIDE]}")
-        own = {name: value for name, value in os.environ.items() if name != OVERRIDE}
-        return subprocess.run([sys.executable, *sys.orig_argv[1:]], env=own, check=False).returncode
-    found = answer(options.designs, options.rounds)
-    print(json.dumps(found, indent=2) if options.json else table(found))
-    return 0 if found["agrees"] else 1
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(
+        run_benchmark(
+            "Speed of exact clearances against NumPy and the machine's bound.",
+            ("designs", 1000, "random modifications per measurement"),
+            answer,
+            table,
+        )
+    )

@@ -37,6 +37,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -218,25 +219,41 @@ def table(found: dict[str, Any]) -> str:
     )
 
 
-def main() -> int:
-    """Run the benchmark; 1 if the kernels disagree."""
-    parser = argparse.ArgumentParser(description="Speed of the compiled kernel against NumPy and the machine's bound.")
+def run_benchmark(
+    description: str,
+    counted: tuple[str, int, str],
+    answer: Callable[[int, int], dict[str, Any]],
+    table: Callable[[dict[str, Any]], str],
+) -> int:
+    """Run a benchmark with the options of all of them; 1 if its competitors disagree.
+
+    ``counted`` is the option that says how much is measured at a time, its default and its help.
+    """
+    name, default, explained = counted
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--samples", type=int, default=4096, help="random units per measurement")
+    parser.add_argument(f"--{name}", type=int, default=default, help=explained)
     parser.add_argument("--rounds", type=int, default=5, help="measurements of each")
-    options = parser.parse_args()
-    for name in ("samples", "rounds"):
-        if getattr(options, name) < 1:
-            parser.error(f"--{name} is {getattr(options, name)}; allowed is 1 or more.")
+    options = vars(parser.parse_args())
+    for count in (name, "rounds"):
+        if options[count] < 1:
+            parser.error(f"--{count} is {options[count]}; allowed is 1 or more.")
     if OVERRIDE in os.environ:
-        # An override keeps the BLAS from this processor's own code: neither (b) nor (c) would be at its best.
+        # An override keeps the BLAS from this processor's own code: no matrix product would be at its best.
         progress(f"running without {OVERRIDE}={os.environ[OVERRIDE]}")
-        own = {name: value for name, value in os.environ.items() if name != OVERRIDE}
+        own = {key: value for key, value in os.environ.items() if key != OVERRIDE}
         return subprocess.run([sys.executable, *sys.orig_argv[1:]], env=own, check=False).returncode
-    found = answer(options.samples, options.rounds)
-    print(json.dumps(found, indent=2) if options.json else table(found))
+    found = answer(options[name], options["rounds"])
+    print(json.dumps(found, indent=2) if options["json"] else table(found))
     return 0 if found["agrees"] else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(
+        run_benchmark(
+            "Speed of the compiled kernel against NumPy and the machine's bound.",
+            ("samples", 4096, "random units per measurement"),
+            answer,
+            table,
+        )
+    )
