@@ -59,7 +59,7 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     this unit: with other errors other pins carry, and a source's share changes. Under the logarithmic law the part that
     is not proportional is listed by itself.
     """
-    derivatives, whole = model.rotation_derivatives(errors, torque), model.equilibria(errors, torque)
+    curve, derivatives = model.rotation_derivatives(errors, torque)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}
     clearance = model.error_columns.matrix.T @ model.error_columns.map.nominal
     for source, values in ((source_name, errors[0]), (lambda _: CLEARANCE, clearance)):
@@ -68,7 +68,7 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
             parts[name] = parts.get(name, 0.0) + values[at] * derivatives.by_error[:, at]
     parts[TORQUE] = torque * derivatives.by_torque
     if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
-        parts[CURVATURE] = whole.transmission_error[0] - np.sum(list(parts.values()), axis=0)
+        parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)
     contribution = np.array(list(parts.values()))
     count = contribution.shape[1]
     waves = np.fft.rfft(contribution, axis=1)[:, 1 : (count + 1) // 2] * (2 / count)

@@ -89,7 +89,9 @@ class EquivalentModel:
         angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
         return angle, self.tables_at(angle)
 
-    def _given(self, errors: Float[np.ndarray, "sample column"], torque: float) -> tuple[Any, ...]:
+    def _given(
+        self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]
+    ) -> tuple[Any, ...]:
         """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
         columns = self.error_columns
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
@@ -198,29 +200,46 @@ class EquivalentModel:
         np.maximum(extremes.status, derivative.status, out=extremes.status)
         return extremes, self._derivatives(derivative)
 
-    def rotation_derivatives(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Derivatives:
-        """Return the exact derivatives of one sample's transmission error at every coarse angle of the search.
+    def rotation_derivatives(
+        self,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float | Float[np.ndarray, " sample"],
+        carrier_angle: Float[np.ndarray, " angle"] | None = None,
+    ) -> tuple[Float[np.ndarray, "sample angle"], Derivatives]:
+        """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
 
         Parameters
         ----------
         errors
             Deviations in the order of ``columns`` [m, angles rad].
         torque
-            Torque on the carrier; negative resists the rotation [N·m].
+            Torque on the carrier, one for all samples or one for each; negative resists the rotation [N·m].
+        carrier_angle
+            Carrier angles; the coarse angles of the search unless given [rad].
 
         Notes
         -----
         They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
         """
-        halving = self.search.halving
-        derivative = self._derivative(halving.coarse)
-        position = halving.first + halving.stride * np.arange(float(halving.coarse))
-        solve_rotation_derivatives(self._tables, *self._given(errors, torque), position, derivative)
-        return self._derivatives(derivative)
+        if carrier_angle is None:
+            halving, tables = self.search.halving, self._tables
+            position = halving.first + halving.stride * np.arange(float(halving.coarse))
+        else:
+            tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
+        samples = errors.shape[0]
+        derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
+        solve_rotation_derivatives(tables, *self._given(errors, np.ascontiguousarray(torques)), position, derivative)
+        derivative.rotation[derivative.status != CONVERGED] = np.nan
+        return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
+
+    def _padded(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+        """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""
+        return self.tables_at(carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)])
 
     def _derivative(self, items: int) -> Derivative:
-        rows = self._tables.row_stiffness.shape[1] + self._tables.play_stiffness.shape[1]
+        rows = max(rows.stop for rows in self.error_columns.rows_of_stiffness.values())
         return Derivative(
+            np.empty(items),
             np.empty((items, self.error_columns.layout.end)),
             np.empty((items, rows)),
             np.empty(items),

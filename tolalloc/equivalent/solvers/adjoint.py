@@ -28,6 +28,8 @@ class Derivative(NamedTuple):
 
     Parameters
     ----------
+    rotation
+        What is derived: the carrier rotation, for a peak-to-peak the weighted branches together [rad].
     by_value
         By every value of `tolalloc.equivalent.columns.Layout` [rad/m, rad/(N·m), rad/rad].
     by_row
@@ -38,6 +40,7 @@ class Derivative(NamedTuple):
         Worst outcome of the equilibria [-].
     """
 
+    rotation: Float[np.ndarray, " sample"]
     by_value: Float[np.ndarray, "sample value"]
     by_row: Float[np.ndarray, "sample row"]
     by_pin: Float[np.ndarray, " sample"]
@@ -138,9 +141,10 @@ def _add_derivative(position, factor, tables, layout, design, values, memory, de
     """Add factor times the derivatives of the carrier rotation at one position; return the equilibrium's status."""
     problem, work, _, carrier_by_kept = memory
     q, adjoint = np.zeros(work.step.size), np.empty(work.step.size)
-    _, status, _, _ = solve_between(position, tables, layout, design.face_width, values, q, memory)
+    rotation, status, _, _ = solve_between(position, tables, layout, design.face_width, values, q, memory)
     if status != CONVERGED:
         return status
+    derivative.rotation[s] += factor * rotation
     _adjoint(problem, work, carrier_by_kept, q, adjoint)
     weight_of_pin, tilt_by_pin = np.empty(problem.contact.size), np.empty(problem.contact.size)
     derivative.by_pin[s] += factor * _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin)
@@ -186,7 +190,8 @@ def _slope(position, step, tables, layout, design, values, memory, q):
 
 @jit
 def _clear(derivative, s, value):
-    derivative.by_value[s], derivative.by_row[s], derivative.by_pin[s] = value, value, value
+    derivative.rotation[s], derivative.by_pin[s] = value, value
+    derivative.by_value[s], derivative.by_row[s] = value, value
 
 
 @jit
@@ -214,10 +219,11 @@ def _of_rotation(s, tables, layout, mapped, design, errors, torque, position, de
     values = np.empty((1, layout.end))
     _clear(derivative, s, 0.0)
     derivative.status[s] = NOT_FINITE
-    if values_of(errors, torque, layout, mapped, values)[0]:
+    sample, angle = s // position.size, s % position.size
+    if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
         memory = make_memory(design.law, tables)
         derivative.status[s] = _add_derivative(
-            position[s], 1.0, tables, layout, design, values[0], memory, derivative, s
+            position[angle], 1.0, tables, layout, design, values[0], memory, derivative, s
         )
 
 
@@ -233,6 +239,9 @@ def solve_peak_to_peak_derivatives(tables, layout, mapped, design, errors, torqu
 
 @parallel_jit
 def solve_rotation_derivatives(tables, layout, mapped, design, errors, torque, position, derivative):
-    """Fill the derivatives of one sample's carrier rotation at every position, [position]."""
-    for s in prange(position.size):
+    """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
+
+    The derivatives stand in one row, sample by sample, and position by position within a sample.
+    """
+    for s in prange(errors.shape[0] * position.size):
         _of_rotation(np.int64(s), tables, layout, mapped, design, errors, torque, position, derivative)
