@@ -5,13 +5,16 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import pydantic
 
 from tolalloc.exceptions import InputError, UnknownNameError
 
 Model = TypeVar("Model", bound=pydantic.BaseModel)
+
+_NUMBER = "constrained-float"
+"""How pydantic calls the kind of a field that may be a number in a range or a record."""
 
 
 class Record(pydantic.BaseModel):
@@ -52,12 +55,20 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         return model.model_validate(data)
     except pydantic.ValidationError as error:
         # The check of a whole record can say more than the check of one field, so unknown fields come first.
-        problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+        # A field that is a number or a record fails as both; who wrote a record did not mean the number.
+        problems = sorted(
+            error.errors(),
+            key=lambda problem: (
+                problem["type"] != "extra_forbidden",
+                problem["loc"][-1:] == (_NUMBER,) and isinstance(problem["input"], Mapping),
+            ),
+        )
         problem = problems[0]
-        # A field that is a number or a record names the failing kind last; a reader knows the field alone.
-        field = ".".join(str(part) for part in problem["loc"] if part != "constrained-float")
+        # Such a field also names the failing kind; a reader knows the field alone.
+        place_in_file = tuple(part for part in problem["loc"] if part != _NUMBER and "Record" not in str(part))
+        field = ".".join(str(part) for part in place_in_file)
         if problem["type"] == "extra_forbidden":
-            known = _known_fields(model, problem["loc"])
+            known = _known_fields(model, place_in_file)
             raise UnknownNameError.among(place, "field", field, known) from None
         if problem["type"] == "missing":
             raise InputError(f"{place}: {field} is missing.") from None
@@ -74,10 +85,13 @@ def _known_fields(model: type[pydantic.BaseModel], location: tuple[int | str, ..
     """Return the dotted names of the fields beside an unknown one."""
     prefix = ""
     for part in location[:-1]:
-        inner = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
-        if not (isinstance(inner, type) and issubclass(inner, pydantic.BaseModel)):
+        kind = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
+        inner = [
+            one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, pydantic.BaseModel)
+        ]
+        if not inner:
             break
-        model, prefix = inner, f"{prefix}{part}."
+        model, prefix = inner[0], f"{prefix}{part}."
     return [prefix + name for name in model.model_fields]
 
 
@@ -98,3 +112,17 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
             raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
         return path
     raise UnknownNameError.among(f"shipped {what} files", "name", str(name), shipped)
+
+
+def require_new(path: Path) -> None:
+    """Refuse a file that is there already or whose folder is not, before anything long runs.
+
+    Raises
+    ------
+    InputError
+        The file cannot be made without losing another, or not at all.
+    """
+    if path.exists():
+        raise InputError(f"{path}: the file exists; allowed is a new one, so that nothing is overwritten.")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; allowed is a file in a folder that does.")

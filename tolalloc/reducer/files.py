@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from dataclasses import replace
-from math import inf, pi
+from math import pi
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
-from tolalloc.reducer.stiffness import (
-    TAPER_ANGLE,
-    IdentifiedStiffness,
-    Material,
-    Stiffness,
-    contact_modulus,
-    gear_mesh,
-    line_contact,
-    pin_bending,
-    roller_bearing,
-    shaft_support,
+from tolalloc.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
+from tolalloc.reducer.stiffness_records import (
+    IDENTIFIABLE,
+    BallRecord,
+    IdentifiedStiffnessRecord,
+    StiffnessRecord,
 )
 from tolalloc.units import DEGREE, GIGAPASCAL, MICROMETRE, MILLIMETRE
 
 PRESETS = Path(__file__).parent / "presets"
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
-NewtonPerMetre = Annotated[float, Field(ge=1e4, le=1e13)]
 
 
 class FirstStageRecord(Record):
@@ -91,76 +88,6 @@ class MaterialRecord(Record):
         return Material(elastic_modulus=self.elastic_modulus_gpa * GIGAPASCAL, poisson_ratio=self.poisson_ratio)
 
 
-class ShaftRecord(Record):
-    """Dimensions from which Table 2 of liu2020 gives the support of the sun."""
-
-    diameter_mm: Annotated[float, Field(gt=0, le=500)]
-    length_mm: Annotated[float, Field(gt=0, le=2000)]
-
-
-class BearingRecord(Record):
-    """Roller length times number of rollers, from which Table 2 of liu2020 gives a bearing's stiffness."""
-
-    loaded_length_mm: Annotated[float, Field(gt=0, le=10000)]
-
-
-class MeshRecord(Record):
-    """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness."""
-
-    contact_ratio: Annotated[float, Field(ge=1, le=4)]
-    sun_virtual_teeth: Annotated[float, Field(ge=5)]
-    planet_virtual_teeth: Annotated[float, Field(ge=5)]
-    face_width_mm: Annotated[float, Field(gt=0, le=500)]
-
-
-class StiffnessRecord(Record):
-    """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE*/2.
-
-    ``pin_span_mm`` is the distance of two supports between which the pins bend; without it they rest in half grooves.
-    """
-
-    sun_support: NewtonPerMetre | ShaftRecord
-    gear_mesh: NewtonPerMetre | MeshRecord
-    crank_disc_bearing: NewtonPerMetre | BearingRecord
-    crank_carrier_bearing: NewtonPerMetre | BearingRecord
-    carrier_bearing: NewtonPerMetre
-    pin_contact: NewtonPerMetre | None = None
-    pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
-    pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
-
-    def stiffness(self, disc: Material, pin: Material, stage: CycloidStage) -> Stiffness:
-        """Return all stiffnesses, given or by formula [N/m]."""
-        modulus, poisson = disc.elastic_modulus, disc.poisson_ratio
-        sun, mesh, journal, crank = (
-            self.sun_support,
-            self.gear_mesh,
-            self.crank_disc_bearing,
-            self.crank_carrier_bearing,
-        )
-        if isinstance(sun, ShaftRecord):
-            sun = shaft_support(sun.diameter_mm * MILLIMETRE, sun.length_mm * MILLIMETRE, modulus)
-        if isinstance(mesh, MeshRecord):
-            mesh = gear_mesh(
-                mesh.contact_ratio, mesh.sun_virtual_teeth, mesh.planet_virtual_teeth, mesh.face_width_mm * MILLIMETRE
-            )
-        if isinstance(journal, BearingRecord):
-            journal = roller_bearing(journal.loaded_length_mm * MILLIMETRE, modulus, poisson)
-        if isinstance(crank, BearingRecord):
-            crank = roller_bearing(crank.loaded_length_mm * MILLIMETRE, modulus, poisson, TAPER_ANGLE)
-        return Stiffness(
-            sun_support=sun,
-            gear_mesh=mesh,
-            crank_disc_bearing=journal,
-            crank_carrier_bearing=crank,
-            carrier_bearing=self.carrier_bearing,
-            pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
-            pin_contact_law=self.pin_contact_law,
-            pin_bending=inf
-            if self.pin_span_mm is None
-            else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
-        )
-
-
 class ClearancesRecord(Record):
     """Table ``[clearances]``, half the play; an interface that is not named has none."""
 
@@ -217,6 +144,12 @@ class ReducerRecord(Record):
     clearances: ClearancesRecord = ClearancesRecord()
     assumptions: tuple[str, ...] = ()
 
+    @model_validator(mode="after")
+    def _preload_is_carried(self) -> ReducerRecord:
+        if isinstance(self.stiffness.carrier_bearing, BallRecord):
+            self.stiffness.carrier_bearing.stiffness(self.material.material())
+        return self
+
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
         first, stage, disc = self.first_stage, self.cycloid_stage.stage(), self.material.material()
@@ -243,21 +176,6 @@ class ReducerRecord(Record):
         )
 
 
-class IdentifiedValue(Record):
-    """One stiffness and its standard uncertainty."""
-
-    value: NewtonPerMetre
-    standard_uncertainty: Annotated[float, Field(ge=0)]
-
-
-class IdentifiedStiffnessRecord(Record):
-    """A stiffness file."""
-
-    source: str
-    stiffness: dict[str, IdentifiedValue]
-    notes: tuple[str, ...] = ()
-
-
 def load_reducer(name: str | Path) -> Reducer:
     """Return a reducer by preset name or from the user's TOML file.
 
@@ -279,17 +197,63 @@ def load_identified_stiffness(name: str | Path) -> IdentifiedStiffness:
         The file, field and value that are not allowed.
     """
     path = shipped_or_path(name, PRESETS, ".stiffness.toml", "stiffness")
-    record = validated(IdentifiedStiffnessRecord, read_toml(path), path)
-    allowed = [field for field in StiffnessRecord.model_fields if field not in ("pin_contact_law", "pin_span_mm")]
+    return _identified(read_toml(path), path)
+
+
+def _identified(data: dict[str, Any], path: Path) -> IdentifiedStiffness:
+    """Return the identified stiffnesses of a file's content."""
+    record = validated(IdentifiedStiffnessRecord, data, path)
     for field in record.stiffness:
-        if field not in allowed:
-            raise InputError.at(path, "stiffness", field, "one of " + ", ".join(allowed))
+        if field not in IDENTIFIABLE:
+            raise InputError.at(path, "stiffness", field, "one of " + ", ".join(IDENTIFIABLE))
+    rows = np.eye(len(record.stiffness)).tolist() if record.correlation is None else record.correlation
     return IdentifiedStiffness(
         source=record.source,
         values={field: item.value for field, item in record.stiffness.items()},
         standard_uncertainty={field: item.standard_uncertainty for field, item in record.stiffness.items()},
+        correlation=checked_correlation(rows, tuple(record.stiffness), path),
         notes=record.notes,
     )
+
+
+def write_identified_stiffness(identified: IdentifiedStiffness, path: Path) -> None:
+    """Write a file that `load_identified_stiffness` reads back equal.
+
+    Parameters
+    ----------
+    identified
+        What to write.
+    path
+        New file.
+
+    Raises
+    ------
+    InputError
+        The file is there already or cannot be made, or a value could not be read back.
+    """
+    lines = [f"source = {_quoted(identified.source)}", "notes = ["]
+    lines += [f"  {_quoted(note)}," for note in identified.notes]
+    lines += ["]", "correlation = ["]
+    lines += [f"  {row}," for row in identified.correlation.tolist()]
+    lines += ["]"]
+    for field, value in identified.values.items():
+        uncertainty = identified.standard_uncertainty[field]
+        lines += ["", f"[stiffness.{field}]", f"value = {float(value)!r}"]
+        lines += [f"standard_uncertainty = {float(uncertainty)!r}"]
+    text = "\n".join(lines) + "\n"
+    _identified(tomllib.loads(text), path)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"{path}: the file exists; allowed is a new one, so that nothing is overwritten.") from None
+    except OSError as error:
+        raise InputError(f"{path}: the file cannot be made ({error.strerror}); name another.") from None
+
+
+def _quoted(text: str) -> str:
+    """Return a text as TOML writes it: JSON's escapes are TOML's, but for one character that JSON leaves as it is."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def with_stiffness(reducer: Reducer, identified: IdentifiedStiffness) -> Reducer:

@@ -1,12 +1,21 @@
-"""Stiffness of every interface: given values, or the empirical formulas of liu2020, Table 2."""
+"""Stiffness of every interface: values, how well they are known, and what pins are made of.
+
+The rows of liu2020's Table 2 for shaft, gears and bearings are in `tolalloc.reducer.table2`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf, pi, radians, sin
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from math import inf, pi
 
-TAPER_ANGLE = radians(80.0)
-"""Contact angle of the taper roller bearings that liu2020 puts into K_b [rad]."""
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError
+
+ROUNDING = 1e-9
+"""What a correlation may miss of symmetry, of 1 on its diagonal and of no negative eigenvalue [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +74,7 @@ def contact_modulus(first: Material, second: Material) -> float:
     return 1.0 / sum((1.0 - body.poisson_ratio**2) / body.elastic_modulus for body in (first, second))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class IdentifiedStiffness:
     """Stiffnesses found from measured units, with their standard uncertainty.
 
@@ -75,79 +84,95 @@ class IdentifiedStiffness:
         Where the values come from.
     values, standard_uncertainty
         Field of `Stiffness` → value and standard uncertainty [N/m].
+    correlation
+        Correlation of the values in their order; none of them is correlated unless given [-].
     notes
         What a reader must know before trusting the values.
+
+    Raises
+    ------
+    InputError
+        What is given is no correlation.
     """
 
     source: str
     values: dict[str, float]
     standard_uncertainty: dict[str, float]
+    correlation: Float[np.ndarray, "stiffness stiffness"] = field(default_factory=lambda: np.empty((0, 0)))
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        given = self.correlation if self.correlation.size else np.eye(len(self.values))
+        object.__setattr__(self, "correlation", checked_correlation(given, tuple(self.values), self.source))
 
-def shaft_support(diameter: float, length: float, elastic_modulus: float) -> float:
-    """Return K_s = 3π d⁴E/(64 l³), a simply supported shaft loaded at mid-span [N/m].
+    def __eq__(self, other: object) -> bool:
+        """Return whether everything is the same, the order of the stiffnesses included."""
+        return isinstance(other, IdentifiedStiffness) and self.content == other.content
 
-    Parameters
-    ----------
-    diameter, length
-        Shaft diameter and span [m].
-    elastic_modulus
-        Young's modulus [Pa].
+    @property
+    def content(self) -> tuple[object, ...]:
+        """Everything as numbers and names that compare and print in full."""
+        own = (getattr(self, item.name) for item in fields(self))
+        return tuple(
+            value.tolist()
+            if isinstance(value, np.ndarray)
+            else list(value.items())
+            if isinstance(value, dict)
+            else value
+            for value in own
+        )
 
-    References
-    ----------
-    liu2020, Table 2.
-    """
-    return 3.0 * pi * diameter**4 * elastic_modulus / (64.0 * length**3)
-
-
-def roller_bearing(
-    loaded_length: float, elastic_modulus: float, poisson_ratio: float, contact_angle: float = radians(90.0)
-) -> float:
-    """Return K_pd = π(l·n)E/(8(1−µ²)), or K_b with the taper's contact angle of 80° [N/m].
-
-    Parameters
-    ----------
-    loaded_length
-        Roller length times number of rollers, l·n [m].
-    elastic_modulus
-        Young's modulus [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
-    contact_angle
-        Angle whose sine divides the stiffness [rad].
-
-    References
-    ----------
-    liu2020, Table 2.
-    """
-    return pi * loaded_length * elastic_modulus / (8.0 * (1.0 - poisson_ratio**2) * sin(contact_angle))
+    @property
+    def covariance(self) -> Float[np.ndarray, "stiffness stiffness"]:
+        """Covariance of the relative changes, which to first order is that of ln K, in the order of ``values`` [-]."""
+        relative = np.array([self.standard_uncertainty[name] / value for name, value in self.values.items()])
+        return np.asarray(self.correlation * np.outer(relative, relative))
 
 
-def gear_mesh(contact_ratio: float, sun_virtual_teeth: float, planet_virtual_teeth: float, face_width: float) -> float:
-    """Return K_sp of one mesh: the single-pair stiffness of ISO 6336-1 times the face width [N/m].
-
-    Notes
-    -----
-    liu2020 prints 0.1551 for the standard's 0.15551 and leaves the face width out; the value per
-    width is in N/(mm·µm), so one millimetre of width gives 1e6 times as much in N/m.
+def checked_correlation(
+    rows: Sequence[Sequence[float]] | Float[np.ndarray, "row column"], names: tuple[str, ...], place: object
+) -> Float[np.ndarray, "stiffness stiffness"]:
+    """Return the rows as a correlation of the named stiffnesses.
 
     Parameters
     ----------
-    contact_ratio
-        Transverse contact ratio ε_α [-].
-    sun_virtual_teeth, planet_virtual_teeth
-        Virtual numbers of teeth [-].
-    face_width
-        Common face width [m].
+    rows
+        One row of numbers for each stiffness [-].
+    names
+        The stiffnesses, in the order of rows and columns.
+    place
+        Where the rows stand, for the sentence that refuses them.
 
-    References
-    ----------
-    liu2020, Table 2; ISO 6336-1.
+    Raises
+    ------
+    InputError
+        The rows are not square, not of this size, not symmetric, not 1 on the diagonal, not within −1…1, or have a
+        negative eigenvalue.
     """
-    flexibility = 0.04723 + 0.15551 / sun_virtual_teeth + 0.25791 / planet_virtual_teeth
-    return (0.75 * contact_ratio + 0.25) / flexibility * (face_width * 1e3) * 1e6
+    size, field_name = len(names), "correlation"
+    lengths = [len(row) for row in rows]
+    if lengths != [size] * size:
+        raise InputError.at(
+            f"{place}",
+            f"{field_name}, numbers per row,",
+            lengths,
+            f"{size} rows of {size}, in the order {', '.join(names)}",
+        )
+    matrix = np.array(rows, dtype=float).reshape(size, size)
+    for (row, column), value in np.ndenumerate(matrix):
+        entry = f"{field_name} of {names[row]} with {names[column]}"
+        if not abs(value) <= 1.0 + ROUNDING:
+            raise InputError.at(f"{place}", entry, float(value), "-1 to 1")
+        if row == column and abs(value - 1.0) > ROUNDING:
+            raise InputError.at(f"{place}", entry, float(value), "1, that of a stiffness with itself")
+        if abs(value - matrix[column, row]) > ROUNDING:
+            raise InputError.at(f"{place}", entry, float(value), f"{matrix[column, row]:g}, as in the mirrored place")
+    smallest = float(np.linalg.eigvalsh(matrix)[0]) if size else 0.0
+    if smallest < -ROUNDING:
+        raise InputError.at(
+            f"{place}", f"smallest eigenvalue of {field_name}", smallest, "0 or more, else no such values exist"
+        )
+    return matrix
 
 
 def line_contact(face_width: float, contact_modulus: float) -> float:
