@@ -114,6 +114,25 @@ def test_manifest_and_summary_say_what_was_done(run_folder):
     assert summary["optimality gap [-]"] >= -1e-9
 
 
+def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
+    name = "stiffness (identified)"
+    ranked = pd.read_csv(run_folder / "sensitivity.csv")
+    row = ranked[ranked["source"] == name].iloc[0]
+    summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
+    found = summary["identified stiffness"]
+    assert found["source"] == name
+    assert found["total index ST [-]"] == pytest.approx(row["total index ST [-]"])
+    assert 0 < found["total index ST [-]"] < 1e-4
+    assert 0 < found["sigma of the mean [arcsec]"] <= found["sigma of a unit [arcsec]"] < 0.1
+    assert found["first-order error at 2 sigma, rms [arcsec]"] < 0.02
+    assert pd.isna(row["zone [µm]"])
+    assert summary["unit surrogate used"] is False
+    assert name not in (run_folder / "allocation.csv").read_text(encoding="utf-8")
+    page = (run_folder / "report.html").read_text(encoding="utf-8")
+    assert f"The row “{name}”" in page
+    assert "common to all units of the reducer" in page
+
+
 def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
     before, after = load_tolerance_table("rv20e_baseline"), load_tolerance_table(run_folder / "allocation.csv")
     assert [source.name for source in after] == [source.name for source in before]

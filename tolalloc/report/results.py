@@ -13,10 +13,17 @@ from tolalloc.equivalent.answers import Equilibria
 from tolalloc.equivalent.outputs import Orders
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.response.stiffness import StiffnessEffect
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol import SobolIndices
 from tolalloc.surrogate.regression import NEEDED_Q2, Surrogate
 from tolalloc.uncertainty.unit_file import BuiltUnit
+
+_COMMON = (
+    "identified stiffness: relative changes are jointly normal with the standard uncertainties and the correlation of "
+    "its file, taken to first order, and common to all units of the reducer; they are part of the ranking alone, not "
+    "of the allocation, the hand estimates or the verified yield, which hold for the identified values"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +66,9 @@ class StudyResults:
     sobol, classical
         Ranking at the zones of the tolerance table, and the hand estimate beside it.
     unit_surrogate
-        Stand-in for single units, with its Q²; the kernel ran for the ranking unless it earned its place.
+        Stand-in for single units, with its Q²; the ranking may run on it where it earned its place.
+    stiffness
+        What not knowing the identified stiffnesses does to the peak-to-peak, if there are any.
     allocation
         What the search found.
     unit
@@ -86,12 +95,18 @@ class StudyResults:
     sobol: SobolIndices
     classical: ClassicalEstimate
     unit_surrogate: Surrogate
+    stiffness: StiffnessEffect | None
     allocation: Allocation
     unit: BuiltUnit | None
     neglected: tuple[str, ...]
     contacts: tuple[Assessment | None, Assessment | None]
     examples: tuple[ExampleUnit, ...]
     statuses: dict[str, int]
+
+    @property
+    def ranked_on_surrogate(self) -> bool:
+        """Whether the ranking ran on the stand-in for single units, which knows no stiffness."""
+        return self.unit_surrogate.earns_its_place and self.stiffness is None
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -106,6 +121,7 @@ class StudyResults:
             "tooth modification costs nothing and is exact; nominal clearance "
             f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
             f"{clearances.radial[0] * 1e6:g}…{clearances.radial[1] * 1e6:g} µm at tip and root",
+            *((_COMMON,) if self.stiffness else ()),
             "contact at rated torque: exact parts, Hertzian line contact, the most loaded disc by Li Lixing's share",
             *self._left_out,
         )
@@ -144,6 +160,12 @@ class StudyResults:
             found.append(
                 f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, "
                 f"below {NEEDED_Q2}: it was not used; the ranking ran on the real model."
+            )
+        if self.stiffness and self.stiffness.first_order.fails:
+            error = self.stiffness.first_order
+            found.append(
+                f"The share of the identified stiffness is rough: at 2σ its first order is off by "
+                f"{error.root_mean_square:.2g}″ where the effect is {error.effect:.2g}″."
             )
         found += [
             f"The modification {when} interferes with the pins, so its contact under load is not shown."

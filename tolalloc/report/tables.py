@@ -16,9 +16,14 @@ from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
 
 
 def ranking(results: StudyResults) -> pd.DataFrame:
-    """Return the sources, largest total Sobol index first, with intervals and the hand estimate beside them."""
-    sobol, classical = results.sobol, results.classical
-    baseline = results.allocation.baseline
+    """Return the sources, largest total Sobol index first, with intervals and the hand estimate beside them.
+
+    A source that stands on no drawing has no zone and no hand estimate.
+    """
+    sobol, undrawn = results.sobol, [np.nan] * (len(results.sobol.sources) - len(results.space.errors.active))
+    zones = [*results.space.errors.zones / MICROMETRE, *undrawn]
+    slopes = [*results.allocation.baseline.by_zone * MICROMETRE, *undrawn]
+    alone = [*results.classical.alone, *undrawn]
     share = sobol.total / sobol.total.sum() * 100
     first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
     among = sobol.among_first(3)
@@ -38,9 +43,9 @@ def ranking(results: StudyResults) -> pd.DataFrame:
             "rank low 5 % [-]": rank[0, at],
             "rank high 95 % [-]": rank[1, at],
             "P(among first 3) [%]": among[at] * 100,
-            "zone [µm]": results.space.errors.zones[at] / MICROMETRE,
-            "Sens of the quantile [arcsec/µm]": baseline.by_zone[at] * MICROMETRE,
-            "alone at its limit [arcsec]": classical.alone[at],
+            "zone [µm]": zones[at],
+            "Sens of the quantile [arcsec/µm]": slopes[at],
+            "alone at its limit [arcsec]": alone[at],
         }
         for place, at in enumerate(sobol.order)
     ]
@@ -189,12 +194,11 @@ def pareto(results: StudyResults) -> pd.DataFrame:
 
 def mappings(results: StudyResults) -> pd.DataFrame:
     """Return how every zone became a distribution, and where the zone comes from."""
-    return pd.DataFrame(
-        [
-            {"source": source.name, "zone → distribution": source.mapping, "note of the table": source.note}
-            for source in results.space.errors.active
-        ]
-    )
+    rows = [(source.name, source.mapping, source.note) for source in results.space.errors.active]
+    if results.stiffness and results.identified:
+        source = results.stiffness.source
+        rows.append((source.name, f"ln K/K0: {source.mapping}", results.identified.source))
+    return pd.DataFrame(rows, columns=["source", "zone → distribution", "note of the table"])
 
 
 def orders(results: StudyResults, largest: int = 130) -> pd.DataFrame:

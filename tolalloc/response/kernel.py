@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -38,11 +39,14 @@ class WithDerivatives:
         Derivative by every varied column [arcsec/m].
     by_modification
         Derivative by the equidistant and the shift amount [arcsec/m].
+    by_stiffness
+        Derivative by the relative change of each stiffness of `tolalloc.reducer.stiffness.Stiffness` [arcsec].
     """
 
     evaluation: Evaluation
     by_column: Float[np.ndarray, "sample column"]
     by_modification: Float[np.ndarray, "sample 2"]
+    by_stiffness: dict[str, Float[np.ndarray, " sample"]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,14 +119,20 @@ class KernelResponse:
         amounts = [self.model.columns.index(name) for name in self.model.reducer.modification.deviations]
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
+        by_stiffness: dict[str, Float[np.ndarray, " sample"]] = defaultdict(lambda: np.empty(x.shape[0]))
         for rows, (extremes, derivatives) in map_chunks(self._alone._derivatives, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             by_column[rows] = derivatives.by_error[:, varied] / ARCSECOND
             by_modification[rows] = derivatives.by_error[:, amounts] / ARCSECOND
+            for name, derivative in derivatives.by_stiffness.items():
+                by_stiffness[name][rows] = derivative / ARCSECOND
             self.observe(extremes.status)
         return WithDerivatives(
-            evaluation=Evaluation(values=values, status=status), by_column=by_column, by_modification=by_modification
+            evaluation=Evaluation(values=values, status=status),
+            by_column=by_column,
+            by_modification=by_modification,
+            by_stiffness=dict(by_stiffness),
         )
 
     @property

@@ -20,7 +20,9 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.kernel import KernelResponse
+from tolalloc.response.stiffness import stiffness_source
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
+from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.sources import ErrorModel, neglected_columns
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
@@ -172,6 +174,8 @@ class Prepared:
         Design variables and the requirement.
     kernel
         The real model at the reducer's own modification.
+    stiffness
+        What is not known of the identified stiffnesses, a source of the ranking alone.
     neglected
         Patterns of the sources that are taken as zero because the tolerance table does not list them.
     """
@@ -183,12 +187,14 @@ class Prepared:
     space: DesignSpace
     requirement: Requirement
     kernel: KernelResponse
+    stiffness: CorrelatedSource | None
     neglected: tuple[str, ...]
 
     @property
     def hash(self) -> str:
         """Digest of the study and of what its files hold, wherever they stand."""
-        content = (asdict(self.study), self.reducer, self.space.errors.sources, self.unit, self.kernel.torque)
+        known = self.identified.content if self.identified else None  # the reducer holds the values alone
+        content = (asdict(self.study), self.reducer, known, self.space.errors.sources, self.unit, self.kernel.torque)
         return hashlib.sha256(repr(content).encode()).hexdigest()
 
 
@@ -259,5 +265,6 @@ def prepare(study: Study) -> Prepared:
         ),
         requirement=Requirement(limit=study.limit_arcsec, target=study.yield_target),
         kernel=kernel,
+        stiffness=stiffness_source(identified, reducer) if identified else None,
         neglected=tuple(pattern for pattern, columns in left_out.items() if columns),
     )

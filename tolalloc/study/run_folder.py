@@ -117,9 +117,27 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "design surrogate Q2 [-]": surrogate.q2,
         "design surrogate used": surrogate.earns_its_place,
         "unit surrogate Q2 [-]": results.unit_surrogate.q2,
-        "unit surrogate used": results.unit_surrogate.earns_its_place,
+        "unit surrogate used": results.ranked_on_surrogate,
+        "identified stiffness": _stiffness(results),
         "torsional stiffness of the perfect reducer [N·m/arcmin]": results.torsional_stiffness,
         "warnings": list(results.warnings),
+    }
+
+
+def _stiffness(results: StudyResults) -> dict[str, Any] | None:
+    """Return what not knowing the identified stiffnesses does, if there are any."""
+    effect, sobol = results.stiffness, results.sobol
+    if effect is None:
+        return None
+    at, first_order = sobol.sources.index(effect.source.name), effect.first_order
+    return {
+        "source": effect.source.name,
+        "total index ST [-]": float(sobol.total[at]),
+        "sigma of a unit [arcsec]": effect.sigma,
+        "sigma of the mean [arcsec]": effect.sigma_of_mean,
+        "first-order error at 2 sigma, rms [arcsec]": first_order.root_mean_square,
+        "first-order error at 2 sigma, largest [arcsec]": first_order.largest,
+        "effect at 2 sigma, rms [arcsec]": first_order.effect,
     }
 
 

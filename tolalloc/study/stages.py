@@ -23,9 +23,10 @@ from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import Modification, Reducer
 from tolalloc.report.results import ExampleUnit, StudyResults
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
 from tolalloc.sensitivity.classical import classical_estimate
 from tolalloc.sensitivity.monte_carlo import MonteCarlo
-from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.sensitivity.sobol import SobolIndices, sobol_indices
 from tolalloc.study.definition import Prepared
 from tolalloc.surrogate.regression import Surrogate, fit_surrogate, quadratic_regression
 from tolalloc.uncertainty.seeds import SeedTree
@@ -33,6 +34,12 @@ from tolalloc.units import ARCMINUTE
 
 _FIRST_SPREAD = 3.1
 """Distance of the 99.73 % quantile from the mean over σ, until a large sample has said better [-]."""
+
+
+_EFFECT_UNITS = 256
+"""Units over which the effect of the stiffness is averaged [-]."""
+_DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
+"""Directions in which the stiffnesses are changed together, either way, and units that the kernel solves there [-]."""
 
 
 @runtime_checkable
@@ -125,10 +132,8 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
         )
     with record.stage("ranking"):
-        # A stand-in for single units would save the ranking's kernel runs; it must have earned that.
         surrogate = _unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size)
-        ranked = surrogate if surrogate.earns_its_place else kernel
-        sobol = sobol_indices(ranked, space.errors, space.errors.zones, seeds.child("sobol"), study.effort.sobol_blocks)
+        sobol, stiffness = _ranking(prepared, kernel, surrogate, allocation.baseline.sample, seeds)
         classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
     with record.stage("report"):
         return StudyResults(
@@ -144,6 +149,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             sobol=sobol,
             classical=classical,
             unit_surrogate=surrogate,
+            stiffness=stiffness,
             allocation=allocation,
             unit=prepared.unit,
             neglected=prepared.neglected,
@@ -156,6 +162,24 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             ),
             statuses=record.counts,
         )
+
+
+def _ranking(
+    prepared: Prepared, kernel: KernelResponse, surrogate: Surrogate, sample: MonteCarlo, seeds: SeedTree
+) -> tuple[SobolIndices, StiffnessEffect | None]:
+    """Return the ranking at the zones of the tolerance table, and what not knowing the stiffness does, if it is one."""
+    errors, blocks, own = prepared.space.errors, prepared.study.effort.sobol_blocks, seeds.child("sobol")
+    if prepared.identified is None or prepared.stiffness is None:
+        # A stand-in for single units saves the ranking's kernel runs; it must have earned that.
+        ranked = surrogate if surrogate.earns_its_place else kernel
+        return sobol_indices(ranked, errors, errors.zones, own, blocks), None
+    # The stand-in knows no stiffness.
+    response = StiffnessResponse(kernel=kernel, stiffnesses=tuple(prepared.identified.values))
+    joint = replace(errors, joint=(prepared.stiffness,))
+    units = sample.x[sample.evaluation.good][:_EFFECT_UNITS]
+    directions = seeds.child("stiffness").generator().standard_normal((_DIRECTIONS, len(response.stiffnesses)))
+    effect = stiffness_effect(response, prepared.stiffness, units, directions, _UNITS_PER_DIRECTION)
+    return sobol_indices(response, joint, joint.zones, own, blocks), effect
 
 
 def _torsional_stiffness(prepared: Prepared) -> float:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.zones import (
     Distribution,
     Feature,
@@ -156,19 +157,27 @@ class ErrorModel:
     ----------
     sources
         The rows of the tolerance table.
+    joint
+        What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and
+        its zone is 1. Rankings take it; allocation, tolerance tables and hand estimates have none.
     """
 
     sources: tuple[Source, ...]
+    joint: tuple[CorrelatedSource, ...] = ()
 
     @cached_property
     def active(self) -> tuple[Source, ...]:
         """Sources with a zone above zero, the ones that vary."""
         return tuple(source for source in self.sources if source.zone > 0.0)
 
+    @property
+    def _varying(self) -> tuple[Source | CorrelatedSource, ...]:
+        return (*self.active, *self.joint)
+
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """Columns of the active sources."""
-        return tuple(column for source in self.active for column in source.columns)
+        """Columns of the active sources, then of the joint ones."""
+        return tuple(column for source in self._varying for column in source.columns)
 
     @cached_property
     def still(self) -> dict[str, float]:
@@ -188,17 +197,17 @@ class ErrorModel:
     @cached_property
     def source_of_column(self) -> tuple[str, ...]:
         """Name of the source of each column."""
-        return tuple(source.name for source in self.active for _ in source.columns)
+        return tuple(source.name for source in self._varying for _ in source.columns)
 
     @cached_property
     def zones(self) -> Float[np.ndarray, " source"]:
-        """Zones of the active sources [m]."""
-        return np.array([source.zone for source in self.active])
+        """Zones of the active sources [m], then 1 for every joint one [-]."""
+        return np.array([*(source.zone for source in self.active), *(1.0 for _ in self.joint)])
 
     def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return all deviations per unit of zone for independent uniform numbers in (0, 1)."""
         parts, start = [], 0
-        for source in self.active:
+        for source in self._varying:
             own = uniform[:, start : start + len(source.columns)]
             parts.append(source.standard_values(own))
             start += len(source.columns)
@@ -208,6 +217,7 @@ class ErrorModel:
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
-        counts = [len(source.columns) for source in self.active]
-        middle = np.repeat([source.middle / source.lever for source in self.active], counts)
+        counts = [len(source.columns) for source in self._varying]
+        middles = [*(source.middle / source.lever for source in self.active), *(0.0 for _ in self.joint)]
+        middle = np.repeat(middles, counts)
         return np.asarray(standard * np.repeat(zones, counts) + middle)

@@ -1,0 +1,159 @@
+"""What is not known of the stiffness as a source: first order, share of the variance, correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+import pytest
+
+from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.exceptions import InputError
+from tolalloc.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
+from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.response.interface import Evaluation
+from tolalloc.response.kernel import KernelResponse
+from tolalloc.response.stiffness import (
+    NAME,
+    StiffnessResponse,
+    first_order_error,
+    stiffness_effect,
+    stiffness_source,
+)
+from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.study.definition import Study, prepare
+from tolalloc.uncertainty.correlated import CorrelatedSource
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+
+FIELDS = ("crank_disc_bearing", "pin_contact")
+
+
+def few_sources() -> ErrorModel:
+    """Return two sources of the shipped table."""
+    table = {source.name: source for source in load_tolerance_table("rv20e_baseline")}
+    return ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
+
+
+@pytest.fixture(scope="module")
+def response(rv20e: EquivalentModel) -> StiffnessResponse:
+    errors = few_sources()
+    fixed = {name: 0.0 for name in rv20e.columns if name not in errors.columns}
+    fixed |= {"modification.equidistant": -17e-6, "modification.shift": -25e-6}
+    kernel = KernelResponse(model=rv20e, torque=-167.0, columns=errors.columns, fixed=fixed)
+    return StiffnessResponse(kernel=kernel, stiffnesses=FIELDS)
+
+
+def source(sigma: float, correlation: float) -> CorrelatedSource:
+    return CorrelatedSource(
+        name=NAME,
+        columns=tuple(f"stiffness.{name}" for name in FIELDS),
+        covariance=sigma**2 * np.array([[1.0, correlation], [correlation, 1.0]]),
+    )
+
+
+def units(count: int, seed: int) -> np.ndarray:
+    errors = few_sources()
+    uniform = np.concatenate(list(SeedTree(seed).uniform_chunks(count, len(errors.columns))))
+    return errors.deviations(errors.standard_values(uniform), errors.zones)
+
+
+def test_first_order_against_the_kernel(response):
+    """At a small torque the error falls faster than the change; at a large one contacts change, and it is seen."""
+    x, direction = units(16, 1), np.array([[-1.0, 0.0], [0.7, -0.7]])
+    light = replace(response, kernel=replace(response.kernel, torque=-1.0))
+    small, large = (first_order_error(light, x, size * direction) for size in (0.02, 0.2))
+    assert small.root_mean_square < 0.05 * small.effect
+    assert large.root_mean_square < 0.25 * large.effect
+    assert large.root_mean_square > 20 * small.root_mean_square
+    assert small.largest >= small.root_mean_square
+    loaded = first_order_error(response, x, 0.2 * direction)
+    assert loaded.root_mean_square > large.root_mean_square
+    assert not large.fails
+    assert first_order_error(response, x, 5 * direction[:1]).fails
+
+
+def test_a_change_is_that_of_the_reducer(response):
+    changed = response.changed(np.array([0.1, -0.2])).model.reducer.stiffness
+    old = response.kernel.model.reducer.stiffness
+    assert changed == replace(
+        old, crank_disc_bearing=old.crank_disc_bearing * exp(0.1), pin_contact=old.pin_contact * exp(-0.2)
+    )
+    x = units(3, 2)
+    extended = np.concatenate([x, np.zeros((3, 2))], axis=1)
+    np.testing.assert_array_equal(response(extended).values, response.kernel(x).values)
+
+
+def test_share_of_the_variance_against_direct_monte_carlo(response):
+    """Pairs of the same unit with two draws of the stiffness give the total index without Sobol's scheme."""
+    stiffness = source(0.6, -0.5)
+    errors = replace(few_sources(), joint=(stiffness,))
+    found = sobol_indices(response, errors, errors.zones, SeedTree(3), 64)
+    at = found.sources.index(NAME)
+    x, draws = units(400, 4), np.random.default_rng(5).multivariate_normal(np.zeros(2), stiffness.covariance, (2, 400))
+    first, second = (response(np.concatenate([x, draw], axis=1)).values[:, 0] for draw in draws)
+    own, total = (first - second) ** 2 / 2, np.concatenate([first, second]).var()
+    direct, error = own.mean() / total, own.std() / np.sqrt(own.size) / total
+    assert found.total[at] > 0.01
+    assert found.total[at] == pytest.approx(direct, abs=3 * np.hypot(error, found.total_resamples[:, at].std()))
+    effect = stiffness_effect(response, stiffness, x[:200], np.eye(2), 2)
+    assert effect.sigma**2 / total == pytest.approx(direct, abs=4 * error)
+    assert effect.sigma_of_mean <= effect.sigma
+
+
+@dataclass(frozen=True)
+class Sum:
+    """The sum of all columns."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...] = ("y [-]",)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
+
+
+@pytest.mark.parametrize(("correlation", "variance"), [(1.0, 4.0), (0.0, 2.0), (-0.5, 1.0), (-1.0, 0.0)])
+def test_correlation_inside_the_group_counts(correlation, variance):
+    """Equal effects of two columns add up or cancel; the other sources have a variance of 2 on this scale."""
+    errors = few_sources()
+    rest = float(units(100_000, 1).sum(axis=1).var())
+    errors = replace(errors, joint=(source(float(np.sqrt(rest / 2)), correlation),))
+    found = sobol_indices(Sum(errors.columns), errors, errors.zones, SeedTree(1), 2048)
+    assert found.total[-1] == pytest.approx(variance / (variance + 2), abs=0.04)
+    assert found.first[-1] == pytest.approx(variance / (variance + 2), abs=0.06)
+
+
+def test_a_stiffness_without_uncertainty_has_no_share(response):
+    errors = replace(few_sources(), joint=(source(0.0, 0.3),))
+    found = sobol_indices(response, errors, errors.zones, SeedTree(3), 16)
+    assert found.total[-1] == 0.0
+    assert found.sources == ("disc1.bore1.position", "pin.diameter", NAME)
+
+
+def test_source_of_the_shipped_file():
+    identified, reducer = load_identified_stiffness("rv20e_table6"), load_reducer("rv20e")
+    found = stiffness_source(identified, reducer)
+    assert found.columns == tuple(f"stiffness.{name}" for name in identified.values)
+    np.testing.assert_allclose(found.factor @ found.factor.T, identified.covariance, rtol=1e-12, atol=1e-20)
+    assert "0.019 (stiffness.crank_carrier_bearing)" in found.mapping
+    bending = replace(reducer, stiffness=replace(reducer.stiffness, pin_bending=1e9))
+    contact = IdentifiedStiffness(source="mine", values={"pin_contact": 1e9}, standard_uncertainty={"pin_contact": 1e8})
+    with pytest.raises(InputError, match=r"pin_contact.*0 where pins bend"):
+        stiffness_source(contact, bending)
+
+
+def test_the_study_knows_the_uncertainty_and_the_allocation_does_not(tmp_path):
+    shipped = load_identified_stiffness("rv20e_table6")
+    doubled = {name: 2 * value for name, value in shipped.standard_uncertainty.items()}
+    prepared = []
+    for name, identified in (("one", shipped), ("two", replace(shipped, standard_uncertainty=doubled))):
+        (tmp_path / name).mkdir()
+        write_identified_stiffness(identified, tmp_path / name / "bench.toml")
+        study = Study(name="same", stiffness=tmp_path / name / "bench.toml")
+        prepared.append(prepare(study))
+    one, two = (replace(item, study=Study(name="same")).hash for item in prepared)
+    assert one != two
+    assert prepared[0].space.errors.joint == ()
+    assert prepare(Study(name="none")).stiffness is None
