@@ -1,0 +1,1 @@
+"""Measured data of finished reducers: read from files, cleaned, every repair counted."""

@@ -1,0 +1,236 @@
+"""Unit tables: the measured errors of many built reducers, one row per unit, read from CSV and written back."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from tolalloc.exceptions import InputError
+from tolalloc.uncertainty.sources import ANGULAR
+from tolalloc.uncertainty.unit_file import BuiltUnit
+from tolalloc.units import MICROMETRE, MICRORADIAN
+
+LENGTH_UNITS, ANGLE_UNITS = ("µm", "um"), ("µrad", "urad")
+LARGEST_LENGTH, LARGEST_ANGLE = 200.0, 20000.0
+"""Largest deviation that is believed, as in a unit file [µm, µrad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextTable:
+    """Cells of a CSV file as text.
+
+    Parameters
+    ----------
+    path
+        Where it was read.
+    headers
+        First line that is not a comment.
+    rows
+        Line of each row as counted in the file [-].
+    cells
+        Cells row by row, as many as there are headers.
+    """
+
+    path: Path
+    headers: tuple[str, ...]
+    rows: tuple[int, ...]
+    cells: tuple[tuple[str, ...], ...]
+
+
+def read_text_table(path: Path) -> TextTable:
+    """Return the cells of a CSV file, separated by commas or semicolons; lines that start with # are comments.
+
+    Raises
+    ------
+    InputError
+        The file is missing, not text, without a row, or a row has too few or too many cells.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file.") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a table in CSV (UTF-8) ({error}).") from None
+    numbered = [(row, line) for row, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    if len(numbered) < 2:
+        raise InputError(f"{path}: the table has no rows; a line of headers and one row or more are needed.")
+    separator = ";" if ";" in numbered[0][1] else ","
+    first, *others = [(row, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))])
+                      for row, line in numbered]  # fmt: skip
+    width = len(first[1])
+    for row, cells in others:
+        if len(cells) < width:
+            raise InputError(
+                f"{path}, row {row}: {len(cells)} of {width} cells are there; the columns must be of equal length, "
+                "and a cell without a number is left empty between its separators."
+            )
+        if any(cells[width:]):  # nothing behind a closing separator is how some programs end their rows
+            raise InputError(
+                f"{path}, row {row}: {len(cells)} cells stand under {width} headers; numbers have a decimal point, and "
+                f"cells are separated by {separator!r}."
+            )
+    return TextTable(
+        path=path,
+        headers=tuple(first[1]),
+        rows=tuple(row for row, _ in others),
+        cells=tuple(tuple(cells[:width]) for _, cells in others),
+    )
+
+
+def split_header(header: str) -> tuple[str, str]:
+    """Return name and unit of a header such as ``disc1.tilt.x [µrad]``; the unit is empty where none is stated."""
+    match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
+    if match is None:
+        return header, ""
+    # Both characters for µ and both dots are typed, and look alike.
+    return match[1], match[2].strip().replace("\u03bc", "µ").replace("\u22c5", "·")
+
+
+def unit_names(table: TextTable) -> tuple[str, ...]:
+    """Return the column ``unit`` of a table, whose names are unique.
+
+    Raises
+    ------
+    InputError
+        The column is missing, or a row names no unit or one that stands further up.
+    """
+    if "unit" not in table.headers:
+        raise InputError(f"{table.path}: the column 'unit' is missing; it names the unit of each row.")
+    position = table.headers.index("unit")
+    first_row: dict[str, int] = {}
+    for row, cells in zip(table.rows, table.cells, strict=True):
+        name = cells[position]
+        if not name:
+            raise InputError.at(f"{table.path}, row {row}", "unit", name, "a name")
+        if name in first_row:
+            raise InputError.at(
+                f"{table.path}, row {row}",
+                "unit",
+                name,
+                f"each name once, and this one stands in row {first_row[name]}",
+            )
+        first_row[name] = row
+    return tuple(first_row)
+
+
+def _is_angle(column: str) -> bool:
+    return column.removesuffix(".x").removesuffix(".y").rsplit(".", 1)[-1] in ANGULAR
+
+
+def _column(path: Path, header: str) -> tuple[str, float, float]:
+    """Return the model's column, the factor to SI and the largest value that is believed."""
+    column, unit = split_header(header)
+    angle = _is_angle(column)
+    allowed = ANGLE_UNITS if angle else LENGTH_UNITS
+    if unit not in allowed:
+        raise InputError.at(
+            path,
+            f"the unit of column {column!r}",
+            unit,
+            f"{' or '.join(allowed)} in square brackets, as {column!r} is {'an angle' if angle else 'a length'}",
+        )
+    return (column, MICRORADIAN, LARGEST_ANGLE) if angle else (column, MICROMETRE, LARGEST_LENGTH)
+
+
+def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[BuiltUnit, ...]:
+    """Return the units of a CSV file: a column ``unit``, the others are model columns such as ``disc1.tilt.x [µrad]``.
+
+    Parameters
+    ----------
+    path
+        The file.
+    neglected
+        Sources that no unit states, taken as zero; ``*`` stands for anything. A model's column that is neither in the
+        table nor here is refused when the units meet the model.
+
+    Raises
+    ------
+    InputError
+        The file, row, column and value that are not allowed.
+    """
+    table = read_text_table(Path(path))
+    names = unit_names(table)
+    columns = {place: _column(table.path, header) for place, header in enumerate(table.headers) if header != "unit"}
+    if len({column for column, *_ in columns.values()}) < len(columns) or table.headers.count("unit") > 1:
+        raise InputError(f"{table.path}: a column stands there twice; each column of the model has one.")
+    units = []
+    for row, name, cells in zip(table.rows, names, table.cells, strict=True):
+        deviations = {}
+        for place, (column, factor, largest) in columns.items():
+            try:
+                value = float(cells[place])
+            except ValueError:
+                value = float("nan")
+            if not (isfinite(value) and abs(value) <= largest):
+                raise InputError.at(
+                    f"{table.path}, row {row} (unit {name})",
+                    table.headers[place],
+                    cells[place],
+                    f"a number from {-largest:g} to {largest:g}",
+                )
+            deviations[column] = value * factor
+        units.append(BuiltUnit(name=name, source=table.path.name, deviations=deviations, neglected=neglected))
+    return tuple(units)
+
+
+def write_table(
+    path: Path, headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()
+) -> None:
+    """Write a CSV file with all digits of its numbers.
+
+    Parameters
+    ----------
+    path
+        New file.
+    headers, rows
+        Names with units, and cells.
+    comments
+        Lines above the headers.
+
+    Raises
+    ------
+    InputError
+        The file exists or cannot be written.
+    """
+    try:
+        with path.open("x", encoding="utf-8", newline="") as file:
+            file.writelines(f"# {comment}\n" for comment in comments)
+            writer = csv.writer(file, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+            writer.writerow(headers)
+            writer.writerows(rows)
+    except FileExistsError:
+        raise InputError(f"{path}: the file exists; name a new one, nothing is overwritten.") from None
+    except OSError as error:
+        raise InputError(f"{path}: the table cannot be written ({error.strerror}); name another file.") from None
+
+
+def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
+    """Write units in the layout that `load_units` reads; what they neglect is not part of it.
+
+    Raises
+    ------
+    InputError
+        There is no unit, units state different columns, or the file exists or cannot be written.
+    """
+    if not units:
+        raise InputError(f"{path}: there are no units to write.")
+    columns = tuple(units[0].deviations)
+    for unit in units:
+        if set(unit.deviations) != set(columns):
+            column = sorted(set(unit.deviations) ^ set(columns))[0]
+            raise InputError(
+                f"{path}: units {units[0].name} and {unit.name} do not both state {column}; units of one table state "
+                "the same columns."
+            )
+    angle = [_is_angle(column) for column in columns]
+    headers = [f"{column} [{'µrad' if turns else 'µm'}]" for column, turns in zip(columns, angle, strict=True)]
+    factors = [MICRORADIAN if turns else MICROMETRE for turns in angle]
+    rows = (
+        [unit.name, *(float(unit.deviations[column]) / factor for column, factor in zip(columns, factors, strict=True))]
+        for unit in units
+    )
+    write_table(Path(path), ["unit", *headers], rows)
