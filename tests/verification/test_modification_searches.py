@@ -12,12 +12,13 @@ from tolalloc.allocation.modification.mixed_penalty import extrapolated, mixed_p
 from tolalloc.allocation.modification.problem import Evaluation
 from tolalloc.allocation.modification.reference import polish, reference
 from tolalloc.allocation.modification.residual_gap import residual_gap
-from tolalloc.allocation.modification.result import REACHED, History, Spread, Tally
+from tolalloc.allocation.modification.result import REACHED, Spread, Tally
 from tolalloc.allocation.modification.rotated_profile import rotated_profile_fit
 from tolalloc.allocation.modification.searches import ALGORITHMS, search, spread
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reducer.design import CycloidStage
 from tolalloc.reducer.files import load_reducer
+from tolalloc.search.history import History
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 SONG = CycloidStage(

@@ -9,38 +9,11 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.modification.problem import Amounts, Evaluation, ModificationProblem
 from tolalloc.reducer.design import Modification
+from tolalloc.search.history import History, quartiles
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 REACHED = 1e-6 * MILLIMETRE
 """Largest difference from the reference's amounts at which a search has reached it [m]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class History:
-    """Best objective of a search, batch by batch; a generation is a batch.
-
-    Parameters
-    ----------
-    evaluations
-        Evaluations up to the end of each batch [-].
-    best
-        Smallest objective until then of a point that meets the constraints, infinite before the first [m].
-    """
-
-    evaluations: Int[np.ndarray, " batch"]
-    best: Float[np.ndarray, " batch"]
-
-    def after(self, evaluations: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return the best objective after so many evaluations [m]."""
-        batch = np.searchsorted(self.evaluations, evaluations, side="right")
-        return np.asarray(np.append(np.inf, self.best)[batch])
-
-    def then(self, following: History) -> History:
-        """Return the history of a search and of what followed it."""
-        return History(
-            evaluations=np.concatenate([self.evaluations, self.evaluations[-1] + following.evaluations]),
-            best=np.concatenate([self.best, following.best]),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +144,4 @@ class Spread:
 
     def band(self, evaluations: Int[np.ndarray, " n"]) -> Float[np.ndarray, "3 n"]:
         """Return lower quartile, median and upper quartile of the best objective after so many evaluations [m]."""
-        best = np.stack([result.history.after(evaluations) for result in self.results])
-        # No interpolation: it would take infinity from infinity where some seeds have met nothing yet.
-        return np.asarray(np.quantile(best, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf"))
+        return quartiles([result.history for result in self.results], evaluations)

@@ -1,0 +1,1 @@
+"""How a search came to its answer, whatever was searched."""
