@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
 DOORS = {
     "SALib": "sensitivity",
-    "pymoo": "allocation",
+    "pymoo": ("allocation", "identification"),
     "cvxpy": "allocation",
     "sklearn": "surrogate",
     "plotly": "report",

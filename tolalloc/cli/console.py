@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import time
+from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING, Annotated, Any
 
+import pandas as pd
+import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from tolalloc.compiled import is_kept
+
+if TYPE_CHECKING:
+    from tolalloc.report.document import Document
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
+ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
 screen = Console()
 messages = Console(stderr=True)
@@ -19,6 +33,29 @@ def announce_compilation(room: str = "equivalent") -> None:
     module, lasts = {"equivalent": ("turn", "about a minute"), "cycloid": ("distance", "some seconds")}[room]
     if not is_kept(module):
         messages.print(f"Compiling the kernel for this machine: {lasts}, once.", style="dim")
+
+
+def print_json(answer: dict[str, Any]) -> None:
+    """Print an answer for a program."""
+    sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
+
+
+def print_table(frame: pd.DataFrame, title: str) -> None:
+    """Print a table for a person."""
+    table = Table(title=title)
+    for number, name in enumerate(frame.columns):
+        table.add_column(escape(str(name)), justify="left" if number == 0 else "right")
+    for row in frame.itertuples(index=False):
+        table.add_row(*(escape(f"{cell:.4g}" if isinstance(cell, float) else str(cell)) for cell in row))
+    screen.print(table)
+
+
+def say(document: Document) -> None:
+    """Print a report's answer and warnings."""
+    for sentence in document.answer:
+        screen.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    for warning in document.warnings:
+        screen.print(warning, style="yellow", markup=False, highlight=False, soft_wrap=True)
 
 
 class UnitProgress:

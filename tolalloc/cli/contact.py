@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import pandas as pd
-from rich.markup import escape
-from rich.table import Table
-
 from tolalloc.cycloid.assessment import Assessment, assess
 from tolalloc.cycloid.solvers.contact_law import LAWS
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -72,13 +68,3 @@ def contact_answer(reducer: Reducer, torque: float | None, law: str, exact: bool
         raise InputError.at(place, "--phases", phases, f"1 to {MOST_PHASES}")
     asked = reducer.torque_on_carrier(reducer.load.rated_torque if torque is None else torque, place)
     return assess(reducer, asked, law=law, exact=True if exact else None, phases=phases)
-
-
-def frame_table(frame: pd.DataFrame, title: str) -> Table:
-    """Return a table for a person."""
-    table = Table(title=title)
-    for number, name in enumerate(frame.columns):
-        table.add_column(escape(str(name)), justify="left" if number == 0 else "right")
-    for row in frame.itertuples(index=False):
-        table.add_row(*(escape(f"{cell:.4g}" if isinstance(cell, float) else str(cell)) for cell in row))
-    return table

@@ -7,13 +7,17 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tolalloc.cli.console import announce_compilation, messages, screen
+from tolalloc.cli.console import announce_compilation, messages, say
 from tolalloc.exceptions import TolallocError
 from tolalloc.report.document import Document, write_document
 from tolalloc.study.run_folder import claimed
 
 
-def written(folder: Path, build: Callable[[], Document]) -> Document:
+def _nothing(folder: Path) -> None:
+    """Add nothing to a report's folder."""
+
+
+def written(folder: Path, build: Callable[[], Document], add: Callable[[Path], None] = _nothing) -> Document:
     """Claim a folder, then make the report and write it.
 
     Parameters
@@ -22,6 +26,8 @@ def written(folder: Path, build: Callable[[], Document]) -> Document:
         New or empty folder.
     build
         Makes the report; nothing stays behind if that fails.
+    add
+        Adds more files to the written report.
 
     Raises
     ------
@@ -31,6 +37,7 @@ def written(folder: Path, build: Callable[[], Document]) -> Document:
     with claimed(folder):
         document = build()
         write_document(document, folder)
+        add(folder)
     messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
     return document
 
@@ -55,5 +62,4 @@ def run_document(name: str, build: Callable[[bool], Document]) -> None:
     except TolallocError as error:
         messages.print(f"Error: {error}", soft_wrap=True, markup=False, highlight=False)
         raise SystemExit(2) from None
-    for sentence in (*document.answer, *document.warnings):
-        screen.print(sentence, soft_wrap=True, markup=False, highlight=False)
+    say(document)

@@ -1,8 +1,7 @@
-"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``."""
+"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``, ``identify``."""
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +9,19 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from tolalloc.cli.console import UnitProgress, announce_compilation, messages, screen
-from tolalloc.cli.contact import asked_reducer, contact_answer, frame_table
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    UnitProgress,
+    announce_compilation,
+    messages,
+    print_json,
+    print_table,
+    say,
+    screen,
+)
+from tolalloc.cli.contact import asked_reducer, contact_answer
+from tolalloc.cli.identify import identify
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
 from tolalloc.exceptions import TolallocError
@@ -33,7 +43,6 @@ app = typer.Typer(
 )
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 
 
 @app.command()
@@ -59,7 +68,7 @@ def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
     with UnitProgress() as progress:
         results = run_study(study, folder, progress, quick=quick)
     if as_json:
-        sys.stdout.write(json.dumps({"folder": str(folder), **summary(results)}, ensure_ascii=False, indent=2) + "\n")
+        print_json({"folder": str(folder), **summary(results)})
         return
     allocation, limit = results.allocation, results.requirement.limit
     chosen = allocation.chosen
@@ -92,7 +101,7 @@ def check(script: Script, as_json: AsJson = False) -> None:
             "limit_arcsec": study.limit_arcsec,
             "yield_target": study.yield_target,
         }
-        sys.stdout.write(json.dumps(content, ensure_ascii=False, indent=2) + "\n")
+        print_json(content)
         return
     screen.print(f"{script}: study {study.name} is in order.", soft_wrap=True)
     screen.print(
@@ -122,7 +131,7 @@ def te(
     announce_compilation()
     answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"), attributed)
     if as_json:
-        sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
+        print_json(answer)
     else:
         screen.print(as_table(answer))
         for warning in answer["warnings"]:
@@ -146,7 +155,7 @@ def contact(
     phases: Annotated[int, typer.Option(help="Phases of the crank within one pin pitch.")] = 72,
     profile: Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")] = None,
     points: Annotated[int, typer.Option(help="Points per tooth of that file.")] = 200,
-    out: Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")] = None,
+    out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
@@ -161,11 +170,11 @@ def contact(
     document = contact_document(found)
     _write_asked(document, out, found.profile, profile, points)
     if as_json:
-        sys.stdout.write(json.dumps(document.summary, ensure_ascii=False, indent=2) + "\n")
+        print_json(document.summary)
         return
-    screen.print(frame_table(profile_table(found), f"{design.name}: profile and clearance"))
-    screen.print(frame_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier"))
-    _say(document)
+    print_table(profile_table(found), f"{design.name}: profile and clearance")
+    print_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier")
+    say(document)
 
 
 @app.command()
@@ -184,7 +193,7 @@ def modify(
     seed: Annotated[int, typer.Option(help="First seed.")] = 1,
     profile: Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")] = None,
     points: Annotated[int, typer.Option(help="Points per tooth of that file.")] = 200,
-    out: Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")] = None,
+    out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Choose equidistant and shift amount by a published method, beside a sure reference and other algorithms."""
@@ -211,19 +220,14 @@ def modify(
     document = modification_document(results)
     _write_asked(document, out, results.assessment.profile, profile, points)
     if as_json:
-        sys.stdout.write(json.dumps(document.summary, ensure_ascii=False, indent=2) + "\n")
+        print_json(document.summary)
         return
-    screen.print(frame_table(algorithms_table(results), f"{design.name}: {method}"))
-    screen.print(frame_table(delivered_table(results), "What the amounts deliver"))
-    _say(document)
+    print_table(algorithms_table(results), f"{design.name}: {method}")
+    print_table(delivered_table(results), "What the amounts deliver")
+    say(document)
 
 
-def _say(document: Document) -> None:
-    """Print answer and warnings."""
-    for sentence in document.answer:
-        screen.print(sentence, markup=False, highlight=False)
-    for warning in document.warnings:
-        screen.print(warning, style="yellow", markup=False)
+app.command()(identify)
 
 
 def _require_writable(out: Path | None, file: Path | None, points: int) -> None:

@@ -109,7 +109,7 @@ def write_document(document: Document, folder: Path) -> None:
             "heading": section.heading,
             "paragraphs": section.paragraphs,
             "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
-            "tables": [html_table(frame) for _, frame in section.tables],
+            "tables": [(name, len(frame), html_table(frame)) for name, frame in section.tables],
         }
         for section in document.sections
     ]

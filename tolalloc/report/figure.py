@@ -56,8 +56,8 @@ class Figure:
         The data.
     vertical, horizontal
         Marked values on the axes, with their names.
-    logarithmic
-        Whether the y axis is logarithmic.
+    logarithmic, logarithmic_x
+        Whether the y axis is logarithmic, and whether the x axis is.
     equal
         Whether a length is the same on both axes, as in a drawing.
     """
@@ -70,6 +70,7 @@ class Figure:
     vertical: tuple[tuple[float, str], ...] = ()
     horizontal: tuple[tuple[float, str], ...] = ()
     logarithmic: bool = False
+    logarithmic_x: bool = False
     equal: bool = False
 
     @property
@@ -127,6 +128,8 @@ def save_png(figure: Figure, path: Path) -> None:
     axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
     if figure.logarithmic:
         axes.set_yscale("log")
+    if figure.logarithmic_x:
+        axes.set_xscale("log")
     if figure.equal:
         axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
@@ -194,6 +197,8 @@ def as_html(figure: Figure) -> str:
     )
     if figure.logarithmic:
         canvas.update_yaxes(type="log", exponentformat="power")
+    if figure.logarithmic_x:
+        canvas.update_xaxes(type="log", exponentformat="power")
     if figure.equal:
         canvas.update_yaxes(scaleanchor="x", scaleratio=1)
     if figure.rows:

@@ -1,0 +1,142 @@
+"""The command ``tolalloc identify``: from a measurement file to a stiffness file."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    UnitProgress,
+    announce_compilation,
+    messages,
+    print_json,
+    print_table,
+    say,
+)
+from tolalloc.exceptions import InputError
+from tolalloc.files import require_new
+from tolalloc.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
+from tolalloc.reducer.design import Reducer
+from tolalloc.reducer.files import load_reducer, write_identified_stiffness
+from tolalloc.reducer.stiffness import IdentifiedStiffness
+
+PLACE = "tolalloc identify"
+
+
+def identify(
+    data: Annotated[Path, typer.Argument(help="Measurement file (TOML): units and their readings.")],
+    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv20e",
+    method: Annotated[str, typer.Option(help="gauss_newton, improved_pso, pso or ga.")] = "gauss_newton",
+    asked: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--parameter",
+            help=f"Unknown as NAME or NAME=LOW:HIGH, again for each; NAME one of {', '.join(SYMBOLS)}. Stiffness in "
+            "N/m, bias in arcsec, torque over the stated one. Unless given: liu2020's three, half to double.",
+        ),
+    ] = None,
+    priors: Annotated[
+        list[str] | None,
+        typer.Option("--prior", help="Known beforehand, as NAME=RELATIVE standard deviation (bias: arcsec)."),
+    ] = None,
+    compare: Annotated[int, typer.Option(help="Seeds over which all methods are compared.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of every random number.")] = 1,
+    stiffness: Annotated[Path | None, typer.Option(help="Write the stiffnesses to this new .toml file.")] = None,
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
+    # The report's libraries take half a second to import; a misspelt file need not wait for them.
+    from tolalloc.cli.document_script import written
+    from tolalloc.measurement.files import load_measurements
+    from tolalloc.report.identification import identification_document
+    from tolalloc.report.identification_tables import choices_table, estimates_table
+    from tolalloc.study.identification import IdentificationStudy
+    from tolalloc.study.identification import identify as identified
+    from tolalloc.study.run_folder import require_usable
+
+    design = load_reducer(reducer)
+    study = IdentificationStudy(
+        parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
+        method=method,
+        seeds=compare,
+        seed=seed,
+        place=str(data),
+    )
+    if out:
+        require_usable(out)
+    if stiffness:
+        require_new(stiffness)
+    measurements = load_measurements(data)
+    announce_compilation()
+    with UnitProgress() as progress:
+        results = identified(study, measurements, design, progress)
+    document, answer = identification_document(results), results.stiffness
+    if out:
+        written(out, lambda: document, lambda folder: _write(answer, folder / "identified.stiffness.toml"))
+    if stiffness:
+        _write(answer, stiffness)
+    if as_json:
+        print_json(document.summary)
+        return
+    print_table(estimates_table(results), f"{design.name}: {measurements.name}")
+    if results.candidates:
+        print_table(choices_table(results), "Simpler explanations")
+    say(document)
+
+
+def _write(answer: IdentifiedStiffness | None, path: Path) -> None:
+    """Write the stiffness file, if a stiffness was asked for."""
+    if answer is None:
+        return
+    write_identified_stiffness(answer, path)
+    messages.print(f"Stiffness file: {path}", soft_wrap=True, markup=False)
+
+
+def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> tuple[Parameter, ...]:
+    """Return the unknowns as written on the command line.
+
+    Parameters
+    ----------
+    reducer
+        Where stiffnesses begin.
+    asked
+        ``NAME`` or ``NAME=LOW:HIGH``.
+    priors
+        ``NAME=DEVIATION``.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is not allowed.
+    """
+    known: dict[str, float] = {}
+    for text in priors:
+        name, sign, number = text.partition("=")
+        if not sign:
+            raise InputError.at(PLACE, "--prior", text, "NAME=NUMBER, such as carrier_bearing=0.1")
+        known[name] = _number(number, "--prior", text)
+    found = []
+    for text in asked:
+        name, sign, range_ = text.partition("=")
+        low, colon, high = range_.partition(":")
+        if sign and not colon:
+            raise InputError.at(PLACE, "--parameter", text, "NAME or NAME=LOW:HIGH, such as bias=-5:5")
+        bounds = (_number(low, "--parameter", text), _number(high, "--parameter", text)) if sign else None
+        found.append(parameter(name, reducer, bounds, known.pop(name, inf), PLACE))
+    for name in known:
+        raise InputError.at(PLACE, "--prior", name, "a prior of a parameter that is asked for")
+    return tuple(found)
+
+
+def _number(text: str, option: str, whole: str) -> float:
+    """Return a number of an option."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError.at(PLACE, option, whole, f"numbers; {text!r} is none") from None

@@ -1,0 +1,1 @@
+"""From measured units to stiffnesses, and to what the measurements cannot tell."""

@@ -1,0 +1,126 @@
+"""The answer as other studies take it: stiffnesses with their covariance, and what the data leave open said as such."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.identification.information import Information
+from tolalloc.identification.parameters import Parameter
+from tolalloc.identification.profile import Profile
+from tolalloc.reducer.stiffness import IdentifiedStiffness
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One parameter.
+
+    Parameters
+    ----------
+    parameter
+        Which one.
+    value
+        At the least objective; the middle of the bounds where the data do not identify it [as parameter].
+    uncertainty
+        Its standard uncertainty, of the logarithm but for the bias [-, arcsec].
+    interval
+        95 % profile interval [as parameter].
+    identified
+        Whether the interval keeps away from at least one bound.
+    on_bound
+        Whether the least objective stands on a bound.
+    """
+
+    parameter: Parameter
+    value: float
+    uncertainty: float
+    interval: tuple[float, float]
+    identified: bool
+    on_bound: bool
+
+    @property
+    def sentence(self) -> str:
+        """What to make of it."""
+        item = self.parameter
+        low, high = (f"{value:.4g}" for value in self.interval)
+        if not self.identified:
+            return (
+                f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {low}…{high} "
+                f"{item.unit}."
+            )
+        bound = "; the least stands on a bound" if self.on_bound else ""
+        return f"{item.symbol} = {self.value:.4g} {item.unit}, 95 % interval {low}…{high} {item.unit}{bound}."
+
+
+def estimates(
+    parameters: Sequence[Parameter],
+    coordinates: Float[np.ndarray, " parameter"],
+    found: Information,
+    profiles: Sequence[Profile],
+) -> tuple[Estimate, ...]:
+    """Return all parameters.
+
+    Parameters
+    ----------
+    parameters
+        The unknowns.
+    coordinates
+        Where the objective is least [-].
+    found, profiles
+        What the readings say around it.
+    """
+    deviations, rows = np.sqrt(np.diag(found.covariance)), []
+    for at, (item, own) in enumerate(zip(parameters, profiles, strict=True)):
+        middle = 0.5 * (item.lower + item.upper)
+        low, high = own.interval
+        rows.append(
+            Estimate(
+                parameter=item,
+                value=item.value(float(coordinates[at]) if own.is_identified else middle),
+                uncertainty=float(deviations[at]) if own.is_identified else (item.upper - item.lower) / sqrt(12.0),
+                interval=(item.value(low), item.value(high)),
+                identified=own.is_identified,
+                on_bound=bool(found.on_bound[at]),
+            )
+        )
+    return tuple(rows)
+
+
+def as_stiffness(
+    answer: Sequence[Estimate], found: Information, source: str, notes: Sequence[str]
+) -> IdentifiedStiffness | None:
+    """Return the stiffnesses for a stiffness file; none if no stiffness was asked for.
+
+    Parameters
+    ----------
+    answer
+        All parameters.
+    found
+        Their information, whose covariance links those that are identified.
+    source
+        Where the readings come from.
+    notes
+        What a reader must know.
+    """
+    places = [at for at, item in enumerate(answer) if item.parameter.is_stiffness]
+    if not places:
+        return None
+    covariance = found.covariance
+    spread = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(spread, spread)
+    for at, item in enumerate(answer):
+        if not item.identified:  # it is given as the middle of its bounds, which goes with nothing else
+            correlation[at], correlation[:, at] = 0.0, 0.0
+    np.fill_diagonal(correlation, 1.0)
+    chosen = [answer[at] for at in places]
+    return IdentifiedStiffness(
+        source=source,
+        values={item.parameter.name: item.value for item in chosen},
+        standard_uncertainty={item.parameter.name: item.value * item.uncertainty for item in chosen},
+        correlation=correlation[np.ix_(places, places)],
+        notes=(*notes, *(item.sentence for item in answer if not item.identified or item.on_bound)),
+    )

@@ -1,0 +1,166 @@
+"""What the readings fix and what they do not: information, its directions, covariance and bounds that stop a search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.stats import t as student
+
+from tolalloc.identification.prediction import Prediction
+from tolalloc.identification.problem import IdentificationProblem
+
+LEVEL = 0.95
+"""Confidence of every interval [-]."""
+
+_ON_BOUND = 1e-3  # distance over the box within which a coordinate stands on its bound [-]
+_SMALL = 0.05  # loadings below this share of the largest are not written [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direction:
+    """One combination of coordinates that the readings fix independently of the others.
+
+    Parameters
+    ----------
+    loading
+        Share of each coordinate, of length 1, its largest positive [-].
+    deviation
+        Standard deviation that the readings leave along it [-].
+    room
+        Half the box's extent along it: the standard deviation must be well below for the readings to say anything [-].
+    """
+
+    loading: Float[np.ndarray, " parameter"]
+    deviation: float
+    room: float
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the 95 % interval is shorter than half of what the bounds allow."""
+        return 1.96 * self.deviation < 0.5 * self.room
+
+    def sentence(self, symbols: tuple[str, ...]) -> str:
+        """Return the direction in words."""
+        largest = np.abs(self.loading).max()
+        parts = [
+            f"{share:+.2f}·{symbol}"
+            for share, symbol in zip(self.loading, symbols, strict=True)
+            if abs(share) >= _SMALL * largest
+        ]
+        combination = " ".join(parts).removeprefix("+").replace("-", "−")
+        if self.is_fixed:
+            return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%}"
+        return (
+            f"these data leave {combination} (relative changes) open: ±{self.deviation:.2%}, where the bounds alone "
+            f"leave ±{self.room:.2%}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Information:
+    """What the readings say around the least objective, to first order.
+
+    Parameters
+    ----------
+    matrix
+        Fisher information of the coordinates, prior included [-].
+    variance_factor
+        By how much residuals exceed the noise: their reduced χ², at least 1 where the noise was stated [-].
+    freedom
+        Readings less parameters [-].
+    reduced_chi_square
+        Sum of squared residuals over noise, per degree of freedom [-].
+    lower, upper
+        Bounds of the coordinates [-].
+    coordinates
+        Where it was taken [-].
+    """
+
+    matrix: Float[np.ndarray, "parameter parameter"]
+    variance_factor: float
+    freedom: int
+    reduced_chi_square: float
+    lower: Float[np.ndarray, " parameter"]
+    upper: Float[np.ndarray, " parameter"]
+    coordinates: Float[np.ndarray, " parameter"]
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """Eigenvectors of the information, best known first."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        found = []
+        for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+            loading = vector * np.sign(vector[np.abs(vector).argmax()])
+            room = 0.5 * float(np.abs(loading) @ (self.upper - self.lower))
+            deviation = sqrt(self.variance_factor / value) if value > 0.0 else np.inf
+            found.append(Direction(loading=loading, deviation=deviation, room=room))
+        return tuple(found)
+
+    @property
+    def covariance(self) -> Float[np.ndarray, "parameter parameter"]:
+        """Covariance of the coordinates from the readings and the bounds together [-].
+
+        Notes
+        -----
+        Bounds enter as a prior with the variance of an even distribution between them, (upper − lower)²/12, so a
+        coordinate of which the readings say nothing has that variance and no more. Where readings say much, it is the
+        inverse of their information. Theory page, equation (40).
+        """
+        bounds = np.diag(12.0 / (self.upper - self.lower) ** 2)
+        return np.asarray(np.linalg.inv(self.matrix / self.variance_factor + bounds))
+
+    @property
+    def standard_errors(self) -> Float[np.ndarray, " parameter"]:
+        """Standard errors of the coordinates from the readings alone; infinite where they say nothing [-]."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        with np.errstate(divide="ignore"):
+            spread = np.where(values > 1e-12 * max(values.max(), 1e-300), self.variance_factor / values, np.inf)
+        share = vectors**2
+        return np.asarray(np.sqrt(np.where(share > 1e-12, share * spread, 0.0).sum(axis=1)))
+
+    @property
+    def interval(self) -> Float[np.ndarray, "2 parameter"]:
+        """First-order 95 % interval of the coordinates, not cut at the bounds [-]."""
+        half = float(student.ppf(0.5 + LEVEL / 2, self.freedom)) * self.standard_errors
+        return np.stack([self.coordinates - half, self.coordinates + half])
+
+    @property
+    def on_bound(self) -> Bool[np.ndarray, " parameter"]:
+        """Which coordinates stand on a bound."""
+        near = _ON_BOUND * (self.upper - self.lower)
+        return np.asarray((self.coordinates <= self.lower + near) | (self.coordinates >= self.upper - near))
+
+
+def information(
+    problem: IdentificationProblem, prediction: Prediction, coordinates: Float[np.ndarray, " parameter"]
+) -> Information:
+    """Return what the readings say around a point.
+
+    Parameters
+    ----------
+    problem
+        The data.
+    prediction
+        What should have been read there.
+    coordinates
+        The point [-].
+
+    Notes
+    -----
+    Theory page, equation (39).
+    """
+    slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)
+    freedom = max(problem.readings - len(problem.parameters), 1)
+    reduced = float(left @ left) / freedom
+    return Information(
+        matrix=slopes.T @ slopes,
+        variance_factor=max(reduced, 1.0) if problem.data.noise_stated else reduced,
+        freedom=freedom,
+        reduced_chi_square=reduced,
+        lower=problem.lower,
+        upper=problem.upper,
+        coordinates=coordinates,
+    )

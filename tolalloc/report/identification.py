@@ -1,0 +1,252 @@
+"""What measured units say of the stiffness: answer, warnings, sections and summary of one report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
+from tolalloc.identification.parameters import BIAS
+from tolalloc.report import identification_figures as figures
+from tolalloc.report import identification_tables as tables
+from tolalloc.report.document import Document, Section
+from tolalloc.report.figure import Figure
+from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.units import ARCSECOND
+
+LARGE_CHI_SQUARE = 1.5
+"""Sum of squared residuals over noise, per degree of freedom, above which model and stated noise disagree [-]."""
+
+LARGE_STAND_IN_ERROR = 0.1
+"""Root-mean-square error of the stand-in over the smallest noise above which profiles are doubtful [-]."""
+
+
+def baseline_sentences(results: IdentificationResults) -> tuple[str, ...]:
+    """Return how a constant alone, and the choice by units not seen, compare with the fit."""
+    if results.chosen is None:
+        return (
+            f"{results.data.units.size} units: too few to judge a fit by units that it has not seen, or to resample.",
+        )
+    data, found = results.data, []
+    constant = results.candidate(BIAS)
+    whole = results.candidate(*(item.name for item in results.parameters))
+    if constant and whole:
+        one, all_of = (
+            (
+                item.rms(data, PEAK_TO_PEAK, unseen=False) / ARCSECOND,
+                item.rms(data, PEAK_TO_PEAK, unseen=True) / ARCSECOND,
+            )
+            for item in (constant, whole)
+        )
+        verdict = (
+            "A constant explains these peak-to-peaks better than the stiffness does"
+            if one[1] <= all_of[1]
+            else "The fit explains these peak-to-peaks better than a constant does"
+        )
+        found.append(
+            f"{verdict}: one bias added to the model leaves {one[0]:.3g}″ rms ({one[1]:.3g}″ on units left out), the "
+            f"fit of {whole.name} leaves {all_of[0]:.3g}″ ({all_of[1]:.3g}″ on units left out)."
+        )
+    found.append(
+        f"Judged by units left out, the simplest choice as good as the best within a standard error is: "
+        f"{results.chosen.name}."
+    )
+    return tuple(found)
+
+
+def answer(results: IdentificationResults) -> tuple[str, ...]:
+    """Return the answer in sentences."""
+    reach = ", ".join(
+        f"{kind} {results.rms(results.at_start, kind):.3g}″ before and {results.rms(results.at_found, kind):.3g}″ after"
+        for kind in results.kinds
+    )
+    return (
+        *(item.sentence for item in results.estimates),
+        *(
+            f"Direction {number}: {item.sentence(results.symbols)}."
+            for number, item in enumerate(results.information.directions, start=1)
+        ),
+        f"Root-mean-square of model less measured: {reach}.",
+        *baseline_sentences(results),
+    )
+
+
+def warnings(results: IdentificationResults) -> tuple[str, ...]:
+    """Return what a reader must know before using the numbers."""
+    found, own = [], results.information
+    open_ones = [item.parameter.symbol for item in results.estimates if not item.identified]
+    if open_ones:
+        found.append(
+            f"Not identified: {', '.join(open_ones)}. The stiffness file gives the middle of the bounds, and their "
+            "whole width as uncertainty."
+        )
+    found += [
+        f"{item.parameter.symbol} stands on a bound: widen it, or read the value as a limit."
+        for item in results.estimates
+        if item.on_bound and item.identified
+    ]
+    if results.data.noise_stated and own.reduced_chi_square > LARGE_CHI_SQUARE:
+        found.append(
+            f"Residuals are {np.sqrt(own.reduced_chi_square):.2g} times the stated noise: errors of the units or the "
+            "model itself miss something. All uncertainties are widened by that factor."
+        )
+    if not results.data.noise_stated:
+        found.append("No noise was stated, so it is estimated from what the fit leaves.")
+    doubtful = results.stand_in.rms_error > LARGE_STAND_IN_ERROR * results.data.noise.min()
+    if doubtful:
+        found.append(
+            "The polynomials behind profiles, bootstrap and choices are off by "
+            f"{results.stand_in.rms_error / ARCSECOND:.2g}″ rms, more than a tenth of the noise: narrow the bounds "
+            "before trusting those."
+        )
+    return (*found, *(f"Repaired: {repair}." for repair in results.measurements.repairs))
+
+
+def assumptions(results: IdentificationResults) -> tuple[str, ...]:
+    """Return what no source states."""
+    return (
+        *results.reducer.assumptions,
+        *results.measurements.assumptions,
+        "noise is normal and independent from reading to reading; errors of the units are known exactly",
+        "curves and loops lose their mean; angles and directions of the bench are those of the model",
+        "bounds enter the covariance as an even distribution between them",
+        "improved particle swarm: ω = 0.9, C1 = C2 = 2, a ring of three, stop at the bounds; liu2020 prints none",
+    )
+
+
+def summary(results: IdentificationResults) -> dict[str, Any]:
+    """Return the whole answer for a program, units in the names."""
+    data = results.data
+    return {
+        "reducer": results.reducer.name,
+        "data": results.measurements.name,
+        "units [-]": int(data.units.size),
+        "readings [-]": int(data.measured.size),
+        "method": results.found.method,
+        "evaluations [-]": results.found.evaluations,
+        "status": results.found.status,
+        "parameters": [
+            {
+                "name": item.parameter.name,
+                "unit": item.parameter.unit,
+                "start": item.parameter.start,
+                "value": item.value,
+                "relative standard uncertainty [-]"
+                if item.parameter.name != BIAS
+                else "standard uncertainty [arcsec]": (item.uncertainty),
+                "interval": list(item.interval),
+                "identified": item.identified,
+                "on bound": item.on_bound,
+            }
+            for item in results.estimates
+        ],
+        "directions": [item.sentence(results.symbols) for item in results.information.directions],
+        "reduced chi square [-]": results.information.reduced_chi_square,
+        "rms before [arcsec]": {kind: results.rms(results.at_start, kind) for kind in results.kinds},
+        "rms after [arcsec]": {kind: results.rms(results.at_found, kind) for kind in results.kinds},
+        "choices": [
+            {
+                "fitted": item.name,
+                "left out [noise]": item.score,
+                "rms [arcsec]": {kind: item.rms(data, kind, unseen=False) / ARCSECOND for kind in results.kinds},
+                "rms left out [arcsec]": {
+                    kind: item.rms(data, kind, unseen=True) / ARCSECOND for kind in results.kinds
+                },
+            }
+            for item in results.candidates
+        ],
+        "chosen": results.chosen.name if results.chosen else None,
+        "methods": [
+            {
+                "method": item.method,
+                "objectives [-]": [float(value) for value in item.objectives],
+                "evaluations [-]": [run.evaluations for run in item.runs],
+                "objective of the best on the model [-]": item.on_model,
+            }
+            for item in results.comparison
+        ],
+        "warnings": list(warnings(results)),
+        "assumptions": list(assumptions(results)),
+    }
+
+
+def _reading_figures(results: IdentificationResults) -> tuple[Figure, ...]:
+    """Return the figures of every kind of reading that there is."""
+    drawn = []
+    if PEAK_TO_PEAK in results.kinds:
+        drawn.append(figures.peak_to_peak_figure(results))
+    if CURVE in results.kinds:
+        drawn += [figures.curve_figure(results), figures.unit_residual_figure(results, CURVE)]
+    if LOOP in results.kinds:
+        drawn += [figures.loop_figure(results), figures.unit_residual_figure(results, LOOP)]
+    return tuple(drawn)
+
+
+def _sections(results: IdentificationResults) -> tuple[Section, ...]:
+    """Return the sections in the order of the questions that a reader has."""
+    stand_in = results.stand_in
+    parameters = Section(
+        heading="Parameters",
+        paragraphs=(
+            "The profile interval counts: it follows the real shape of the objective between the bounds. The "
+            "first-order one assumes a parabola, the bootstrap draws the units anew. Written: what the stiffness file "
+            "gives.",
+        ),
+        tables=(("parameters", tables.parameters_table(results)),),
+    )
+    fixed = Section(
+        heading="What the data fix",
+        paragraphs=(
+            "Eigenvectors of the Fisher information, best known first: each is a combination of relative changes that "
+            "the data know independently of the others.",
+            f"Profiles, bootstrap and choices ask polynomials of the model: {stand_in.trained} runs, rms error "
+            f"{stand_in.rms_error / ARCSECOND:.2g}″, largest {stand_in.largest_error / ARCSECOND:.2g}″ on "
+            f"{stand_in.held_out} runs that the fit has not seen.",
+        ),
+        figures=(figures.profile_figure(results),),
+        tables=(("directions", tables.directions_table(results)),),
+    )
+    choices = Section(
+        heading="Simpler explanations",
+        paragraphs=(
+            "Each choice is fitted to all units but one and judged by that one, in turn. Chosen is the one with the "
+            "fewest parameters that is as good as the best within one standard error.",
+        ),
+        tables=(("choices", tables.choices_table(results)),),
+    )
+    readings = Section(
+        heading="Measured against modelled",
+        figures=_reading_figures(results),
+        tables=(("units", tables.units_table(results)),),
+    )
+    return (parameters, fixed, *((choices,) if results.candidates else ()), readings)
+
+
+def _methods_section(results: IdentificationResults) -> Section:
+    """Return how the methods compare over many seeds."""
+    return Section(
+        heading="Methods",
+        paragraphs=(
+            "All methods minimise the same objective on the same polynomials, Gauss–Newton from three random starts "
+            "for each seed; the last column puts the best answer of each to the model itself.",
+        ),
+        figures=(figures.convergence_figure(results),),
+        tables=(("methods", tables.methods_table(results)),),
+    )
+
+
+def identification_document(results: IdentificationResults) -> Document:
+    """Return the report of one identification."""
+    return Document(
+        title=f"{results.reducer.name}: stiffness from {results.measurements.name}",
+        subtitle=f"{results.found.method}, {results.found.evaluations} evaluations of "
+        f"{results.data.units.size} units, {results.data.measured.size} readings; {results.found.status}; "
+        f"seed {results.seed}.",
+        answer=answer(results),
+        warnings=warnings(results),
+        sections=(*_sections(results), *((_methods_section(results),) if results.comparison else ())),
+        assumptions=assumptions(results),
+        summary=summary(results),
+        seed=results.seed,
+    )

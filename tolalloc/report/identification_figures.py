@@ -1,0 +1,145 @@
+"""Figures of an identification: profiles, measured against modelled readings, residuals per unit, convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
+from tolalloc.identification.parameters import BIAS
+from tolalloc.report.figure import Figure, Series
+from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.search.history import quartiles
+from tolalloc.units import ARCSECOND, DEGREE
+
+_TOP = 4.0  # a profile is drawn up to so many times its threshold
+
+
+def profile_figure(results: IdentificationResults) -> Figure:
+    """Draw how much worse the fit gets as each stiffness or torque is held away from its best value."""
+    series = []
+    for item, own in zip(results.parameters, results.profiles, strict=True):
+        if item.name == BIAS:
+            continue
+        shown = own.rise <= _TOP * own.threshold
+        change = [100 * (item.value(float(at)) / item.start - 1) for at in own.coordinate[shown]]
+        series.append(Series(label=item.symbol, kind="line", x=change, y=list(own.rise[shown])))
+    return Figure(
+        name="profiles",
+        title="Profile likelihood: a flat line to both ends is a parameter that the data do not identify",
+        x_label="change from the given value [%]",
+        y_label="rise of twice the objective [-]",
+        series=tuple(series),
+        horizontal=((results.profiles[0].threshold, "95 %"),),
+    )
+
+
+def peak_to_peak_figure(results: IdentificationResults) -> Figure:
+    """Draw model less measured of every unit, before and after."""
+    rows = results.blocks(PEAK_TO_PEAK)[0].rows
+    numbers = [float(unit) + 1 for unit in results.data.unit[rows]]
+    return Figure(
+        name="peak_to_peak_residuals",
+        title="Peak-to-peak, model less measured, per unit",
+        x_label="unit [-]",
+        y_label="model less measured [arcsec]",
+        series=tuple(
+            Series(
+                label=label,
+                kind="points",
+                x=numbers,
+                y=list((prediction.values - results.data.measured)[rows] / ARCSECOND),
+            )
+            for label, prediction in (("before", results.at_start), ("after", results.at_found))
+        ),
+        horizontal=((0.0, ""),),
+    )
+
+
+def curve_figure(results: IdentificationResults) -> Figure:
+    """Draw the first measured curve and the model's after the fit."""
+    block = results.blocks(CURVE)[0]
+    curve = results.measurements.curves[block.number]
+    angle = list(curve.carrier_angle / DEGREE)
+    measured = results.data.measured[block.rows] / ARCSECOND
+    model = results.at_found.values[block.rows] / ARCSECOND
+    return Figure(
+        name="measured_curve",
+        title=f"Unit {results.measurements.units[curve.unit].name} at {curve.torque:g} N·m: measured and modelled",
+        x_label="carrier angle [°]",
+        y_label="transmission error [arcsec]",
+        series=(
+            Series(label="measured", kind="line", x=angle, y=list(measured)),
+            Series(label="model after the fit", kind="line", x=angle, y=list(model)),
+            Series(label="model less measured", kind="line", x=angle, y=list(model - measured)),
+        ),
+    )
+
+
+def loop_figure(results: IdentificationResults) -> Figure:
+    """Draw the first measured loop and the model's before and after the fit."""
+    block = results.blocks(LOOP)[0]
+    loop = results.measurements.loops[block.number]
+    torque, name = list(loop.torque), results.measurements.units[loop.unit].name
+    return Figure(
+        name="measured_loop",
+        title=f"Unit {name} at {loop.carrier_angle / DEGREE:.0f}°: torque and twist",
+        x_label="torque on the carrier [N·m]",
+        y_label="twist less its mean [arcsec]",
+        series=(
+            Series(label="measured", kind="points", x=torque, y=list(results.data.measured[block.rows] / ARCSECOND)),
+            Series(
+                label="model before", kind="line", x=torque, y=list(results.at_start.values[block.rows] / ARCSECOND)
+            ),
+            Series(label="model after", kind="line", x=torque, y=list(results.at_found.values[block.rows] / ARCSECOND)),
+        ),
+    )
+
+
+def unit_residual_figure(results: IdentificationResults, kind: str) -> Figure:
+    """Draw the root-mean-square residual of every unit's curves or loops, before and after."""
+    data, names = results.data, [results.measurements.units[unit].name for unit in results.data.units]
+    chosen = np.zeros(data.measured.size, bool)
+    for block in results.blocks(kind):
+        chosen[block.rows] = True
+    series = []
+    for label, prediction in (("before", results.at_start), ("after", results.at_found)):
+        left = (prediction.values - data.measured) / ARCSECOND
+        rms = [float(np.sqrt((left[chosen & (data.unit == unit)] ** 2).mean())) for unit in data.units]
+        series.append(Series(label=label, kind="bars", x=[f"unit {name}" for name in names], y=rms))
+    return Figure(
+        name=f"{kind}_residuals",
+        title=f"Root-mean-square of model less measured over each unit's {kind}s",
+        x_label="rms [arcsec]",
+        y_label="",
+        series=tuple(series),
+    )
+
+
+def convergence_figure(results: IdentificationResults) -> Figure:
+    """Draw S above its least after so many evaluations: median and quartiles of the seeds."""
+    least = min(float(item.objectives.min()) for item in results.comparison)
+    series = []
+    for item in results.comparison:
+        most = max(run.evaluations for run in item.runs)
+        first = max(int(run.history.evaluations[0]) for run in item.runs)
+        at = np.unique(np.geomspace(max(first, 1), most, 120).astype(int))
+        band = np.maximum(np.sqrt(quartiles([run.history for run in item.runs], at) / least) - 1, 1e-9)
+        series.append(
+            Series(
+                label=item.method,
+                kind="line",
+                x=[float(value) for value in at],
+                y=list(band[1]),
+                low=list(band[0]),
+                high=list(band[2]),
+            )
+        )
+    return Figure(
+        name="convergence",
+        title=f"Distance of S from its least: median and quartiles of {len(results.comparison[0].runs)} seeds",
+        x_label="evaluations of all units [-]",
+        y_label="S over its least, less 1 [-]",
+        series=tuple(series),
+        logarithmic=True,
+        logarithmic_x=True,
+    )

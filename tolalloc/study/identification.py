@@ -1,0 +1,220 @@
+"""From measured units to stiffnesses: fit, what the data fix, and what simpler explanations would do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.identification.data import Data, data_of
+from tolalloc.identification.estimate import estimates
+from tolalloc.identification.gauss_newton import NAME as GAUSS_NEWTON
+from tolalloc.identification.gauss_newton import gauss_newton, starts
+from tolalloc.identification.information import information
+from tolalloc.identification.parameters import BIAS, Parameter, parameter
+from tolalloc.identification.prediction import KernelPredictor
+from tolalloc.identification.problem import IdentificationProblem, require_enough
+from tolalloc.identification.profile import profile
+from tolalloc.identification.resampling import FEWEST_UNITS, Candidate, bootstrap, judged, simplest
+from tolalloc.identification.result import Comparison, Identified
+from tolalloc.identification.searches import ALGORITHMS, search
+from tolalloc.identification.stand_in import StandIn, fit_stand_in
+from tolalloc.measurement.records import Measurements
+from tolalloc.reducer.design import Reducer
+from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.study.stages import Progress
+from tolalloc.uncertainty.seeds import SeedTree
+
+METHODS = {
+    "gauss_newton": GAUSS_NEWTON,
+    "improved_pso": "improved particle swarm",
+    "pso": "particle swarm",
+    "ga": "genetic algorithm",
+}
+"""Name on the command line → method."""
+
+_STARTS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentificationStudy:
+    """What is to be identified, and how.
+
+    Parameters
+    ----------
+    parameters
+        The unknowns.
+    method
+        One of `METHODS`.
+    seeds
+        Runs of every method that are compared; none if 0 [-].
+    seed
+        Seed of every random number [-].
+    place
+        Where the data were read, for errors.
+    """
+
+    parameters: tuple[Parameter, ...]
+    method: str = "gauss_newton"
+    seeds: int = 0
+    seed: int = 1
+    place: str = "tolalloc identify"
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UnknownNameError.among(self.place, "method", self.method, METHODS)
+        names = [item.name for item in self.parameters]
+        if not set(names) - {BIAS}:
+            raise InputError.at(self.place, "parameters", names, "one or more besides the bias, which is the baseline")
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError.at(self.place, "parameter", name, "each parameter once")
+        for name, value, good, allowed in (
+            ("seeds", self.seeds, 0 <= self.seeds <= 1000, "0 to 1000"),
+            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
+        ):
+            if not good:
+                raise InputError.at(self.place, name, value, allowed)
+
+
+def identify(
+    study: IdentificationStudy, measurements: Measurements, reducer: Reducer, progress: Progress
+) -> IdentificationResults:
+    """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
+
+    Parameters
+    ----------
+    study
+        What is to be identified.
+    measurements
+        Readings of finished units.
+    reducer
+        Nominal design; its stiffness is where every search begins.
+    progress
+        Told of every stage and of the units answered for.
+
+    Raises
+    ------
+    InputError
+        Too few readings or units for the parameters.
+    SolveError
+        A unit has no equilibrium.
+    """
+    data, seeds = data_of(measurements, study.place), SeedTree(study.seed).child("identification")
+    _require_visible(study, data)
+    kernel = KernelPredictor(reducer, study.parameters, measurements, data, progress.advance)
+    problem = IdentificationProblem(
+        parameters=study.parameters,
+        data=data,
+        predictor=kernel,
+        weight=np.ones(len(measurements.units)),
+        place=study.place,
+    )
+    require_enough(problem)
+    progress.begin("polynomials of the model")
+    stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
+    quick = problem.of(study.parameters, stand_in)
+    progress.begin(METHODS[study.method])
+    found = _found(study, problem, quick, seeds)
+    prediction = kernel(found.coordinates)
+    own = information(problem, prediction, found.coordinates)
+    progress.begin("what the data fix")
+    near = gauss_newton(quick, found.coordinates[np.newaxis]).coordinates
+    profiles = tuple(profile(quick, near, at, own) for at in range(len(study.parameters)))
+    several = data.units.size >= FEWEST_UNITS
+    progress.begin("other choices")
+    candidates = judged_candidates(quick, stand_in, reducer) if several else ()
+    return IdentificationResults(
+        measurements=measurements,
+        reducer=reducer,
+        data=data,
+        parameters=study.parameters,
+        found=found,
+        at_start=kernel(problem.start),
+        at_found=prediction,
+        information=own,
+        profiles=profiles,
+        estimates=estimates(study.parameters, found.coordinates, own, profiles),
+        bootstrap=bootstrap(quick, near, seeds.child("bootstrap")) if several else None,
+        candidates=candidates,
+        chosen=simplest(candidates) if candidates else None,
+        stand_in=stand_in.polynomial,
+        comparison=compare(problem, quick, study, progress) if study.seeds else (),
+        seed=study.seed,
+        place=study.place,
+    )
+
+
+def _require_visible(study: IdentificationStudy, data: Data) -> None:
+    """Refuse a bias where no reading shows one: curves and loops have lost their mean."""
+    if any(item.name == BIAS for item in study.parameters) and data.peak_to_peak is None:
+        raise InputError(
+            f"{study.place}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
+        )
+
+
+def _found(
+    study: IdentificationStudy, problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree
+) -> Identified:
+    """Return the answer of the chosen method, its objective on the model itself."""
+    if METHODS[study.method] == GAUSS_NEWTON:
+        return gauss_newton(problem, starts(problem, _STARTS, seeds.child("starts")), study.seed)
+    return on_the_model(problem, search(quick, METHODS[study.method], study.seed))
+
+
+def on_the_model(problem: IdentificationProblem, found: Identified) -> Identified:
+    """Return a stand-in's answer with its objective on the model itself."""
+    return replace(found, objective=float(problem.objectives(found.coordinates[np.newaxis])[0]))
+
+
+def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[Candidate, ...]:
+    """Return nothing, a bias, each parameter alone, all, and all with a bias, each judged by units not seen.
+
+    Parameters
+    ----------
+    quick
+        The data, predicted by the stand-in.
+    stand_in
+        Polynomials of all parameters.
+    reducer
+        Nominal design.
+    """
+    asked = tuple(item for item in quick.parameters if item.name != BIAS)
+    choices: list[tuple[Parameter, ...]] = [(), *((item,) for item in asked)]
+    if len(asked) > 1:
+        choices.append(asked)
+    if quick.data.peak_to_peak is not None:
+        own = next((item for item in quick.parameters if item.name == BIAS), parameter(BIAS, reducer))
+        choices[1:1] = [(own,)]
+        choices.append((*asked, own))
+    return tuple(judged(quick, stand_in, choice) for choice in choices)
+
+
+def compare(
+    problem: IdentificationProblem, quick: IdentificationProblem, study: IdentificationStudy, progress: Progress
+) -> tuple[Comparison, ...]:
+    """Return every method's answers from many seeds, on the same stand-in; the best of each is put to the model.
+
+    Parameters
+    ----------
+    problem, quick
+        The data, predicted by the model and by the stand-in.
+    study
+        Seeds.
+    progress
+        Told of every method.
+    """
+    methods = []
+    for name in (GAUSS_NEWTON, *ALGORITHMS):
+        progress.begin(f"{name}, {study.seeds} seeds")
+        runs = []
+        for seed in range(study.seed, study.seed + study.seeds):
+            if name == GAUSS_NEWTON:  # from random starts, as every other method
+                begin = starts(quick, _STARTS + 1, SeedTree(seed).child("identification", name))[1:]
+                runs.append(gauss_newton(quick, begin, seed))
+            else:
+                runs.append(search(quick, name, seed))
+        best = min(runs, key=lambda run: run.objective)
+        methods.append(Comparison(runs=tuple(runs), on_model=on_the_model(problem, best).objective))
+    return tuple(methods)
