@@ -16,6 +16,7 @@ LEVEL = 0.95
 """Confidence of every interval [-]."""
 
 _ON_BOUND = 1e-3  # distance over the box within which a coordinate stands on its bound [-]
+_NOTHING = 1e-12  # eigenvalue over the largest, or squared loading, that is rounding [-]
 _SMALL = 0.05  # loadings below this share of the largest are not written [-]
 
 
@@ -116,10 +117,11 @@ class Information:
     def standard_errors(self) -> Float[np.ndarray, " parameter"]:
         """Standard errors of the coordinates from the readings alone; infinite where they say nothing [-]."""
         values, vectors = np.linalg.eigh(self.matrix)
-        with np.errstate(divide="ignore"):
-            spread = np.where(values > 1e-12 * max(values.max(), 1e-300), self.variance_factor / values, np.inf)
+        known = values > _NOTHING * max(values.max(), np.finfo(float).tiny)
         share = vectors**2
-        return np.asarray(np.sqrt(np.where(share > 1e-12, share * spread, 0.0).sum(axis=1)))
+        variance = share[:, known] @ (self.variance_factor / values[known])
+        open_to = share[:, ~known].sum(axis=1) > _NOTHING
+        return np.asarray(np.where(open_to, np.inf, np.sqrt(variance)))
 
     @property
     def interval(self) -> Float[np.ndarray, "2 parameter"]:

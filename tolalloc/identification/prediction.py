@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -43,6 +43,7 @@ class Prediction:
     by_coordinate: Float[np.ndarray, "datum parameter"]
 
 
+@runtime_checkable
 class Predictor(Protocol):
     """Answers for all readings at one point, or at many without derivatives."""
 

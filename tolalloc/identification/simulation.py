@@ -42,7 +42,7 @@ class Bench:
     loop_noise: float = 0.0
 
 
-def random_units(errors: ErrorModel, count: int, seeds: SeedTree) -> tuple[BuiltUnit, ...]:
+def random_units(errors: ErrorModel, count: int, seeds: SeedTree, scale: float = 1.0) -> tuple[BuiltUnit, ...]:
     """Return units with random errors inside their zones; what the tolerance table does not list is exact.
 
     Parameters
@@ -53,9 +53,11 @@ def random_units(errors: ErrorModel, count: int, seeds: SeedTree) -> tuple[Built
         Number of units [-].
     seeds
         Node of the seed tree.
+    scale
+        Zones over those of the sources [-].
     """
     uniform = np.concatenate(list(seeds.uniform_chunks(count, len(errors.columns))))
-    rows = errors.deviations(errors.standard_values(uniform), errors.zones)
+    rows = errors.deviations(errors.standard_values(uniform), scale * errors.zones)
     return tuple(
         BuiltUnit(
             name=str(number + 1),

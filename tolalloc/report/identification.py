@@ -228,7 +228,7 @@ def _methods_section(results: IdentificationResults) -> Section:
     return Section(
         heading="Methods",
         paragraphs=(
-            "All methods minimise the same objective on the same polynomials, Gauss–Newton from three random starts "
+            "All methods minimise the same objective on the same polynomials, Gauss–Newton from eight random starts "
             "for each seed; the last column puts the best answer of each to the model itself.",
         ),
         figures=(figures.convergence_figure(results),),

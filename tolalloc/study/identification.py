@@ -34,7 +34,8 @@ METHODS = {
 }
 """Name on the command line → method."""
 
-_STARTS = 3
+_STARTS = 8
+"""Starts of Gauss–Newton: flat directions end in several corners of the box [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,9 +159,11 @@ def _found(
     study: IdentificationStudy, problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree
 ) -> Identified:
     """Return the answer of the chosen method, its objective on the model itself."""
-    if METHODS[study.method] == GAUSS_NEWTON:
-        return gauss_newton(problem, starts(problem, _STARTS, seeds.child("starts")), study.seed)
-    return on_the_model(problem, search(quick, METHODS[study.method], study.seed))
+    if METHODS[study.method] != GAUSS_NEWTON:
+        return on_the_model(problem, search(quick, METHODS[study.method], study.seed))
+    near = gauss_newton(quick, starts(quick, _STARTS, seeds.child("starts")), study.seed)
+    found = gauss_newton(problem, near.coordinates[np.newaxis], study.seed)
+    return replace(found, history=near.history.then(found.history))
 
 
 def on_the_model(problem: IdentificationProblem, found: Identified) -> Identified:

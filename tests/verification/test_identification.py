@@ -1,0 +1,317 @@
+"""Identification: derivatives, closed forms of a linear problem, liu2020's swarm, and finding the truth again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, log
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from scipy.stats import t as student
+
+from tolalloc.exceptions import InputError
+from tolalloc.identification.baseline import BiasOnly, improvement
+from tolalloc.identification.data import Block, Data, data_of
+from tolalloc.identification.estimate import as_stiffness, estimates
+from tolalloc.identification.gauss_newton import gauss_newton, starts
+from tolalloc.identification.information import information
+from tolalloc.identification.parameters import LIU2020, Parameter, parameter
+from tolalloc.identification.prediction import KernelPredictor, Prediction
+from tolalloc.identification.problem import IdentificationProblem, require_enough
+from tolalloc.identification.profile import profile
+from tolalloc.identification.recovery import recovery
+from tolalloc.identification.resampling import bootstrap, judged, simplest
+from tolalloc.identification.searches import ALGORITHMS, search
+from tolalloc.identification.simulation import Bench, random_units, simulated_bench
+from tolalloc.identification.stand_in import StandIn, fit_stand_in
+from tolalloc.identification.swarm import best_neighbours, velocity, weights
+from tolalloc.reducer.files import load_reducer
+from tolalloc.surrogate.polynomial import fit_box_polynomial, total_degrees
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import ErrorModel
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.units import ARCSECOND
+
+NONE = np.empty(0)
+RV20E = load_reducer("rv20e")
+ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
+
+
+def bench(**changes) -> Bench:
+    angles = 2 * np.pi * np.arange(24) / 24
+    whole = Bench(
+        peak_to_peak_torque=-1.0,
+        peak_to_peak_noise=ARCSECOND,
+        curve_torques=(-1.0, 40.0),
+        curve_angles=angles,
+        curve_noise=0.5 * ARCSECOND,
+        loop_angles=(0.3,),
+        loop_torques=np.array([-160.0, -40.0, 5.0, 60.0, 160.0]),
+        loop_noise=0.1 * ARCSECOND,
+    )
+    return replace(whole, **changes)
+
+
+def test_derivatives_of_every_kind_of_reading_agree_with_differences():
+    """Peak-to-peaks are as accurate as the angles of their kinks, so they need a longer step than curves and loops."""
+    names = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing", "gear_mesh", "pin_contact")
+    parameters = tuple(parameter(name, RV20E) for name in (*names, "torque", "bias"))
+    measured = simulated_bench(RV20E, random_units(ERRORS, 4, SeedTree(3)), bench()).measurements
+    data = data_of(measured, "test")
+    predict = KernelPredictor(RV20E, parameters, measured, data)
+    at = np.array([0.05, -0.1, 0.2, 0.1, -0.15, 0.3, 1.5])
+    slopes = predict(at).by_coordinate
+    for place, item in enumerate(parameters):
+        difference = {}
+        for step in (2e-4, 0.02):
+            move = step * np.eye(at.size)[place]
+            difference[step] = (predict(at + move).values - predict(at - move).values) / (2 * step)
+        for block in data.blocks:
+            expected = difference[2e-4 if block.centred else 0.02][block.rows] / ARCSECOND
+            own = slopes[block.rows, place] / ARCSECOND
+            finest = 0.0 if block.centred else 0.01  # what 0.0004″ of a peak-to-peak make over this step
+            allowed = 0.02 * max(np.abs(expected).max(), 1e-3) + finest
+            assert np.median(np.abs(own - expected)) < allowed, (item.name, block)
+
+
+def test_curves_and_loops_lose_their_mean_and_peak_to_peaks_do_not():
+    measured = simulated_bench(RV20E, random_units(ERRORS, 2, SeedTree(3)), bench()).measurements
+    data = data_of(measured, "test")
+    prediction = KernelPredictor(RV20E, (parameter("bias", RV20E, (-5.0, 5.0)),), measured, data)(np.array([2.0]))
+    for block in data.blocks:
+        mean = prediction.values[block.rows].mean() / ARCSECOND
+        assert abs(mean) < 1e-9 if block.centred else mean > 10
+    np.testing.assert_allclose(prediction.values[:2] - data.measured[:2], 2.0 * ARCSECOND, rtol=1e-9)
+    assert data.free == data.measured.size - 6  # two units with two curves and a loop each
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Readings that are linear in the coordinates: everything about them has a closed form."""
+
+    slopes: np.ndarray
+
+    def __call__(self, coordinates: np.ndarray) -> Prediction:
+        return Prediction(values=self.slopes @ coordinates, by_coordinate=self.slopes)
+
+    def values(self, coordinates: np.ndarray) -> np.ndarray:
+        return coordinates @ self.slopes.T
+
+
+def straight_problem(readings: int, noise_stated: bool = True, prior: float = inf) -> IdentificationProblem:
+    generator = np.random.default_rng(7)
+    slopes = generator.normal(size=(readings, 2))
+    truth = np.array([0.1, -0.2])
+    data = Data(
+        measured=slopes @ truth + generator.normal(0, 0.3, readings),
+        noise=np.full(readings, 0.3),
+        unit=np.arange(readings),
+        blocks=(Block(kind="peak-to-peak", number=0, rows=slice(0, readings), centred=False),),
+        noise_stated=noise_stated,
+    )
+    parameters = tuple(
+        Parameter(name=name, low=1e9, high=1e11, start=1e10, prior=prior)
+        for name in ("crank_disc_bearing", "crank_carrier_bearing")
+    )
+    return IdentificationProblem(parameters=parameters, data=data, predictor=Straight(slopes), weight=np.ones(readings))
+
+
+@pytest.mark.parametrize("prior", [inf, 0.05])
+def test_linear_readings_give_the_closed_form_of_least_squares(prior):
+    problem = straight_problem(40, prior=prior)
+    slopes, weight = problem.predictor.slopes / 0.3, 0.0 if prior == inf else 1 / prior**2
+    normal = slopes.T @ slopes + weight * np.eye(2)
+    expected = np.linalg.solve(normal, slopes.T @ problem.data.measured / 0.3)
+    found = gauss_newton(problem, problem.start[np.newaxis])
+    np.testing.assert_allclose(found.coordinates, expected, atol=1e-6)
+    own = information(problem, problem.predictor(expected), expected)
+    np.testing.assert_allclose(own.matrix, normal, rtol=1e-12)
+    np.testing.assert_allclose(
+        own.standard_errors, np.sqrt(own.variance_factor * np.diag(np.linalg.inv(normal))), rtol=1e-9
+    )
+    bounds = np.diag(12 / (problem.upper - problem.lower) ** 2)
+    np.testing.assert_allclose(own.covariance, np.linalg.inv(normal / own.variance_factor + bounds), rtol=1e-9)
+
+
+@pytest.mark.parametrize("noise_stated", [True, False])
+def test_the_profile_of_linear_readings_is_the_students_interval(noise_stated):
+    problem = straight_problem(12, noise_stated)
+    found = gauss_newton(problem, problem.start[np.newaxis])
+    own = information(problem, problem.predictor(found.coordinates), found.coordinates)
+    if not noise_stated:
+        assert own.variance_factor == pytest.approx(2 * found.objective / 10, rel=1e-6)
+    half = student.ppf(0.975, 10) * own.standard_errors
+    for place in range(2):
+        low, high = profile(problem, found.coordinates, place, own).interval
+        assert low == pytest.approx(found.coordinates[place] - half[place], abs=0.01 * half[place])
+        assert high == pytest.approx(found.coordinates[place] + half[place], abs=0.01 * half[place])
+
+
+def test_a_parameter_without_effect_is_not_identified_and_said_so():
+    problem = straight_problem(40)
+    blind = replace(problem, predictor=Straight(problem.predictor.slopes * [1.0, 0.0]))
+    found = gauss_newton(blind, blind.start[np.newaxis])
+    own = information(blind, blind.predictor(found.coordinates), found.coordinates)
+    profiles = [profile(blind, found.coordinates, place, own) for place in range(2)]
+    assert [item.is_identified for item in profiles] == [True, False]
+    assert profiles[1].interval == pytest.approx((blind.lower[1], blind.upper[1]))
+    assert own.standard_errors[1] == inf
+    assert [item.is_fixed for item in own.directions] == [True, False]
+    rows = estimates(blind.parameters, found.coordinates, own, profiles)
+    assert "not identified" in rows[1].sentence
+    written = as_stiffness(rows, own, "test", ())
+    assert written is not None
+    assert written.values["crank_carrier_bearing"] == pytest.approx(1e10)  # the middle of 1e9 and 1e11
+    even = (log(1e11) - log(1e9)) / np.sqrt(12)
+    assert written.standard_uncertainty["crank_carrier_bearing"] == pytest.approx(1e10 * even)
+    assert written.correlation[0, 1] == 0.0
+
+
+def test_bootstrap_spreads_as_least_squares_says():
+    """With 40 units the bootstrap's standard deviation is within 40 % of the first-order one."""
+    problem = straight_problem(40)
+    found = gauss_newton(problem, problem.start[np.newaxis])
+    own = information(problem, problem.predictor(found.coordinates), found.coordinates)
+    drawn = bootstrap(problem, found.coordinates, SeedTree(1)).coordinates
+    np.testing.assert_allclose(drawn.std(axis=0), own.standard_errors, rtol=0.4)
+
+
+def fitted_straight(problem: IdentificationProblem) -> StandIn:
+    polynomial = fit_box_polynomial(problem.predictor.values, problem.lower, problem.upper, 2, SeedTree(1))
+    assert polynomial.largest_error < 1e-9
+    return StandIn(problem.parameters, problem.parameters, polynomial, problem.data)
+
+
+def test_leaving_units_out_has_the_closed_form_of_the_hat_matrix():
+    problem = straight_problem(15)
+    slopes = problem.predictor.slopes
+    hat = slopes @ np.linalg.solve(slopes.T @ slopes, slopes.T)
+    left = hat @ problem.data.measured - problem.data.measured
+    found = judged(problem, fitted_straight(problem), problem.parameters)
+    np.testing.assert_allclose(found.left, left, atol=1e-5)
+    np.testing.assert_allclose(found.unseen, left / (1 - np.diag(hat)), atol=1e-5)
+
+
+def test_a_bias_alone_left_out_is_the_formula_of_the_baseline():
+    problem = straight_problem(15)
+    bias = Parameter(name="bias", low=-3600.0, high=3600.0, start=0.0)
+    scaled = replace(
+        problem,
+        data=replace(problem.data, measured=problem.data.measured * ARCSECOND, noise=problem.data.noise * ARCSECOND),
+        predictor=Straight(problem.predictor.slopes * ARCSECOND),
+    )
+    found = judged(scaled, fitted_straight(scaled), (bias,))
+    expected = BiasOnly(difference=-scaled.data.measured)
+    assert np.sqrt((found.left**2).mean()) == pytest.approx(expected.rms, rel=1e-6)
+    assert np.sqrt((found.unseen**2).mean()) == pytest.approx(expected.leave_one_out, rel=1e-6)
+
+
+def test_the_simplest_choice_is_taken_when_more_explains_no_more():
+    problem = straight_problem(30)
+    stand_in = fitted_straight(problem)
+    choices = [judged(problem, stand_in, chosen) for chosen in ((), problem.parameters[:1], problem.parameters)]
+    assert simplest(choices).parameters == problem.parameters  # both have an effect of several standard errors
+    blind = replace(problem, predictor=Straight(problem.predictor.slopes * [1.0, 0.0]))
+    stand_in = fitted_straight(blind)
+    choices = [judged(blind, stand_in, chosen) for chosen in (blind.parameters[1:], blind.parameters)]
+    assert simplest(choices).parameters == blind.parameters[1:]
+
+
+def test_too_few_units_are_refused():
+    problem = straight_problem(2)
+    with pytest.raises(InputError, match="peak-to-peaks of 2 units cannot fix 2 parameters"):
+        require_enough(problem)
+
+
+def test_polynomials_know_their_derivatives_and_their_error():
+    lower, upper = np.array([-1.0, 0.5]), np.array([2.0, 0.8])
+    found = fit_box_polynomial(
+        lambda x: np.stack([np.exp(0.3 * x[:, 0]) * x[:, 1], np.sin(x[:, 0])], axis=1), lower, upper, 6, SeedTree(1)
+    )
+    assert len(total_degrees(2, 6)) == 28
+    assert 0 < found.rms_error <= found.largest_error < 2e-4
+    at = np.array([0.7, 0.61])
+    expected = [
+        [0.3 * np.exp(0.21) * 0.61, np.exp(0.21)],
+        [np.cos(0.7), 0.0],
+    ]
+    np.testing.assert_allclose(found.derivatives(at), expected, atol=1e-3)
+    coarse = fit_box_polynomial(lambda x: np.abs(x[:, :1]), lower, upper, 3, SeedTree(1))
+    assert coarse.largest_error > 0.01  # a kink is no polynomial, and the held-out runs say so
+
+
+def test_the_weight_of_the_improved_swarm_stays_between_0_and_1():
+    """Equation (17) with the factor d that is printed inside its sum would leave that range."""
+    lower, upper = np.array([0.0, 0.0, 0.0]), np.array([1.0, 2.0, 4.0])
+    corners = np.array([lower, upper, 0.5 * upper])
+    np.testing.assert_allclose(weights(corners, upper, lower, upper)[:, 0], [0.0, 1.0, 0.5])
+    printed = 1 - (np.arange(1, 4) * np.abs(upper - lower) / (upper - lower)).sum() / 3
+    assert printed < 0
+
+
+def test_the_velocity_is_equation_18():
+    one = np.ones((1, 1))
+    random = np.array([0.5, 0.25, 0.75]).reshape(3, 1, 1)
+    alpha = np.array([[0.6]])
+    found = velocity(0.0 * one, 2.0 * one, 1.0 * one, np.array([10.0]), 100.0 * one, alpha, random)
+    expected = 0.9 * 2 + 0.6 * 2 * 0.5 * 1 + 0.4 * (0.4 * 2 * 0.25 * 10 + 0.6 * 2 * 0.75 * 100)
+    assert found[0, 0] == pytest.approx(expected)
+    assert list(best_neighbours(np.array([3.0, 1.0, 2.0, 0.0, 5.0]))) == [1, 1, 3, 3, 3]
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_every_search_ends_where_gauss_newton_does(algorithm):
+    """Within 1e-4 of S, and the same bits from the same seed."""
+    problem = straight_problem(40)
+    least = gauss_newton(problem, starts(problem, 3, SeedTree(1)))
+    found = search(problem, algorithm, 0)
+    assert problem.rms(found.objective) <= (1 + 1e-4) * problem.rms(least.objective)
+    assert least.evaluations <= found.evaluations / 20
+    np.testing.assert_array_equal(found.coordinates, search(problem, algorithm, 0).coordinates)
+    assert (np.diff(found.history.best) <= 0).all()
+    assert ((found.coordinates >= problem.lower) & (found.coordinates <= problem.upper)).all()
+
+
+def test_peak_to_peaks_at_one_newton_metre_leave_two_stiffnesses_open():
+    """As Table 6 of liu2020 hints: one and the same S with K_b and K_ca anywhere between their bounds."""
+    limits = {"crank_disc_bearing": (0.8e10, 1.3e10), "crank_carrier_bearing": (1.4e10, 1.8e10)}
+    limits["carrier_bearing"] = (7.4e10, 8.0e10)
+    units = random_units(ERRORS, 20, SeedTree(4))
+    only = bench(curve_torques=(), loop_angles=())
+    measured = simulated_bench(RV20E, units, only).measured(SeedTree(5))
+    data = data_of(measured, "test")
+    parameters = tuple(parameter(name, RV20E, limits[name]) for name in LIU2020)
+    kernel = KernelPredictor(RV20E, parameters, measured, data)
+    stand_in = fit_stand_in(kernel, SeedTree(6))
+    assert stand_in.polynomial.rms_error < 0.02 * ARCSECOND
+    problem = IdentificationProblem(parameters=parameters, data=data, predictor=stand_in, weight=np.ones(20))
+    found = gauss_newton(problem, starts(problem, 3, SeedTree(7)))
+    own = information(problem, stand_in(found.coordinates), found.coordinates)
+    for place in (1, 2):
+        assert not profile(problem, found.coordinates, place, own).is_identified
+
+
+def test_curves_and_loops_find_the_truth_again():
+    """Twelve repetitions; all of them within three standard errors, and intervals that cover as 95 % intervals do."""
+    true = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.0e10}
+    truth = replace(RV20E, stiffness=replace(RV20E.stiffness, **true))
+    plan = bench(
+        peak_to_peak_torque=0.0,
+        curve_angles=2 * np.pi * np.arange(180) / 180,
+        loop_angles=(0.0, 1.5),
+        loop_torques=167 * np.array([-1, -0.6, -0.2, 0.2, 0.6, 1]),
+        curve_torques=(-1.0, 1.0),
+    )
+    exact = simulated_bench(truth, random_units(ERRORS, 3, SeedTree(8)), plan)
+    parameters = tuple(parameter(name, RV20E) for name in LIU2020)
+    at = np.array([item.coordinate(true[item.name]) for item in parameters])
+    found = recovery(RV20E, parameters, at, exact, 12, SeedTree(9))
+    assert found.recovered == 12
+    held = int(found.covered.sum())
+    assert held >= binom.ppf(0.001, 36, 0.95)
+    assert np.abs(found.error.mean(axis=0) / found.error.std(axis=0, ddof=1) * np.sqrt(12)).max() < 4
+
+
+def test_the_gain_of_table_7_is_a_share_of_the_difference():
+    np.testing.assert_allclose(improvement(np.array([2.0, 4.0]), np.array([1.0, 3.0])), [0.5, 0.25])
