@@ -42,7 +42,9 @@ class _Coordinates(Problem):  # type: ignore[misc]
         out["F"] = objectives
 
 
-def search(problem: IdentificationProblem, algorithm: str, seed: int) -> Identified:
+def search(
+    problem: IdentificationProblem, algorithm: str, seed: int, begin: Callable[[], Algorithm] | None = None
+) -> Identified:
     """Return the best point that an algorithm comes across.
 
     Parameters
@@ -53,6 +55,8 @@ def search(problem: IdentificationProblem, algorithm: str, seed: int) -> Identif
         One of `ALGORITHMS`.
     seed
         Seed, 0 like every other [-].
+    begin
+        Makes the algorithm with other settings than those of `ALGORITHMS`.
 
     Raises
     ------
@@ -64,5 +68,5 @@ def search(problem: IdentificationProblem, algorithm: str, seed: int) -> Identif
     tally = Tally(problem)
     own = SeedTree(seed).child("identification", algorithm).integer()
     genes = _Coordinates(problem, tally)
-    minimize(genes, ALGORITHMS[algorithm](), ("n_gen", GENERATIONS), seed=own, copy_algorithm=False)
+    minimize(genes, (begin or ALGORITHMS[algorithm])(), ("n_gen", GENERATIONS), seed=own, copy_algorithm=False)
     return tally.result(algorithm, seed, f"{GENERATIONS} generations done")

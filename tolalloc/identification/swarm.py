@@ -6,16 +6,34 @@ bounds are assumed.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from pymoo.algorithms.soo.nonconvex.pso import PSO
 from pymoo.core.population import Population
 
-INERTIA, ACCELERATION = 0.9, 2.0
-"""ω, and C1 = C2: what pymoo's plain swarm begins with, so that the equation alone differs; assumed [-]."""
 
-NEIGHBOURS = 1
-"""Particles to either side on a ring that make up a neighbourhood, assumed [-]."""
+@dataclass(frozen=True, kw_only=True)
+class SwarmSettings:
+    """What liu2020 does not print; the defaults are those of pymoo's plain swarm, so that the equations alone differ.
+
+    Parameters
+    ----------
+    inertia
+        ω [-].
+    acceleration
+        C1 and C2 [-].
+    neighbours
+        Particles to either side on a ring that make up a neighbourhood [-].
+    """
+
+    inertia: float = 0.9
+    acceleration: float = 2.0
+    neighbours: int = 1
+
+
+ASSUMED = SwarmSettings()
 
 
 def weights(
@@ -50,6 +68,7 @@ def velocity(
     local: Float[np.ndarray, "particle parameter"],
     alpha: Float[np.ndarray, "particle 1"],
     random: Float[np.ndarray, "3 particle parameter"],
+    settings: SwarmSettings = ASSUMED,
 ) -> Float[np.ndarray, "particle parameter"]:
     """Return the new velocities.
 
@@ -63,6 +82,8 @@ def velocity(
         α of every particle [-].
     random
         r1, r2, r3 in 0…1 [-].
+    settings
+        ω and C.
 
     References
     ----------
@@ -70,15 +91,15 @@ def velocity(
     """
     among_others = (1.0 - alpha) * random[1] * (best - position) + alpha * random[2] * (local - position)
     return np.asarray(
-        INERTIA * old
-        + alpha * ACCELERATION * random[0] * (own - position)
-        + (1.0 - alpha) * ACCELERATION * among_others
+        settings.inertia * old
+        + alpha * settings.acceleration * random[0] * (own - position)
+        + (1.0 - alpha) * settings.acceleration * among_others
     )
 
 
-def best_neighbours(objective: Float[np.ndarray, " particle"]) -> np.ndarray:
+def best_neighbours(objective: Float[np.ndarray, " particle"], neighbours: int = 1) -> Int[np.ndarray, " particle"]:
     """Return the position of the best particle of each one's neighbourhood on the ring, itself included [-]."""
-    around = np.arange(objective.size)[:, np.newaxis] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1)
+    around = np.arange(objective.size)[:, np.newaxis] + np.arange(-neighbours, neighbours + 1)
     around %= objective.size
     return np.asarray(around[np.arange(objective.size), objective[around].argmin(axis=1)])
 
@@ -86,7 +107,8 @@ def best_neighbours(objective: Float[np.ndarray, " particle"]) -> np.ndarray:
 class ImprovedPSO(PSO):  # type: ignore[misc]
     """liu2020's swarm on pymoo's: only how the particles move is its own; a particle that leaves stops at the bound."""
 
-    def __init__(self, pop_size: int = 20) -> None:
+    def __init__(self, pop_size: int = 20, settings: SwarmSettings = ASSUMED) -> None:
+        self.settings = settings
         super().__init__(pop_size=pop_size, adaptive=False, pertube_best=False, initial_velocity="zero")
 
     def _infill(self) -> Population:
@@ -99,9 +121,10 @@ class ImprovedPSO(PSO):  # type: ignore[misc]
             old,
             own,
             best,
-            own[best_neighbours(objective)],
+            own[best_neighbours(objective, self.settings.neighbours)],
             weights(position, best, lower, upper),
             self.random_state.random((3, *position.shape)),
+            self.settings,
         )
         reached = np.clip(position + new, lower, upper)  # equation (19)
         return Population.new(X=reached, V=reached - position)
