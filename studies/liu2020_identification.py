@@ -231,8 +231,8 @@ def _peak_to_peaks(
     measured = simulated_bench(true, units, bench).measured(seeds.child("noise"))
     study = IdentificationStudy(
         parameters=tuple(parameter(name, given, BOUNDS[name]) for name in LIU2020),
-        seeds=_seeds(quick),
-        place="50 simulated units",
+        compare=_seeds(quick),
+        data="50 simulated units",
     )
     return identify(study, measured, given, progress)
 
@@ -253,7 +253,7 @@ def _curves_and_loops(
     """Identify from curves in both directions and torque loops of five units, then again with fresh noise."""
     exact = simulated_bench(true, _five_units(errors, seeds), CURVES_AND_LOOPS)
     parameters = tuple(parameter(name, given) for name in LIU2020)
-    study = IdentificationStudy(parameters=parameters, place="5 simulated units")
+    study = IdentificationStudy(parameters=parameters, data="5 simulated units")
     results = identify(study, exact.measured(seeds.child("once")), given, progress)
     progress.begin("measured again and again")
     truth = np.array([item.coordinate(TRUTH[item.name]) for item in parameters])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from math import log, pi, sqrt
 from pathlib import Path
@@ -16,6 +19,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.test_commands import refused, tolalloc
+from tolalloc.cli.main import main
 from tolalloc.identification.simulation import Bench, random_units, simulated_bench
 from tolalloc.measurement.folder import write_measurements
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer
@@ -29,6 +33,7 @@ NOISE = {"curve": 0.2, "loop": 0.1}
 """Standard deviation of one reading [arcsec]."""
 
 TORQUES = 167.0 * np.array([-1.0, -0.6, -0.2, 0.2, 0.6, 1.0])
+READINGS = {"curve": 6 * 72, "loop": 6 * TORQUES.size}
 NOTHING = np.empty(0)
 METHODS = {
     "gauss_newton": "Gauss–Newton",
@@ -138,7 +143,7 @@ def test_the_answer_for_a_program(run):
         "on bound",
     }
     assert (answer["reducer"], answer["data"], answer["units [-]"]) == ("RV-20E", "6 simulated units", 6)
-    assert answer["readings [-]"] == 6 * (72 + TORQUES.size)
+    assert answer["readings [-]"] == sum(READINGS.values())
     assert (answer["method"], answer["status"]) == ("Gauss–Newton", "converged")
     assert (found["name"], found["unit"], found["start"]) == (NAME, "N/m", START)
     assert answer["methods"] == []
@@ -159,7 +164,8 @@ def test_the_truth_is_found(run):
     assert run.answer["reduced chi square [-]"] == pytest.approx(1.0, abs=0.3)
     for kind, noise in NOISE.items():
         before, after = (run.answer[f"rms {when} [arcsec]"][kind] for when in ("before", "after"))
-        assert after == pytest.approx(noise, rel=0.3)
+        freedom = READINGS[kind] - 6  # each curve and each loop has lost its mean
+        assert READINGS[kind] * (after / noise) ** 2 / freedom == pytest.approx(1.0, abs=3 * sqrt(2 / freedom))
         assert before > after
 
 
@@ -227,9 +233,8 @@ def test_every_method_ends_at_the_same_objective(curves, run, method):
 
 def objective(answer: dict) -> float:
     """Return half the sum of squared residuals over their noise."""
-    readings = {"curve": 6 * 72, "loop": 6 * TORQUES.size}
     rms = answer["rms after [arcsec]"]
-    return 0.5 * sum(count * (rms[kind] / NOISE[kind]) ** 2 for kind, count in readings.items())
+    return 0.5 * sum(count * (rms[kind] / NOISE[kind]) ** 2 for kind, count in READINGS.items())
 
 
 def test_methods_are_compared_over_seeds(curves, run, tmp_path):
@@ -246,7 +251,9 @@ def test_bounds_and_prior_are_taken(curves, run):
     answer = answered(identify(curves, "--prior", f"{NAME}=0.005", "--json", name=f"{NAME}=8e9:2e10"))
     (found,), (without,) = answer["parameters"], run.answer["parameters"]
     assert START < found["value"] < without["value"]
-    assert found["relative standard uncertainty [-]"] < 0.006
+    # Prior and readings contradict each other here, which is said and widens both: 0.0043 becomes 0.0065.
+    assert found["relative standard uncertainty [-]"] < without["relative standard uncertainty [-]"]
+    assert any("times the stated noise" in sentence for sentence in answer["warnings"])
     alone = answered(identify(curves, "--json", name=f"{NAME}=8e9:1.2e10"))
     assert alone["parameters"][0]["on bound"] is True
     assert any("K_pd stands on a bound" in sentence for sentence in alone["warnings"])
@@ -255,10 +262,15 @@ def test_bounds_and_prior_are_taken(curves, run):
 def test_wide_bounds_keep_the_value_inside_its_interval(curves, run):
     """The value is the model's own, the interval its polynomial's; they must not contradict each other."""
     (found,) = answered(identify(curves, "--json", name=f"{NAME}=1e9:1e11"))["parameters"]
-    assert found["value"] == pytest.approx(run.answer["parameters"][0]["value"], rel=1e-3)
     low, high = found["interval"]
     assert low <= found["value"] <= high
-    assert low < high
+    if found["identified"]:
+        assert found["value"] == pytest.approx(run.answer["parameters"][0]["value"], rel=1e-3)
+        assert low < high
+
+
+def test_bounds_beyond_what_polynomials_follow_are_refused(curves):
+    refused(identify(curves, name=f"{NAME}=1e4:1e13"), "are too wide, polynomials of the model are off by", "narrower")
 
 
 def test_weak_data_leave_the_stiffness_open_and_say_so(peak_to_peaks, tmp_path):
@@ -339,7 +351,7 @@ def test_repairs_are_counted_in_answer_and_report(curves, tmp_path):
     assert answer["warnings"] == repaired
     page = (report / "report.html").read_text(encoding="utf-8")
     assert all(sentence in page for sentence in repaired)
-    assert answer["readings [-]"] == 6 * (72 + TORQUES.size) - 3
+    assert answer["readings [-]"] == sum(READINGS.values()) - 3
     (found,) = answer["parameters"]
     assert abs(log(found["value"] / TRUTH)) <= 3 * found["relative standard uncertainty [-]"]
 
@@ -465,10 +477,10 @@ CASES = (
     asked(
         "negative prior",
         f"{NAME} --prior {NAME}=-0.1",
-        f"Error: tolalloc identify: prior of {NAME} is -0.1; allowed is a positive number.",
+        f"Error: tolalloc identify: prior of {NAME} is -0.1; allowed is 0.0001 or more.",
     ),
-    asked("prior of 0", f"{NAME} --prior {NAME}=0", f"prior of {NAME} is 0.0", "a positive number"),
-    asked("prior that is nan", f"{NAME} --prior {NAME}=nan", f"prior of {NAME} is nan", "a positive number"),
+    asked("prior of 0", f"{NAME} --prior {NAME}=0", f"prior of {NAME} is 0.0", "0.0001 or more"),
+    asked("prior that is nan", f"{NAME} --prior {NAME}=nan", f"prior of {NAME} is nan", "0.0001 or more"),
     asked("prior too small to divide by", f"{NAME} --prior {NAME}=1e-320", "prior", NAME),
     asked("prior that is a word", f"{NAME} --prior {NAME}=good", "--prior", f"{NAME}=good", "'good' is none"),
     asked("prior without a number", f"{NAME} --prior {NAME}", "--prior", "NAME=NUMBER, such as carrier_bearing=0.1"),
@@ -490,7 +502,7 @@ CASES = (
     bad("negative number of seeds", "--compare -1", "-1", "0 to 1000"),
     data(
         "noise missing beside noise",
-        text("measurement.toml", f"noise_arcsec = {NOISE['curve']}", ""),
+        lines("measurement.toml", lambda rows: rows.pop(next(at for at, row in enumerate(rows) if "noise" in row))),
         "Error: measurement.toml: noise_arcsec of curve 1 is missing; readings of several kinds, or with and without "
         "it, cannot be weighed against each other.",
     ),
@@ -515,7 +527,7 @@ CASES = (
     data(
         "sources that nothing states",
         text("measurement.toml", 'neglected = ["*"]', 'neglected = ["sun.*"]'),
-        "modification",
+        "is not stated",
         "neglected",
     ),
     data(
@@ -577,17 +589,24 @@ CASES = (
 )
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """What came of a case."""
+def in_this_process(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the command line as `tolalloc` does, without the two seconds that a process of its own spends on imports."""
+    command, code = ["tolalloc", *map(str, arguments)], 0
+    stdout, stderr = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(stdout), redirect_stderr(stderr):
+        patch.setattr(sys, "argv", command)
+        try:
+            main()
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        except Exception:
+            code = 1
+            stderr.write(traceback.format_exc())
+    return subprocess.CompletedProcess(command, code, stdout.getvalue(), stderr.getvalue())
 
-    result: subprocess.CompletedProcess[str]
-    sentence: str
-    before: dict[str, bytes]
-    after: dict[str, bytes]
 
-
-def refusal(case: Bad, source: Path, folder: Path) -> Refusal:
+def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.CompletedProcess[str], str]:
+    """Return what came of a case and its last line, files named relative to the folder, in which nothing changed."""
     copied(source, folder)
     for change in case.changes:
         change(folder)
@@ -596,34 +615,28 @@ def refusal(case: Bad, source: Path, folder: Path) -> Refusal:
         if option not in options:
             options += [option, str(folder / name)]
     before = files(folder)
-    result = tolalloc("identify", folder / "measurement.toml", *options)
-    sentence = result.stderr.strip().rsplit("\n", 1)[-1].replace(f"{folder}/", "")
-    return Refusal(result, sentence, before, files(folder))
-
-
-@pytest.fixture(scope="module")
-def refusals(curves, peak_to_peaks, tmp_path_factory) -> Iterator[dict[str, Future[Refusal]]]:
-    """All cases at once: each spends its seconds on imports."""
-    place = tmp_path_factory.mktemp("bad")
-    with ThreadPoolExecutor(4) as pool:
-        yield {
-            case.name: pool.submit(refusal, case, peak_to_peaks if case.weak else curves, place / str(number))
-            for number, case in enumerate(CASES)
-        }
+    result = in_this_process("identify", folder / "measurement.toml", *options)
+    refused(result)
+    assert result.stdout == ""
+    assert files(folder) == before
+    return result, result.stderr.strip().rsplit("\n", 1)[-1].replace(f"{folder}/", "")
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_bad_input_is_refused_in_one_sentence(refusals, case):
-    found = refusals[case.name].result()
-    refused(found.result)
-    assert found.result.stdout == ""
-    assert found.sentence.endswith(".")
+def test_bad_input_is_refused_in_one_sentence(curves, peak_to_peaks, tmp_path, case):
+    result, sentence = refusal(case, peak_to_peaks if case.weak else curves, tmp_path / "case")
+    assert sentence.endswith(".")
     for word in case.words:
-        assert word in found.sentence
+        assert word in sentence
         if word.startswith("Error: "):
-            assert word == found.sentence
-    assert found.after == found.before
-    assert "Gauss–Newton  " not in found.result.stderr, "refused only after the long part"
+            assert word == sentence
+    assert "Gauss–Newton  " not in result.stderr, "refused only after the long part"
+
+
+def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):
+    refused(identify(curves, "--method", "annealing", "--out", tmp_path / "report"), "'annealing' is not known")
+    refused(identify(tmp_path, "--stiffness", tmp_path / "found.toml"), "measurement.toml: no such file.")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -636,7 +649,8 @@ def test_bad_input_is_refused_in_one_sentence(refusals, case):
         ("negative number of seeds", "compare"),
     ],
 )
-def test_what_stands_on_the_command_line_is_not_looked_for_in_the_data_file(refusals, name, word):
-    sentence = refusals[name].result().sentence
+def test_what_stands_on_the_command_line_is_not_looked_for_in_the_data_file(curves, tmp_path, name, word):
+    case = next(case for case in CASES if case.name == name)
+    _, sentence = refusal(case, curves, tmp_path / "case")
     assert sentence.startswith("Error: tolalloc identify: ")
     assert word in sentence

@@ -126,12 +126,11 @@ def test_linear_readings_give_the_closed_form_of_least_squares(prior):
     found = gauss_newton(problem, problem.start[np.newaxis])
     np.testing.assert_allclose(found.coordinates, expected, atol=1e-6)
     own = information(problem, problem.predictor(expected), expected)
-    np.testing.assert_allclose(own.matrix, normal, rtol=1e-12)
-    np.testing.assert_allclose(
-        own.standard_errors, np.sqrt(own.variance_factor * np.diag(np.linalg.inv(normal))), rtol=1e-9
-    )
+    widened = slopes.T @ slopes / own.variance_factor + weight * np.eye(2)
+    np.testing.assert_allclose(own.matrix, widened, rtol=1e-12)
+    np.testing.assert_allclose(own.standard_errors, np.sqrt(np.diag(np.linalg.inv(own.matrix))), rtol=1e-9)
     bounds = np.diag(12 / (problem.upper - problem.lower) ** 2)
-    np.testing.assert_allclose(own.covariance, np.linalg.inv(normal / own.variance_factor + bounds), rtol=1e-9)
+    np.testing.assert_allclose(own.covariance, np.linalg.inv(widened + bounds), rtol=1e-9)
 
 
 @pytest.mark.parametrize("noise_stated", [True, False])
@@ -143,7 +142,8 @@ def test_the_profile_of_linear_readings_is_the_students_interval(noise_stated):
         assert own.variance_factor == pytest.approx(2 * found.objective / 10, rel=1e-6)
     half = student.ppf(0.975, 10) * own.standard_errors
     for place in range(2):
-        low, high = profile(problem, found.coordinates, place, own).interval
+        widened = problem.widened(own.variance_factor)
+        low, high = profile(widened, found.coordinates, place, own).interval
         assert low == pytest.approx(found.coordinates[place] - half[place], abs=0.01 * half[place])
         assert high == pytest.approx(found.coordinates[place] + half[place], abs=0.01 * half[place])
 

@@ -66,7 +66,7 @@ class UnitProgress:
             SpinnerColumn(),
             TextColumn("{task.description:<24}"),
             BarColumn(bar_width=24),
-            TextColumn(f"{{task.completed:>8.0f}} {counted}"),
+            TextColumn(f"{{task.fields[counted]:>8.0f}} {counted}"),
             TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),
             TimeElapsedColumn(),
             console=messages,
@@ -87,7 +87,7 @@ class UnitProgress:
     def begin(self, stage: str) -> None:
         """Begin a stage; the one before is finished."""
         self._end()
-        self._task = self._bar.add_task(stage, total=None, rate=0.0)
+        self._task = self._bar.add_task(stage, total=None, rate=0.0, counted=0)
         self._began, self._units = time.perf_counter(), 0
 
     def advance(self, units: int) -> None:
@@ -96,8 +96,8 @@ class UnitProgress:
             return
         self._units += units
         rate = self._units / max(time.perf_counter() - self._began, 1e-9)
-        self._bar.update(self._task, advance=units, rate=rate)
+        self._bar.update(self._task, counted=self._units, rate=rate)
 
     def _end(self) -> None:
         if self._task is not None:
-            self._bar.update(self._task, total=max(self._units, 1), completed=max(self._units, 1))
+            self._bar.update(self._task, total=1, completed=1)

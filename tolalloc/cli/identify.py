@@ -64,14 +64,16 @@ def identify(
     study = IdentificationStudy(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
         method=method,
-        seeds=compare,
+        compare=compare,
         seed=seed,
-        place=str(data),
+        data=str(data),
     )
     if out:
         require_usable(out)
     if stiffness:
         require_new(stiffness)
+        if not any(item.is_stiffness for item in study.parameters):
+            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
     announce_compilation()
     with UnitProgress() as progress:
@@ -120,6 +122,8 @@ def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> t
         name, sign, number = text.partition("=")
         if not sign:
             raise InputError.at(PLACE, "--prior", text, "NAME=NUMBER, such as carrier_bearing=0.1")
+        if name in known:
+            raise InputError.at(PLACE, "--prior", text, "each parameter once")
         known[name] = _number(number, "--prior", text)
     found = []
     for text in asked:

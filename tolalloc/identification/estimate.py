@@ -48,12 +48,11 @@ class Estimate:
         item = self.parameter
         low, high = (f"{value:.4g}" for value in self.interval)
         if not self.identified:
-            return (
-                f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {low}…{high} "
-                f"{item.unit}."
-            )
+            spanned = item.written(f"{low}…{high}")
+            return f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {spanned}."
         bound = "; the least stands on a bound" if self.on_bound else ""
-        return f"{item.symbol} = {self.value:.4g} {item.unit}, 95 % interval {low}…{high} {item.unit}{bound}."
+        value, interval = item.written(f"{self.value:.4g}"), item.written(f"{low}…{high}")
+        return f"{item.symbol} = {value}, 95 % interval {interval}{bound}."
 
 
 def estimates(

@@ -7,6 +7,7 @@ from math import sqrt
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from tolalloc.identification.prediction import Prediction
@@ -16,6 +17,7 @@ LEVEL = 0.95
 """Confidence of every interval [-]."""
 
 _ON_BOUND = 1e-3  # distance over the box within which a coordinate stands on its bound [-]
+_RARE = 1e-3  # probability below which the stated noise is doubted [-]
 _NOTHING = 1e-12  # eigenvalue over the largest, or squared loading, that is rounding [-]
 _SMALL = 0.05  # loadings below this share of the largest are not written [-]
 
@@ -67,7 +69,7 @@ class Information:
     Parameters
     ----------
     matrix
-        Fisher information of the coordinates, prior included [-].
+        Fisher information of the coordinates from the readings over the variance factor, and from the prior [-].
     variance_factor
         By how much residuals exceed the noise: their reduced χ², at least 1 where the noise was stated [-].
     freedom
@@ -96,7 +98,7 @@ class Information:
         for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
             loading = vector * np.sign(vector[np.abs(vector).argmax()])
             room = 0.5 * float(np.abs(loading) @ (self.upper - self.lower))
-            deviation = sqrt(self.variance_factor / value) if value > 0.0 else np.inf
+            deviation = sqrt(1.0 / value) if value > 0.0 else np.inf
             found.append(Direction(loading=loading, deviation=deviation, room=room))
         return tuple(found)
 
@@ -111,7 +113,7 @@ class Information:
         inverse of their information. Theory page, equation (40).
         """
         bounds = np.diag(12.0 / (self.upper - self.lower) ** 2)
-        return np.asarray(np.linalg.inv(self.matrix / self.variance_factor + bounds))
+        return np.asarray(np.linalg.inv(self.matrix + bounds))
 
     @property
     def standard_errors(self) -> Float[np.ndarray, " parameter"]:
@@ -119,7 +121,7 @@ class Information:
         values, vectors = np.linalg.eigh(self.matrix)
         known = values > _NOTHING * max(values.max(), np.finfo(float).tiny)
         share = vectors**2
-        variance = share[:, known] @ (self.variance_factor / values[known])
+        variance = share[:, known] @ (1.0 / values[known])
         open_to = share[:, ~known].sum(axis=1) > _NOTHING
         return np.asarray(np.where(open_to, np.inf, np.sqrt(variance)))
 
@@ -128,6 +130,11 @@ class Information:
         """First-order 95 % interval of the coordinates, not cut at the bounds [-]."""
         half = float(student.ppf(0.5 + LEVEL / 2, self.freedom)) * self.standard_errors
         return np.stack([self.coordinates - half, self.coordinates + half])
+
+    @property
+    def exceeds_noise(self) -> bool:
+        """Whether residuals are so large that the stated noise makes them in less than one case of a thousand."""
+        return bool(chi2.sf(self.reduced_chi_square * self.freedom, self.freedom) < _RARE)
 
     @property
     def on_bound(self) -> Bool[np.ndarray, " parameter"]:
@@ -154,12 +161,14 @@ def information(
     -----
     Theory page, equation (39).
     """
-    slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)
-    freedom = max(problem.readings - len(problem.parameters), 1)
+    readings, freedom = problem.data.measured.size, problem.freedom
+    slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)[:readings]
     reduced = float(left @ left) / freedom
+    factor = max(reduced, 1.0) if problem.data.noise_stated else reduced
+    known = slopes[readings:]
     return Information(
-        matrix=slopes.T @ slopes,
-        variance_factor=max(reduced, 1.0) if problem.data.noise_stated else reduced,
+        matrix=slopes[:readings].T @ slopes[:readings] / factor + known.T @ known,
+        variance_factor=factor,
         freedom=freedom,
         reduced_chi_square=reduced,
         lower=problem.lower,

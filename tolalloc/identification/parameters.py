@@ -33,6 +33,7 @@ LIU2020 = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 _WIDEST = {BIAS: (-60.0, 60.0), TORQUE: (0.1, 10.0)}
 _ALLOWED = {BIAS: "two numbers from -3600 to 3600 arcsec", TORQUE: "two positive factors up to 1000"}
+_SMALLEST_PRIOR = 1e-4  # what is known better is known [-]
 _STIFFNESS_SPAN = 2.0  # bounds of a stiffness unless told otherwise: half to double its value in the reducer file
 
 
@@ -67,6 +68,10 @@ class Parameter:
     def unit(self) -> str:
         """Unit of measurement of bounds and value."""
         return {BIAS: "arcsec", TORQUE: "-"}.get(self.name, "N/m")
+
+    def written(self, value: str) -> str:
+        """Return a value with its unit of measurement, if it has one."""
+        return value if self.unit == "-" else f"{value} {self.unit}"
 
     @property
     def is_stiffness(self) -> bool:
@@ -126,8 +131,8 @@ def parameter(
     allowed = _ALLOWED.get(name, "two stiffnesses from 1e4 to 1e13 N/m") + ", the smaller one first"
     if not floor <= low < high <= ceiling:
         raise InputError.at(place, name, f"{low:g}:{high:g}", allowed)
-    if not prior > 0.0:
-        raise InputError.at(place, f"prior of {name}", prior, "a positive number")
+    if not prior >= _SMALLEST_PRIOR:
+        raise InputError.at(place, f"prior of {name}", prior, f"{_SMALLEST_PRIOR:g} or more")
     if not low <= start <= high:
         raise InputError.at(place, name, f"{low:g}:{high:g}", f"bounds around the start, which is {start:g}")
     return Parameter(name=name, low=low, high=high, start=start, prior=prior)

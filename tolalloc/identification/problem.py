@@ -98,6 +98,16 @@ class IdentificationProblem:
         """Return the root-mean-square residual over noise that an objective means: S of liu2020 over the noise [-]."""
         return float(np.sqrt(2.0 * objective / self.data.measured.size))
 
+    @property
+    def freedom(self) -> int:
+        """Readings less parameters, at least 1 [-]."""
+        return max(self.readings - len(self.parameters), 1)
+
+    def widened(self, variance_factor: float) -> IdentificationProblem:
+        """Return the problem with the variance of the noise times a factor."""
+        noise = self.data.noise * np.sqrt(variance_factor)
+        return replace(self, data=replace(self.data, noise=noise))
+
     def of(self, parameters: Sequence[Parameter], predictor: Predictor) -> IdentificationProblem:
         """Return the same data asked for other parameters."""
         return replace(self, parameters=tuple(parameters), predictor=predictor)

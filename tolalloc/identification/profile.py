@@ -26,7 +26,7 @@ class Profile:
     coordinate
         Values at which it was held, bounds included [-].
     rise
-        Twice the rise of the objective above its least, over the variance factor [-].
+        Twice the rise of the objective above its least [-].
     threshold
         Rise at which the 95 % interval ends [-].
     """
@@ -90,13 +90,13 @@ def profile(
     Parameters
     ----------
     problem
-        The data; a stand-in should predict.
+        The data, their noise widened by the variance factor; a stand-in should predict.
     best
         Where the objective is least [-].
     place
         Position of the parameter [-].
     found
-        What the readings say to first order: where to look, and the variance factor.
+        What the readings say to first order: where to look.
 
     Notes
     -----
@@ -118,11 +118,10 @@ def profile(
                 start, objective[at] = fitted.coordinates, fitted.objective + known
             else:
                 objective[at] = held.objectives(np.empty((1, 0)))[0] + known
-    freedom = max(problem.readings - len(problem.parameters), 1)
     return Profile(
         coordinate=values,
-        rise=2.0 * (objective - objective.min()) / found.variance_factor,
-        threshold=float(fisher_f.ppf(LEVEL, 1, freedom)),
+        rise=2.0 * (objective - objective.min()),
+        threshold=float(fisher_f.ppf(LEVEL, 1, problem.freedom)),
     )
 
 

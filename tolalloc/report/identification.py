@@ -8,15 +8,13 @@ import numpy as np
 
 from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
 from tolalloc.identification.parameters import BIAS
+from tolalloc.identification.resampling import Candidate
 from tolalloc.report import identification_figures as figures
 from tolalloc.report import identification_tables as tables
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure
 from tolalloc.report.identification_results import IdentificationResults
 from tolalloc.units import ARCSECOND
-
-LARGE_CHI_SQUARE = 1.5
-"""Sum of squared residuals over noise, per degree of freedom, above which model and stated noise disagree [-]."""
 
 LARGE_STAND_IN_ERROR = 0.1
 """Root-mean-square error of the stand-in over the smallest noise above which profiles are doubtful [-]."""
@@ -28,31 +26,37 @@ def baseline_sentences(results: IdentificationResults) -> tuple[str, ...]:
         return (
             f"{results.data.units.size} units: too few to judge a fit by units that it has not seen, or to resample.",
         )
-    data, found = results.data, []
-    constant = results.candidate(BIAS)
-    whole = results.candidate(*(item.name for item in results.parameters))
-    if constant and whole:
-        one, all_of = (
-            (
-                item.rms(data, PEAK_TO_PEAK, unseen=False) / ARCSECOND,
-                item.rms(data, PEAK_TO_PEAK, unseen=True) / ARCSECOND,
-            )
-            for item in (constant, whole)
-        )
-        verdict = (
-            "A constant explains these peak-to-peaks better than the stiffness does"
-            if one[1] <= all_of[1]
-            else "The fit explains these peak-to-peaks better than a constant does"
-        )
-        found.append(
-            f"{verdict}: one bias added to the model leaves {one[0]:.3g}″ rms ({one[1]:.3g}″ on units left out), the "
-            f"fit of {whole.name} leaves {all_of[0]:.3g}″ ({all_of[1]:.3g}″ on units left out)."
-        )
+    found = []
+    if PEAK_TO_PEAK in results.kinds:
+        found.append(_verdict(results))
     found.append(
         f"Judged by units left out, the simplest choice as good as the best within a standard error is: "
         f"{results.chosen.name}."
     )
     return tuple(found)
+
+
+def _verdict(results: IdentificationResults) -> str:
+    """Return whether a constant explains the peak-to-peaks, or the stiffness does, or nothing needs explaining."""
+    asked = tuple(item.name for item in results.parameters)
+    given, constant, whole = (results.candidate(*names) for names in ((), (BIAS,), asked))
+    assert given and constant and whole
+
+    def left(item: Candidate, *, unseen: bool) -> float:
+        return item.rms(results.data, PEAK_TO_PEAK, unseen=unseen) / ARCSECOND
+
+    numbers = (
+        f"the reducer as given leaves {left(given, unseen=False):.3g}″ rms, one bias "
+        f"{left(constant, unseen=False):.3g}″ ({left(constant, unseen=True):.3g}″ on units left out), the fit of "
+        f"{whole.name} {left(whole, unseen=False):.3g}″ ({left(whole, unseen=True):.3g}″ on units left out)."
+    )
+    unseen = {name: left(item, unseen=True) for name, item in (("given", given), ("bias", constant), ("fit", whole))}
+    best = min(unseen, key=lambda name: unseen[name])
+    return {
+        "given": "Neither a constant nor the stiffness explains these peak-to-peaks better than the reducer as given: ",
+        "bias": "A constant explains these peak-to-peaks better than the stiffness does: ",
+        "fit": "The stiffness explains these peak-to-peaks better than a constant does: ",
+    }[best] + numbers
 
 
 def answer(results: IdentificationResults) -> tuple[str, ...]:
@@ -86,7 +90,7 @@ def warnings(results: IdentificationResults) -> tuple[str, ...]:
         for item in results.estimates
         if item.on_bound and item.identified
     ]
-    if results.data.noise_stated and own.reduced_chi_square > LARGE_CHI_SQUARE:
+    if results.data.noise_stated and own.exceeds_noise:
         found.append(
             f"Residuals are {np.sqrt(own.reduced_chi_square):.2g} times the stated noise: errors of the units or the "
             "model itself miss something. All uncertainties are widened by that factor."
@@ -124,6 +128,7 @@ def summary(results: IdentificationResults) -> dict[str, Any]:
         "units [-]": int(data.units.size),
         "readings [-]": int(data.measured.size),
         "method": results.found.method,
+        "objective [-]": results.found.objective,
         "evaluations [-]": results.found.evaluations,
         "status": results.found.status,
         "parameters": [

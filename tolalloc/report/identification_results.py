@@ -49,8 +49,6 @@ class IdentificationResults:
         Every method over many seeds, if asked for.
     seed
         Seed of every random number [-].
-    place
-        Where the data were read.
     """
 
     measurements: Measurements
@@ -69,7 +67,6 @@ class IdentificationResults:
     stand_in: BoxPolynomial
     comparison: tuple[Comparison, ...]
     seed: int
-    place: str
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -103,6 +100,6 @@ class IdentificationResults:
     def candidate(self, *names: str) -> Candidate | None:
         """Return the candidate with just these parameters, if it was judged."""
         for item in self.candidates:
-            if tuple(one.name for one in item.parameters) == names:
+            if {one.name for one in item.parameters} == set(names):
                 return item
         return None

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.identification.data import Data, data_of
+from tolalloc.identification.data import LOOP, Data, data_of
 from tolalloc.identification.estimate import estimates
 from tolalloc.identification.gauss_newton import NAME as GAUSS_NEWTON
 from tolalloc.identification.gauss_newton import gauss_newton, starts
 from tolalloc.identification.information import information
-from tolalloc.identification.parameters import BIAS, Parameter, parameter
+from tolalloc.identification.parameters import BIAS, TORQUE, Parameter, parameter
 from tolalloc.identification.prediction import KernelPredictor
 from tolalloc.identification.problem import IdentificationProblem, require_enough
 from tolalloc.identification.profile import profile
@@ -25,6 +25,7 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.report.identification_results import IdentificationResults
 from tolalloc.study.stages import Progress
 from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.units import ARCSECOND
 
 METHODS = {
     "gauss_newton": GAUSS_NEWTON,
@@ -48,35 +49,36 @@ class IdentificationStudy:
         The unknowns.
     method
         One of `METHODS`.
-    seeds
-        Runs of every method that are compared; none if 0 [-].
+    compare
+        Seeds over which every method is compared; none if 0 [-].
     seed
         Seed of every random number [-].
-    place
+    data
         Where the data were read, for errors.
     """
 
     parameters: tuple[Parameter, ...]
     method: str = "gauss_newton"
-    seeds: int = 0
+    compare: int = 0
     seed: int = 1
-    place: str = "tolalloc identify"
+    data: str = "measurements"
 
     def __post_init__(self) -> None:
+        place = "tolalloc identify"
         if self.method not in METHODS:
-            raise UnknownNameError.among(self.place, "method", self.method, METHODS)
+            raise UnknownNameError.among(place, "method", self.method, METHODS)
         names = [item.name for item in self.parameters]
         if not set(names) - {BIAS}:
-            raise InputError.at(self.place, "parameters", names, "one or more besides the bias, which is the baseline")
+            raise InputError.at(place, "parameters", names, "one or more besides the bias, which is the baseline")
         for name in names:
             if names.count(name) > 1:
-                raise InputError.at(self.place, "parameter", name, "each parameter once")
+                raise InputError.at(place, "parameter", name, "each parameter once")
         for name, value, good, allowed in (
-            ("seeds", self.seeds, 0 <= self.seeds <= 1000, "0 to 1000"),
+            ("compare", self.compare, 0 <= self.compare <= 1000, "0 to 1000 seeds"),
             ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
         ):
             if not good:
-                raise InputError.at(self.place, name, value, allowed)
+                raise InputError.at(place, name, value, allowed)
 
 
 def identify(
@@ -102,7 +104,7 @@ def identify(
     SolveError
         A unit has no equilibrium.
     """
-    data, seeds = data_of(measurements, study.place), SeedTree(study.seed).child("identification")
+    data, seeds = data_of(measurements, study.data), SeedTree(study.seed).child("identification")
     _require_visible(study, data)
     kernel = KernelPredictor(reducer, study.parameters, measurements, data, progress.advance)
     problem = IdentificationProblem(
@@ -110,16 +112,18 @@ def identify(
         data=data,
         predictor=kernel,
         weight=np.ones(len(measurements.units)),
-        place=study.place,
+        place=study.data,
     )
     require_enough(problem)
     progress.begin("polynomials of the model")
     stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
+    _require_close(study, data, stand_in)
     quick = problem.of(study.parameters, stand_in)
     progress.begin(METHODS[study.method])
     found = _found(study, problem, quick, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
+    quick = quick.widened(own.variance_factor)
     progress.begin("what the data fix")
     near = gauss_newton(quick, found.coordinates[np.newaxis]).coordinates
     profiles = tuple(profile(quick, near, at, own) for at in range(len(study.parameters)))
@@ -141,17 +145,33 @@ def identify(
         candidates=candidates,
         chosen=simplest(candidates) if candidates else None,
         stand_in=stand_in.polynomial,
-        comparison=compare(problem, quick, study, progress) if study.seeds else (),
+        comparison=compare(problem, quick, study, progress) if study.compare else (),
         seed=study.seed,
-        place=study.place,
     )
 
 
 def _require_visible(study: IdentificationStudy, data: Data) -> None:
-    """Refuse a bias where no reading shows one: curves and loops have lost their mean."""
-    if any(item.name == BIAS for item in study.parameters) and data.peak_to_peak is None:
+    """Refuse a bias or a torque where no reading shows one."""
+    names = [item.name for item in study.parameters]
+    if BIAS in names and data.peak_to_peak is None:
         raise InputError(
-            f"{study.place}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
+            f"{study.data}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
+        )
+    if TORQUE in names and all(block.kind == LOOP for block in data.blocks):
+        raise InputError(
+            f"{study.data}: parameter 'torque' needs peak-to-peaks or curves; loops measure their torque themselves."
+        )
+
+
+def _require_close(study: IdentificationStudy, data: Data, stand_in: StandIn) -> None:
+    """Refuse bounds within which polynomials are no stand-in for the model."""
+    off = stand_in.polynomial.rms_error
+    if off > data.noise.min():
+        bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in study.parameters)
+        raise InputError(
+            f"tolalloc identify: bounds {bounds} are too wide, polynomials of the model are off by "
+            f"{off / ARCSECOND:.2g}″ where the noise is {data.noise.min() / ARCSECOND:.2g}″; allowed are narrower ones, "
+            "such as half to double."
         )
 
 
@@ -210,9 +230,9 @@ def compare(
     """
     methods = []
     for name in (GAUSS_NEWTON, *ALGORITHMS):
-        progress.begin(f"{name}, {study.seeds} seeds")
+        progress.begin(f"{name}, {study.compare} seeds")
         runs = []
-        for seed in range(study.seed, study.seed + study.seeds):
+        for seed in range(study.seed, study.seed + study.compare):
             if name == GAUSS_NEWTON:  # from random starts, as every other method
                 begin = starts(quick, _STARTS + 1, SeedTree(seed).child("identification", name))[1:]
                 runs.append(gauss_newton(quick, begin, seed))

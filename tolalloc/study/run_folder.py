@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,6 +42,9 @@ def require_usable(folder: Path) -> None:
             f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), "
             "so that nothing is overwritten."
         )
+    above = next(parent for parent in folder.absolute().parents if parent.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise RunFolderError(f"{folder}: the run folder cannot be made in {above}; name another (--out).")
 
 
 @contextmanager
