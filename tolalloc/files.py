@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -124,5 +125,5 @@ def require_new(path: Path) -> None:
     """
     if path.exists():
         raise InputError(f"{path}: the file exists; allowed is a new one, so that nothing is overwritten.")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; allowed is a file in a folder that does.")
+    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: cannot be made there; allowed is a file in a folder that exists and may be written.")

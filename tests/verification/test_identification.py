@@ -7,7 +7,7 @@ from math import inf, log
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, norm
 from scipy.stats import t as student
 
 from tolalloc.exceptions import InputError
@@ -24,9 +24,10 @@ from tolalloc.identification.recovery import recovery
 from tolalloc.identification.resampling import bootstrap, judged, simplest
 from tolalloc.identification.searches import ALGORITHMS, search
 from tolalloc.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.identification.stand_in import StandIn, fit_stand_in
+from tolalloc.identification.stand_in import StandIn, anchored, fit_stand_in
 from tolalloc.identification.swarm import best_neighbours, velocity, weights
 from tolalloc.reducer.files import load_reducer
+from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.surrogate.polynomial import fit_box_polynomial, total_degrees
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import ErrorModel
@@ -134,18 +135,51 @@ def test_linear_readings_give_the_closed_form_of_least_squares(prior):
 
 
 @pytest.mark.parametrize("noise_stated", [True, False])
-def test_the_profile_of_linear_readings_is_the_students_interval(noise_stated):
+def test_the_profile_of_linear_readings_is_the_interval_of_least_squares(noise_stated):
+    """Normal where the noise is known, Student's where it is estimated from what the fit leaves."""
     problem = straight_problem(12, noise_stated)
     found = gauss_newton(problem, problem.start[np.newaxis])
     own = information(problem, problem.predictor(found.coordinates), found.coordinates)
-    if not noise_stated:
-        assert own.variance_factor == pytest.approx(2 * found.objective / 10, rel=1e-6)
-    half = student.ppf(0.975, 10) * own.standard_errors
+    assert own.variance_factor == pytest.approx(1.0 if noise_stated else 2 * found.objective / 10, rel=1e-6)
+    half = (norm.ppf(0.975) if noise_stated else student.ppf(0.975, 10)) * own.standard_errors
     for place in range(2):
-        widened = problem.widened(own.variance_factor)
-        low, high = profile(widened, found.coordinates, place, own).interval
-        assert low == pytest.approx(found.coordinates[place] - half[place], abs=0.01 * half[place])
-        assert high == pytest.approx(found.coordinates[place] + half[place], abs=0.01 * half[place])
+        low, high = profile(problem.widened(own.variance_factor), found.coordinates, place, own).interval
+        assert low == pytest.approx(found.coordinates[place] - half[place], abs=1e-3 * half[place])
+        assert high == pytest.approx(found.coordinates[place] + half[place], abs=1e-3 * half[place])
+
+
+def test_stated_noise_is_doubted_only_when_the_residuals_are_next_to_impossible():
+    problem = straight_problem(12)
+    found = gauss_newton(problem, problem.start[np.newaxis]).coordinates
+    much = problem.widened(1 / 16.0)  # as if the noise had been stated four times too small
+    assert not information(problem, problem.predictor(found), found).estimated
+    assert information(much, much.predictor(found), found).estimated
+
+
+@pytest.mark.parametrize("share", [0.1, 0.01])
+def test_a_profile_is_sharp_along_one_parameter_though_another_is_open(share):
+    """Readings a + share·b with b open between its bounds: a's interval is widened by what b may do."""
+    problem = straight_problem(40)
+    one = problem.predictor.slopes[:, :1]
+    slanted = replace(problem, predictor=Straight(one * [1.0, share]))
+    found = gauss_newton(slanted, slanted.start[np.newaxis]).coordinates
+    own = information(slanted, slanted.predictor(found), found)
+    sharp = profile(slanted, found, 0, own)
+    middle = float(found[0] + share * found[1])
+    half = norm.ppf(0.975) / np.linalg.norm(one / 0.3)
+    assert sharp.interval[0] == pytest.approx(middle - share * slanted.upper[1] - half, abs=0.02 * half)
+    assert sharp.interval[1] == pytest.approx(middle - share * slanted.lower[1] + half, abs=0.02 * half)
+
+
+def written_of(problem: IdentificationProblem) -> tuple[np.ndarray, IdentifiedStiffness]:
+    found = gauss_newton(problem, problem.start[np.newaxis]).coordinates
+    own = information(problem, problem.predictor(found), found)
+    profiles = [profile(problem, found, place, own) for place in range(2)]
+    both = gauss_newton(replace(problem, evenly=True), found[np.newaxis]).coordinates
+    spread = information(problem, problem.predictor(both), both)
+    stiffness = as_stiffness(estimates(problem.parameters, own, spread, profiles), spread, "test", ())
+    assert stiffness
+    return found, stiffness
 
 
 def test_a_parameter_without_effect_is_not_identified_and_said_so():
@@ -158,14 +192,48 @@ def test_a_parameter_without_effect_is_not_identified_and_said_so():
     assert profiles[1].interval == pytest.approx((blind.lower[1], blind.upper[1]))
     assert own.standard_errors[1] == inf
     assert [item.is_fixed for item in own.directions] == [True, False]
-    rows = estimates(blind.parameters, found.coordinates, own, profiles)
-    assert "not identified" in rows[1].sentence
-    written = as_stiffness(rows, own, "test", ())
-    assert written is not None
+    _, written = written_of(blind)
+    assert any("K_b is not identified" in note for note in written.notes)
     assert written.values["crank_carrier_bearing"] == pytest.approx(1e10)  # the middle of 1e9 and 1e11
     even = (log(1e11) - log(1e9)) / np.sqrt(12)
     assert written.standard_uncertainty["crank_carrier_bearing"] == pytest.approx(1e10 * even)
-    assert written.correlation[0, 1] == 0.0
+    assert written.correlation[0, 1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_combination_that_the_data_fix_stays_fixed_in_the_stiffness_file():
+    problem = straight_problem(40)
+    together = replace(problem, predictor=Straight(problem.predictor.slopes[:, :1] * [0.8, 0.6]))
+    found, written = written_of(together)
+    values = np.log(np.array([*written.values.values()]) / 1e10)
+    weights_ = np.array([0.8, 0.6])
+    fixed = float(np.sqrt(weights_ @ written.covariance @ weights_))
+    assert fixed == pytest.approx(0.3 / np.linalg.norm(problem.predictor.slopes[:, 0]), rel=0.02)
+    assert weights_ @ values == pytest.approx(weights_ @ found, abs=0.1 * fixed)
+    assert (np.sqrt(np.diag(written.covariance)) > 0.5).all()  # each alone is open
+
+
+def test_directions_leave_a_bias_out_and_do_not_depend_on_its_unit():
+    problem = straight_problem(40)
+    slopes = np.column_stack([problem.predictor.slopes, np.ones(40)])
+    bias = Parameter(name="bias", low=-60.0, high=60.0, start=0.0)
+    found = np.array([0.1, -0.2, 0.0])
+    rows = []
+    for unit in (1.0, 1000.0):
+        scaled = replace(problem, parameters=(*problem.parameters, bias), predictor=Straight(slopes * [1.0, 1.0, unit]))
+        own = information(scaled, scaled.predictor(found), found)
+        assert all(item.loading.size == 2 for item in own.directions)
+        rows.append([item.deviation for item in own.directions])
+    np.testing.assert_allclose(rows[0], rows[1], rtol=1e-9)
+
+
+def test_a_stand_in_is_moved_onto_the_model():
+    problem = straight_problem(10)
+    stand_in = fitted_straight(problem)
+    at = np.array([0.2, 0.3])
+    model = Prediction(values=stand_in.values(at[np.newaxis])[0] + 7.0, by_coordinate=np.zeros((10, 2)))
+    moved = anchored(stand_in, at, model)
+    np.testing.assert_allclose(moved(at).values, model.values)
+    np.testing.assert_allclose(moved.values(at[np.newaxis])[0], model.values)
 
 
 def test_bootstrap_spreads_as_least_squares_says():

@@ -55,7 +55,7 @@ def identify(
     from tolalloc.cli.document_script import written
     from tolalloc.measurement.files import load_measurements
     from tolalloc.report.identification import identification_document
-    from tolalloc.report.identification_tables import choices_table, estimates_table
+    from tolalloc.report.identification_tables import estimates_table, short_choices_table
     from tolalloc.study.identification import IdentificationStudy
     from tolalloc.study.identification import identify as identified
     from tolalloc.study.run_folder import require_usable
@@ -72,6 +72,10 @@ def identify(
         require_usable(out)
     if stiffness:
         require_new(stiffness)
+        if stiffness.suffix != ".toml":
+            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file that ends in .toml")
+        if out and (out.absolute() == stiffness.absolute() or out.absolute() in stiffness.absolute().parents):
+            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file outside of the report's folder")
         if not any(item.is_stiffness for item in study.parameters):
             raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
@@ -88,7 +92,7 @@ def identify(
         return
     print_table(estimates_table(results), f"{design.name}: {measurements.name}")
     if results.candidates:
-        print_table(choices_table(results), "Simpler explanations")
+        print_table(short_choices_table(results), "Simpler explanations")
     say(document)
 
 

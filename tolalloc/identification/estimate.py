@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
-from jaxtyping import Float
 
 from tolalloc.identification.information import Information
 from tolalloc.identification.parameters import Parameter
@@ -24,7 +22,8 @@ class Estimate:
     parameter
         Which one.
     value
-        At the least objective; the middle of the bounds where the data do not identify it [as parameter].
+        Most probable if the bounds count as an even distribution: next to the least objective where the data say much,
+        the middle of the bounds where they say nothing [as parameter].
     uncertainty
         Its standard uncertainty, of the logarithm but for the bias [-, arcsec].
     interval
@@ -50,15 +49,15 @@ class Estimate:
         if not self.identified:
             spanned = item.written(f"{low}…{high}")
             return f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {spanned}."
-        bound = "; the least stands on a bound" if self.on_bound else ""
+        bound = "; the least objective is on a bound" if self.on_bound else ""
         value, interval = item.written(f"{self.value:.4g}"), item.written(f"{low}…{high}")
         return f"{item.symbol} = {value}, 95 % interval {interval}{bound}."
 
 
 def estimates(
     parameters: Sequence[Parameter],
-    coordinates: Float[np.ndarray, " parameter"],
     found: Information,
+    written: Information,
     profiles: Sequence[Profile],
 ) -> tuple[Estimate, ...]:
     """Return all parameters.
@@ -67,20 +66,19 @@ def estimates(
     ----------
     parameters
         The unknowns.
-    coordinates
-        Where the objective is least [-].
     found, profiles
-        What the readings say around it.
+        What the readings say around the least objective.
+    written
+        The same where readings and bounds together put the parameters.
     """
-    deviations, rows = np.sqrt(np.diag(found.covariance)), []
+    deviations, rows = np.sqrt(np.diag(written.covariance)), []
     for at, (item, own) in enumerate(zip(parameters, profiles, strict=True)):
-        middle = 0.5 * (item.lower + item.upper)
         low, high = own.interval
         rows.append(
             Estimate(
                 parameter=item,
-                value=item.value(float(coordinates[at]) if own.is_identified else middle),
-                uncertainty=float(deviations[at]) if own.is_identified else (item.upper - item.lower) / sqrt(12.0),
+                value=item.value(float(written.coordinates[at])),
+                uncertainty=float(deviations[at]),
                 interval=(item.value(low), item.value(high)),
                 identified=own.is_identified,
                 on_bound=bool(found.on_bound[at]),
@@ -90,7 +88,7 @@ def estimates(
 
 
 def as_stiffness(
-    answer: Sequence[Estimate], found: Information, source: str, notes: Sequence[str]
+    answer: Sequence[Estimate], written: Information, source: str, notes: Sequence[str]
 ) -> IdentifiedStiffness | None:
     """Return the stiffnesses for a stiffness file; none if no stiffness was asked for.
 
@@ -98,8 +96,8 @@ def as_stiffness(
     ----------
     answer
         All parameters.
-    found
-        Their information, whose covariance links those that are identified.
+    written
+        Their information, whose covariance links them: what is fixed is often a combination.
     source
         Where the readings come from.
     notes
@@ -108,12 +106,9 @@ def as_stiffness(
     places = [at for at, item in enumerate(answer) if item.parameter.is_stiffness]
     if not places:
         return None
-    covariance = found.covariance
+    covariance = written.covariance
     spread = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(spread, spread)
-    for at, item in enumerate(answer):
-        if not item.identified:  # it is given as the middle of its bounds, which goes with nothing else
-            correlation[at], correlation[:, at] = 0.0, 0.0
     np.fill_diagonal(correlation, 1.0)
     chosen = [answer[at] for at in places]
     return IdentifiedStiffness(

@@ -8,8 +8,10 @@ from math import sqrt
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
+from scipy.stats import f as fisher_f
 from scipy.stats import t as student
 
+from tolalloc.identification.parameters import BIAS
 from tolalloc.identification.prediction import Prediction
 from tolalloc.identification.problem import IdentificationProblem
 
@@ -17,6 +19,8 @@ LEVEL = 0.95
 """Confidence of every interval [-]."""
 
 _ON_BOUND = 1e-3  # distance over the box within which a coordinate stands on its bound [-]
+_FINEST = 1e-6  # least variance factor of noise that nobody stated: a thousandth of an arcsecond, squared [-]
+_TINY = np.finfo(float).tiny
 _RARE = 1e-3  # probability below which the stated noise is doubted [-]
 _NOTHING = 1e-12  # eigenvalue over the largest, or squared loading, that is rounding [-]
 _SMALL = 0.05  # loadings below this share of the largest are not written [-]
@@ -42,7 +46,7 @@ class Direction:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the 95 % interval is shorter than half of what the bounds allow."""
+        """Whether the 95 % interval is no longer than half of what the bounds allow."""
         return 1.96 * self.deviation < 0.5 * self.room
 
     def sentence(self, symbols: tuple[str, ...]) -> str:
@@ -55,9 +59,10 @@ class Direction:
         ]
         combination = " ".join(parts).removeprefix("+").replace("-", "−")
         if self.is_fixed:
-            return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%}"
+            return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%} as standard error"
+        left = f"±{self.deviation:.2%}" if self.deviation < self.room else "no less than that"
         return (
-            f"these data leave {combination} (relative changes) open: ±{self.deviation:.2%}, where the bounds alone "
+            f"these data leave {combination} (relative changes) open: {left} as standard error, where the bounds alone "
             f"leave ±{self.room:.2%}"
         )
 
@@ -71,7 +76,8 @@ class Information:
     matrix
         Fisher information of the coordinates from the readings over the variance factor, and from the prior [-].
     variance_factor
-        By how much residuals exceed the noise: their reduced χ², at least 1 where the noise was stated [-].
+        Variance of the noise over the one that the data carry: 1 where it was stated and can be believed, else the
+        reduced χ² [-].
     freedom
         Readings less parameters [-].
     reduced_chi_square
@@ -80,6 +86,10 @@ class Information:
         Bounds of the coordinates [-].
     coordinates
         Where it was taken [-].
+    estimated
+        Whether the variance factor was estimated from the residuals; if not, the noise is known.
+    logarithmic
+        Which coordinates are logarithms; the bias is not.
     """
 
     matrix: Float[np.ndarray, "parameter parameter"]
@@ -89,16 +99,22 @@ class Information:
     lower: Float[np.ndarray, " parameter"]
     upper: Float[np.ndarray, " parameter"]
     coordinates: Float[np.ndarray, " parameter"]
+    estimated: bool
+    logarithmic: Bool[np.ndarray, " parameter"]
 
     @property
     def directions(self) -> tuple[Direction, ...]:
-        """Eigenvectors of the information, best known first."""
-        values, vectors = np.linalg.eigh(self.matrix)
+        """Eigenvectors of the information of all logarithms, best known first; a bias is left free."""
+        own, other = self.logarithmic, ~self.logarithmic
+        between = self.matrix[np.ix_(own, other)]
+        left = self.matrix[np.ix_(own, own)] - between @ np.linalg.pinv(self.matrix[np.ix_(other, other)]) @ between.T
+        values, vectors = np.linalg.eigh(left)
+        width = (self.upper - self.lower)[own]
         found = []
         for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
             loading = vector * np.sign(vector[np.abs(vector).argmax()])
-            room = 0.5 * float(np.abs(loading) @ (self.upper - self.lower))
-            deviation = sqrt(1.0 / value) if value > 0.0 else np.inf
+            room = 0.5 * float(np.abs(loading) @ width)
+            deviation = sqrt(1.0 / value) if value > _NOTHING * max(values[-1], _TINY) else np.inf
             found.append(Direction(loading=loading, deviation=deviation, room=room))
         return tuple(found)
 
@@ -119,7 +135,7 @@ class Information:
     def standard_errors(self) -> Float[np.ndarray, " parameter"]:
         """Standard errors of the coordinates from the readings alone; infinite where they say nothing [-]."""
         values, vectors = np.linalg.eigh(self.matrix)
-        known = values > _NOTHING * max(values.max(), np.finfo(float).tiny)
+        known = values > _NOTHING * max(values.max(), _TINY)
         share = vectors**2
         variance = share[:, known] @ (1.0 / values[known])
         open_to = share[:, ~known].sum(axis=1) > _NOTHING
@@ -128,13 +144,14 @@ class Information:
     @property
     def interval(self) -> Float[np.ndarray, "2 parameter"]:
         """First-order 95 % interval of the coordinates, not cut at the bounds [-]."""
-        half = float(student.ppf(0.5 + LEVEL / 2, self.freedom)) * self.standard_errors
+        freedom = self.freedom if self.estimated else np.inf
+        half = float(student.ppf(0.5 + LEVEL / 2, freedom)) * self.standard_errors
         return np.stack([self.coordinates - half, self.coordinates + half])
 
     @property
-    def exceeds_noise(self) -> bool:
-        """Whether residuals are so large that the stated noise makes them in less than one case of a thousand."""
-        return bool(chi2.sf(self.reduced_chi_square * self.freedom, self.freedom) < _RARE)
+    def threshold(self) -> float:
+        """Rise of twice the objective at which a 95 % interval ends: χ² of one, or F where the noise was estimated."""
+        return float(fisher_f.ppf(LEVEL, 1, self.freedom) if self.estimated else chi2.ppf(LEVEL, 1))
 
     @property
     def on_bound(self) -> Bool[np.ndarray, " parameter"]:
@@ -164,7 +181,9 @@ def information(
     readings, freedom = problem.data.measured.size, problem.freedom
     slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)[:readings]
     reduced = float(left @ left) / freedom
-    factor = max(reduced, 1.0) if problem.data.noise_stated else reduced
+    # Stated noise is believed unless it makes such residuals in less than one case of a thousand.
+    estimated = not problem.data.noise_stated or bool(chi2.sf(reduced * freedom, freedom) < _RARE)
+    factor = max(reduced, _FINEST) if estimated else 1.0
     known = slopes[readings:]
     return Information(
         matrix=slopes[:readings].T @ slopes[:readings] / factor + known.T @ known,
@@ -174,4 +193,6 @@ def information(
         lower=problem.lower,
         upper=problem.upper,
         coordinates=coordinates,
+        estimated=estimated,
+        logarithmic=np.array([item.name != BIAS for item in problem.parameters]),
     )

@@ -33,6 +33,7 @@ LIU2020 = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 _WIDEST = {BIAS: (-60.0, 60.0), TORQUE: (0.1, 10.0)}
 _ALLOWED = {BIAS: "two numbers from -3600 to 3600 arcsec", TORQUE: "two positive factors up to 1000"}
+_NARROWEST = 1.01
 _SMALLEST_PRIOR = 1e-4  # what is known better is known [-]
 _STIFFNESS_SPAN = 2.0  # bounds of a stiffness unless told otherwise: half to double its value in the reducer file
 
@@ -133,6 +134,8 @@ def parameter(
         raise InputError.at(place, name, f"{low:g}:{high:g}", allowed)
     if not prior >= _SMALLEST_PRIOR:
         raise InputError.at(place, f"prior of {name}", prior, f"{_SMALLEST_PRIOR:g} or more")
+    if name != BIAS and high < _NARROWEST * low:
+        raise InputError.at(place, name, f"{low:g}:{high:g}", "bounds at least 1 % apart")
     if not low <= start <= high:
         raise InputError.at(place, name, f"{low:g}:{high:g}", f"bounds around the start, which is {start:g}")
     return Parameter(name=name, low=low, high=high, start=start, prior=prior)

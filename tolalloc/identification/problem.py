@@ -28,6 +28,8 @@ class IdentificationProblem:
         What says what should have been read.
     weight
         How often each unit counts: 1, 0 for one that is left out, more in a bootstrap sample [-].
+    evenly
+        Whether the bounds count as knowledge: an even distribution between them, by its mean and variance.
     place
         Where the data were read, for errors.
 
@@ -40,6 +42,7 @@ class IdentificationProblem:
     data: Data
     predictor: Predictor
     weight: Float[np.ndarray, " unit"]
+    evenly: bool = False
     place: str = "identify"
     _root: Float[np.ndarray, " datum"] = field(init=False, repr=False)
 
@@ -78,15 +81,29 @@ class IdentificationProblem:
         own = (prediction.values - self.data.measured) * self._root
         if not np.isfinite(own).all():
             unit = int(self.data.unit[np.flatnonzero(~np.isfinite(own))[0]]) + 1
-            raise SolveError(
-                f"{self.place}: unit {unit} in the order of the file has no equilibrium at these stiffnesses."
+            values = ", ".join(
+                f"{item.name} = {item.value(float(at)):.4g}"
+                for item, at in zip(self.parameters, coordinates, strict=True)
             )
-        return np.concatenate([own, coordinates * prior_weights(self.parameters)])
+            raise SolveError(
+                f"{self.place}: unit {unit} in the order of the file has no equilibrium at {values}; leave it out, or "
+                "narrow the bounds."
+            )
+        known = [coordinates * prior_weights(self.parameters)]
+        if self.evenly:
+            known.append((coordinates - 0.5 * (self.lower + self.upper)) * self._pull)
+        return np.concatenate([own, *known])
+
+    @property
+    def _pull(self) -> Float[np.ndarray, " parameter"]:
+        """One over the standard deviation of an even distribution between the bounds [-]."""
+        return np.asarray(np.sqrt(12.0) / (self.upper - self.lower))
 
     def jacobian(self, prediction: Prediction) -> Float[np.ndarray, "row parameter"]:
         """Return the derivatives of the residuals by the coordinates [-]."""
         own = prediction.by_coordinate * self._root[:, np.newaxis]
-        return np.concatenate([own, np.diag(prior_weights(self.parameters))])
+        known = [np.diag(prior_weights(self.parameters)), *([np.diag(self._pull)] if self.evenly else [])]
+        return np.concatenate([own, *known])
 
     def objectives(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
         """Return the objective at many points [-]."""

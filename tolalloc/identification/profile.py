@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import f as fisher_f
+from scipy.optimize import brentq
 
 from tolalloc.identification.gauss_newton import gauss_newton
-from tolalloc.identification.information import LEVEL, Information
+from tolalloc.identification.information import Information
 from tolalloc.identification.prediction import Prediction, Predictor
 from tolalloc.identification.problem import IdentificationProblem
 
-BOX_POINTS, NEAR_POINTS, NEAR = 13, 21, 4.0
+BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
 """Values at which a parameter is held: evenly between its bounds, and within so many standard errors of its best."""
 
 
@@ -24,38 +24,24 @@ class Profile:
     Parameters
     ----------
     coordinate
-        Values at which it was held, bounds included [-].
+        Values at which it was held, bounds and ends of the interval included [-].
     rise
         Twice the rise of the objective above its least [-].
     threshold
         Rise at which the 95 % interval ends [-].
+    interval
+        Where the rise crosses the threshold to either side of the least, or the bound [-].
     """
 
     coordinate: Float[np.ndarray, " value"]
     rise: Float[np.ndarray, " value"]
     threshold: float
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Ends of the 95 % interval: where the rise crosses the threshold, or the bound [-]."""
-        inside = np.flatnonzero(self.rise <= self.threshold)
-        if inside.size == 0:  # the least lies between two values and is narrower than their distance
-            at = float(self.coordinate[self.rise.argmin()])
-            return at, at
-        return self._crossing(int(inside[0]), -1), self._crossing(int(inside[-1]), 1)
-
-    def _crossing(self, at: int, side: int) -> float:
-        """Return where the straight line to the next value outwards crosses the threshold."""
-        outer = at + side
-        if not 0 <= outer < self.rise.size:
-            return float(self.coordinate[at])
-        share = (self.threshold - self.rise[at]) / (self.rise[outer] - self.rise[at])
-        return float(self.coordinate[at] + share * (self.coordinate[outer] - self.coordinate[at]))
+    interval: tuple[float, float]
 
     @property
     def open_ends(self) -> tuple[bool, bool]:
         """Whether the interval reaches the lower and the upper bound."""
-        return bool(self.rise[0] <= self.threshold), bool(self.rise[-1] <= self.threshold)
+        return bool(self.interval[0] <= self.coordinate[0]), bool(self.interval[1] >= self.coordinate[-1])
 
     @property
     def is_identified(self) -> bool:
@@ -82,6 +68,30 @@ class _Held:
         return self.predictor.values(self._whole(coordinates))
 
 
+class _Fits:
+    """Least objectives with one coordinate held, each begun where its nearest neighbour ended."""
+
+    def __init__(self, problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int) -> None:
+        self._problem, self._place = problem, place
+        self._others = [item for at, item in enumerate(problem.parameters) if at != place]
+        self._ended = {float(best[place]): np.delete(best, place)}
+        self.objective: dict[float, float] = {}
+        self(float(best[place]))
+
+    def __call__(self, at: float) -> float:
+        """Return the least objective with the coordinate held at a value."""
+        if at not in self.objective:
+            held = self._problem.of(self._others, _Held(self._problem.predictor, self._place, at))
+            known = 0.5 * (at / self._problem.parameters[self._place].prior) ** 2
+            if self._others:
+                nearest = min(self._ended, key=lambda other: abs(other - at))
+                fitted = gauss_newton(held, self._ended[nearest][np.newaxis])
+                self._ended[at], self.objective[at] = fitted.coordinates, fitted.objective + known
+            else:
+                self.objective[at] = float(held.objectives(np.empty((1, 0)))[0]) + known
+        return self.objective[at]
+
+
 def profile(
     problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int, found: Information
 ) -> Profile:
@@ -96,38 +106,37 @@ def profile(
     place
         Position of the parameter [-].
     found
-        What the readings say to first order: where to look.
+        What the readings say to first order: where to look, and the threshold.
 
     Notes
     -----
-    The threshold is that of the F distribution with one and (readings − parameters) degrees of freedom, which is χ²'s
-    3.84 for many readings. Theory page, equation (41).
+    Theory page, equation (41).
     """
-    values = _values(problem.lower[place], problem.upper[place], best[place], found.standard_errors[place])
-    others = [item for at, item in enumerate(problem.parameters) if at != place]
-    objective = np.empty(values.size)
-    middle = int(np.searchsorted(values, best[place]))
-    for order in (range(middle, values.size), range(middle - 1, -1, -1)):
-        start = np.delete(best, place)  # each fit begins where its neighbour ended
-        for at in order:
-            held = problem.of(others, _Held(problem.predictor, place, float(values[at])))
-            own = problem.parameters[place].prior
-            known = 0.5 * (values[at] / own) ** 2
-            if others:
-                fitted = gauss_newton(held, start[np.newaxis])
-                start, objective[at] = fitted.coordinates, fitted.objective + known
-            else:
-                objective[at] = held.objectives(np.empty((1, 0)))[0] + known
-    return Profile(
-        coordinate=values,
-        rise=2.0 * (objective - objective.min()),
-        threshold=float(fisher_f.ppf(LEVEL, 1, problem.freedom)),
-    )
-
-
-def _values(lower: float, upper: float, best: float, standard_error: float) -> Float[np.ndarray, " value"]:
-    """Return the values at which a coordinate is held: its bounds, its best, the box, and densely around the best."""
+    lower, upper, middle = float(problem.lower[place]), float(problem.upper[place]), float(best[place])
+    reach = NEAR * float(np.sqrt(found.covariance[place, place]))
     box = np.linspace(lower, upper, BOX_POINTS)
-    reach = min(NEAR * standard_error, upper - lower)
-    near = best + reach * np.linspace(-1.0, 1.0, NEAR_POINTS)
-    return np.unique(np.concatenate([box, near[(near > lower) & (near < upper)], [best]]))
+    near = middle + reach * np.linspace(-1.0, 1.0, NEAR_POINTS)
+    values = np.unique(np.concatenate([box, near[(near > lower) & (near < upper)], [middle]]))
+    fits = _Fits(problem, best, place)
+    for at in sorted(values, key=lambda value: abs(value - middle)):
+        fits(float(at))
+    ends = tuple(_crossing(fits, values, found.threshold, side) for side in (-1, 1))
+    held = np.array(sorted(fits.objective))
+    rise = 2.0 * (np.array([fits.objective[float(at)] for at in held]) - min(fits.objective.values()))
+    return Profile(coordinate=held, rise=rise, threshold=found.threshold, interval=(ends[0], ends[1]))
+
+
+def _crossing(fits: _Fits, values: Float[np.ndarray, " value"], threshold: float, side: int) -> float:
+    """Return where the rise crosses the threshold beyond the outermost value inside, or the bound."""
+    least = min(fits.objective.values())
+
+    def beyond(at: float) -> float:
+        return 2.0 * (fits(at) - least) - threshold
+
+    inside = [float(at) for at in values if beyond(float(at)) <= 0.0]
+    inner = min(inside) if side < 0 else max(inside)
+    outward = values[values < inner] if side < 0 else values[values > inner]
+    if outward.size == 0:
+        return inner
+    outer = float(outward.max() if side < 0 else outward.min())
+    return float(brentq(beyond, inner, outer, xtol=1e-4 * abs(outer - inner)))

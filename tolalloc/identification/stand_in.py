@@ -91,3 +91,37 @@ def fit_stand_in(kernel: KernelPredictor, seeds: SeedTree) -> StandIn:
     degree = _DEGREES.get(len(fitted), 2)
     polynomial = fit_box_polynomial(own.values, *box(fitted), degree, seeds)
     return StandIn(kernel.parameters, fitted, polynomial, kernel.data)
+
+
+@dataclass(frozen=True)
+class Anchored:
+    """A stand-in whose readings are moved, so that they are the model's at one point.
+
+    Parameters
+    ----------
+    stand_in
+        The polynomials.
+    offset
+        Model less polynomials at that point, without the bias's part [rad].
+    """
+
+    stand_in: StandIn
+    offset: Float[np.ndarray, " datum"]
+
+    def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
+        """Return readings and derivatives at one point."""
+        found = self.stand_in(coordinates)
+        return Prediction(values=found.values + self.offset, by_coordinate=found.by_coordinate)
+
+    def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
+        """Return the readings at many points [rad]."""
+        return np.asarray(self.stand_in.values(coordinates) + self.offset)
+
+    def of(self, parameters: tuple[Parameter, ...]) -> Anchored:
+        """Return the same for fewer unknowns, or with a bias."""
+        return Anchored(self.stand_in.of(parameters), self.offset)
+
+
+def anchored(stand_in: StandIn, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> Anchored:
+    """Return the stand-in moved onto what the model predicts at one point."""
+    return Anchored(stand_in, model.values - stand_in.values(coordinates[np.newaxis])[0])

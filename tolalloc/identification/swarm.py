@@ -16,7 +16,7 @@ from pymoo.core.population import Population
 
 @dataclass(frozen=True, kw_only=True)
 class SwarmSettings:
-    """What liu2020 does not print; the defaults are those of pymoo's plain swarm, so that the equations alone differ.
+    """What liu2020 does not print; the defaults are what pymoo's plain swarm begins with, before it adapts them.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import plotly.graph_objects as go
 from matplotlib.figure import Figure as Canvas
 
-COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a")
+COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
 
 
 @dataclass(frozen=True, kw_only=True)

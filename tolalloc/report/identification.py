@@ -16,22 +16,20 @@ from tolalloc.report.figure import Figure
 from tolalloc.report.identification_results import IdentificationResults
 from tolalloc.units import ARCSECOND
 
-LARGE_STAND_IN_ERROR = 0.1
-"""Root-mean-square error of the stand-in over the smallest noise above which profiles are doubtful [-]."""
+LARGE_DRIFT = 0.3
+"""Distance of polynomials' and model's least objective over the standard deviation that makes profiles doubtful [-]."""
 
 
 def baseline_sentences(results: IdentificationResults) -> tuple[str, ...]:
     """Return how a constant alone, and the choice by units not seen, compare with the fit."""
     if results.chosen is None:
-        return (
-            f"{results.data.units.size} units: too few to judge a fit by units that it has not seen, or to resample.",
-        )
+        return (f"{results.count}: too few to judge a fit by units that it has not seen, or to resample.",)
     found = []
     if PEAK_TO_PEAK in results.kinds:
         found.append(_verdict(results))
     found.append(
-        f"Judged by units left out, the simplest choice as good as the best within a standard error is: "
-        f"{results.chosen.name}."
+        f"Judged by {results.count}, each left out in turn, the simplest choice as good as the best within a standard "
+        f"error is: {results.chosen.name}."
     )
     return tuple(found)
 
@@ -61,14 +59,15 @@ def _verdict(results: IdentificationResults) -> str:
 
 def answer(results: IdentificationResults) -> tuple[str, ...]:
     """Return the answer in sentences."""
-    reach = ", ".join(
-        f"{kind} {results.rms(results.at_start, kind):.3g}″ before and {results.rms(results.at_found, kind):.3g}″ after"
+    reach = "; ".join(
+        f"{kind} {results.rms(results.at_start, kind):.3g}″ as given, {results.rms(results.at_found, kind):.3g}″ at "
+        f"the least objective, {results.rms(results.at_written, kind):.3g}″ with what the stiffness file states"
         for kind in results.kinds
     )
     return (
         *(item.sentence for item in results.estimates),
         *(
-            f"Direction {number}: {item.sentence(results.symbols)}."
+            f"Direction {number}: {item.sentence(results.logarithms)}."
             for number, item in enumerate(results.information.directions, start=1)
         ),
         f"Root-mean-square of model less measured: {reach}.",
@@ -82,29 +81,30 @@ def warnings(results: IdentificationResults) -> tuple[str, ...]:
     open_ones = [item.parameter.symbol for item in results.estimates if not item.identified]
     if open_ones:
         found.append(
-            f"Not identified: {', '.join(open_ones)}. The stiffness file gives the middle of the bounds, and their "
-            "whole width as uncertainty."
+            f"Not identified: {', '.join(open_ones)}. What the data leave open the stiffness file takes from the "
+            "bounds: towards their middle, with the standard uncertainty of an even distribution."
         )
     found += [
-        f"{item.parameter.symbol} stands on a bound: widen it, or read the value as a limit."
+        f"{item.parameter.symbol} has its least objective on a bound: widen it, or read the interval as a limit."
         for item in results.estimates
         if item.on_bound and item.identified
     ]
-    if results.data.noise_stated and own.exceeds_noise:
+    if results.data.noise_stated and own.estimated:
         found.append(
             f"Residuals are {np.sqrt(own.reduced_chi_square):.2g} times the stated noise: errors of the units or the "
             "model itself miss something. All uncertainties are widened by that factor."
         )
     if not results.data.noise_stated:
         found.append("No noise was stated, so it is estimated from what the fit leaves.")
-    doubtful = results.stand_in.rms_error > LARGE_STAND_IN_ERROR * results.data.noise.min()
-    if doubtful:
+    if results.drift > LARGE_DRIFT:
         found.append(
-            "The polynomials behind profiles, bootstrap and choices are off by "
-            f"{results.stand_in.rms_error / ARCSECOND:.2g}″ rms, more than a tenth of the noise: narrow the bounds "
-            "before trusting those."
+            f"The polynomials behind profiles and bootstrap have their least objective {results.drift:.2g} standard "
+            "deviations away from the model's: narrow the bounds, or ask for fewer parameters."
         )
     return (*found, *(f"Repaired: {repair}." for repair in results.measurements.repairs))
+
+
+_SWARM = "improved particle swarm: ω = 0.9, C1 = C2 = 2, a ring of three, stop at the bounds; liu2020 prints none"
 
 
 def assumptions(results: IdentificationResults) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ def assumptions(results: IdentificationResults) -> tuple[str, ...]:
         "noise is normal and independent from reading to reading; errors of the units are known exactly",
         "curves and loops lose their mean; angles and directions of the bench are those of the model",
         "bounds enter the covariance as an even distribution between them",
-        "improved particle swarm: ω = 0.9, C1 = C2 = 2, a ring of three, stop at the bounds; liu2020 prints none",
+        *((_SWARM,) if results.comparison or "improved" in results.found.method else ()),
     )
 
 
@@ -146,10 +146,11 @@ def summary(results: IdentificationResults) -> dict[str, Any]:
             }
             for item in results.estimates
         ],
-        "directions": [item.sentence(results.symbols) for item in results.information.directions],
+        "directions": [item.sentence(results.logarithms) for item in results.information.directions],
         "reduced chi square [-]": results.information.reduced_chi_square,
         "rms before [arcsec]": {kind: results.rms(results.at_start, kind) for kind in results.kinds},
         "rms after [arcsec]": {kind: results.rms(results.at_found, kind) for kind in results.kinds},
+        "rms as written [arcsec]": {kind: results.rms(results.at_written, kind) for kind in results.kinds},
         "choices": [
             {
                 "fitted": item.name,
@@ -182,9 +183,9 @@ def _reading_figures(results: IdentificationResults) -> tuple[Figure, ...]:
     if PEAK_TO_PEAK in results.kinds:
         drawn.append(figures.peak_to_peak_figure(results))
     if CURVE in results.kinds:
-        drawn += [figures.curve_figure(results), figures.unit_residual_figure(results, CURVE)]
+        drawn += [*figures.curve_figures(results), figures.unit_residual_figure(results, CURVE)]
     if LOOP in results.kinds:
-        drawn += [figures.loop_figure(results), figures.unit_residual_figure(results, LOOP)]
+        drawn += [*figures.loop_figures(results), figures.unit_residual_figure(results, LOOP)]
     return tuple(drawn)
 
 
@@ -195,8 +196,8 @@ def _sections(results: IdentificationResults) -> tuple[Section, ...]:
         heading="Parameters",
         paragraphs=(
             "The profile interval counts: it follows the real shape of the objective between the bounds. The "
-            "first-order one assumes a parabola, the bootstrap draws the units anew. Written: what the stiffness file "
-            "gives.",
+            "first-order one assumes a parabola, the bootstrap draws the units anew. Written: what the "
+            "stiffness file states, with one standard uncertainty: readings and bounds together.",
         ),
         tables=(("parameters", tables.parameters_table(results)),),
     )
@@ -245,9 +246,9 @@ def identification_document(results: IdentificationResults) -> Document:
     """Return the report of one identification."""
     return Document(
         title=f"{results.reducer.name}: stiffness from {results.measurements.name}",
-        subtitle=f"{results.found.method}, {results.found.evaluations} evaluations of "
-        f"{results.data.units.size} units, {results.data.measured.size} readings; {results.found.status}; "
-        f"seed {results.seed}.",
+        subtitle=f"{results.count}, {results.data.measured.size} readings; {results.found.method} on polynomials of "
+        f"the model, finished on the model by Gauss–Newton, {results.found.evaluations} evaluations in all; "
+        f"{results.found.status}; seed {results.seed}.",
         answer=answer(results),
         warnings=warnings(results),
         sections=(*_sections(results), *((_methods_section(results),) if results.comparison else ())),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
+from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK, Block
 from tolalloc.identification.parameters import BIAS
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.identification_results import IdentificationResults
@@ -55,42 +55,68 @@ def peak_to_peak_figure(results: IdentificationResults) -> Figure:
     )
 
 
-def curve_figure(results: IdentificationResults) -> Figure:
-    """Draw the first measured curve and the model's after the fit."""
+def curve_figures(results: IdentificationResults) -> tuple[Figure, Figure]:
+    """Draw the first measured curve with the model's, and what is left between them, before and after."""
     block = results.blocks(CURVE)[0]
     curve = results.measurements.curves[block.number]
-    angle = list(curve.carrier_angle / DEGREE)
-    measured = results.data.measured[block.rows] / ARCSECOND
-    model = results.at_found.values[block.rows] / ARCSECOND
-    return Figure(
-        name="measured_curve",
-        title=f"Unit {results.measurements.units[curve.unit].name} at {curve.torque:g} N·m: measured and modelled",
-        x_label="carrier angle [°]",
-        y_label="transmission error [arcsec]",
-        series=(
-            Series(label="measured", kind="line", x=angle, y=list(measured)),
-            Series(label="model after the fit", kind="line", x=angle, y=list(model)),
-            Series(label="model less measured", kind="line", x=angle, y=list(model - measured)),
+    name = f"Unit {results.measurements.units[curve.unit].name} at {curve.torque:g} N·m"
+    angle, data = list(curve.carrier_angle / DEGREE), results.data
+    measured = Series(label="measured", kind="line", x=angle, y=list(data.measured[block.rows] / ARCSECOND))
+    model = Series(label="model", kind="line", x=angle, y=list(results.at_found.values[block.rows] / ARCSECOND))
+    return (
+        Figure(
+            name="measured_curve",
+            title=f"{name}: measured and modelled",
+            x_label="carrier angle [°]",
+            y_label="transmission error [arcsec]",
+            series=(measured, model),
+        ),
+        _left_figure(results, block, "curve_left", f"{name}: model less measured", "carrier angle [°]", angle),
+    )
+
+
+def loop_figures(results: IdentificationResults) -> tuple[Figure, Figure]:
+    """Draw the first measured loop with the model's, and what is left between them, before and after."""
+    block = results.blocks(LOOP)[0]
+    loop = results.measurements.loops[block.number]
+    torque = list(loop.torque)
+    name = f"Unit {results.measurements.units[loop.unit].name} at {loop.carrier_angle / DEGREE:.0f}°"
+    measured = list(results.data.measured[block.rows] / ARCSECOND)
+    model = list(results.at_found.values[block.rows] / ARCSECOND)
+    return (
+        Figure(
+            name="measured_loop",
+            title=f"{name}: torque and twist",
+            x_label="torque on the carrier [N·m]",
+            y_label="twist less its mean [arcsec]",
+            series=(
+                Series(label="measured", kind="points", x=torque, y=measured),
+                Series(label="model", kind="line", x=torque, y=model),
+            ),
+        ),
+        _left_figure(
+            results, block, "loop_left", f"{name}: model less measured", "torque on the carrier [N·m]", torque
         ),
     )
 
 
-def loop_figure(results: IdentificationResults) -> Figure:
-    """Draw the first measured loop and the model's before and after the fit."""
-    block = results.blocks(LOOP)[0]
-    loop = results.measurements.loops[block.number]
-    torque, name = list(loop.torque), results.measurements.units[loop.unit].name
+def _left_figure(
+    results: IdentificationResults, block: Block, name: str, title: str, x_label: str, x: list[float]
+) -> Figure:
+    """Draw model less measured of one block, before and after."""
     return Figure(
-        name="measured_loop",
-        title=f"Unit {name} at {loop.carrier_angle / DEGREE:.0f}°: torque and twist",
-        x_label="torque on the carrier [N·m]",
-        y_label="twist less its mean [arcsec]",
-        series=(
-            Series(label="measured", kind="points", x=torque, y=list(results.data.measured[block.rows] / ARCSECOND)),
+        name=name,
+        title=title,
+        x_label=x_label,
+        y_label="model less measured [arcsec]",
+        series=tuple(
             Series(
-                label="model before", kind="line", x=torque, y=list(results.at_start.values[block.rows] / ARCSECOND)
-            ),
-            Series(label="model after", kind="line", x=torque, y=list(results.at_found.values[block.rows] / ARCSECOND)),
+                label=label,
+                kind="line",
+                x=x,
+                y=list((prediction.values - results.data.measured)[block.rows] / ARCSECOND),
+            )
+            for label, prediction in (("before", results.at_start), ("after", results.at_found))
         ),
     )
 
@@ -117,7 +143,7 @@ def unit_residual_figure(results: IdentificationResults, kind: str) -> Figure:
 
 def convergence_figure(results: IdentificationResults) -> Figure:
     """Draw S above its least after so many evaluations: median and quartiles of the seeds."""
-    least = min(float(item.objectives.min()) for item in results.comparison)
+    least = max(min(float(item.objectives.min()) for item in results.comparison), np.finfo(float).tiny)
     series = []
     for item in results.comparison:
         most = max(run.evaluations for run in item.runs)

@@ -9,7 +9,7 @@ import numpy as np
 from tolalloc.identification.data import Block, Data
 from tolalloc.identification.estimate import Estimate, as_stiffness
 from tolalloc.identification.information import Information
-from tolalloc.identification.parameters import Parameter
+from tolalloc.identification.parameters import BIAS, Parameter
 from tolalloc.identification.prediction import Prediction
 from tolalloc.identification.profile import Profile
 from tolalloc.identification.resampling import Bootstrap, Candidate
@@ -37,8 +37,14 @@ class IdentificationResults:
         Answer of the chosen method, on the model itself.
     at_start, at_found
         What the model says should have been read, before and after.
-    information, profiles, bootstrap
-        What the data fix; no bootstrap for a few units.
+    at_written
+        The same for what the stiffness file states.
+    information, written
+        What the data fix around the least objective, and around what the stiffness file states.
+    profiles, bootstrap
+        The same without a parabola, and for units drawn anew; no bootstrap for a few units.
+    drift
+        How far the least objective of the polynomials is from that of the model, over the standard deviation [-].
     estimates
         Every parameter with its uncertainty.
     candidates, chosen
@@ -58,7 +64,10 @@ class IdentificationResults:
     found: Identified
     at_start: Prediction
     at_found: Prediction
+    at_written: Prediction
     information: Information
+    written: Information
+    drift: float
     profiles: tuple[Profile, ...]
     estimates: tuple[Estimate, ...]
     bootstrap: Bootstrap | None
@@ -74,13 +83,24 @@ class IdentificationResults:
         return tuple(item.symbol for item in self.parameters)
 
     @property
+    def logarithms(self) -> tuple[str, ...]:
+        """Symbols of all parameters but the bias: those whose relative changes the directions combine."""
+        return tuple(item.symbol for item in self.parameters if item.name != BIAS)
+
+    @property
+    def count(self) -> str:
+        """Number of units in words."""
+        units = int(self.data.units.size)
+        return "1 unit" if units == 1 else f"{units} units"
+
+    @property
     def stiffness(self) -> IdentifiedStiffness | None:
         """The answer for a stiffness file; none if no stiffness was asked for."""
         notes = (
-            f"identified by {self.found.method} from {self.data.units.size} units of {self.reducer.name}; residuals "
+            f"identified by {self.found.method} from {self.count} of {self.reducer.name}; residuals "
             f"{np.sqrt(self.information.reduced_chi_square):.3g} times the noise",
         )
-        return as_stiffness(self.estimates, self.information, self.measurements.source, notes)
+        return as_stiffness(self.estimates, self.written, self.measurements.source, notes)
 
     def rms(self, prediction: Prediction, kind: str) -> float:
         """Return the root-mean-square of predicted less measured for one kind of reading [arcsec]."""

@@ -9,6 +9,8 @@ from tolalloc.identification.parameters import BIAS, Parameter
 from tolalloc.report.identification_results import IdentificationResults
 from tolalloc.units import ARCSECOND
 
+_OPEN = 10.0  # width of an interval of a logarithm beyond which it says nothing [-]
+
 
 def _span(item: Parameter, low: float, high: float) -> str:
     """Return an interval of coordinates as values."""
@@ -21,18 +23,21 @@ def parameters_table(results: IdentificationResults) -> pd.DataFrame:
     for at, (item, estimate) in enumerate(zip(results.parameters, results.estimates, strict=True)):
         rows.append(
             {
-                "parameter": f"{item.symbol} [{item.unit}]",
+                "parameter": f"{item.symbol} [{item.unit}], {item.name.replace('_', ' ')}",
                 "given": f"{item.start:.4g}",
                 "bounds": f"{item.low:.4g}…{item.high:.4g}",
                 "least objective at": f"{item.value(float(results.found.coordinates[at])):.4g}",
                 "95 % profile": f"{estimate.interval[0]:.4g}…{estimate.interval[1]:.4g}",
-                "95 % first order": _span(item, *first_order[:, at]) if np.ptp(first_order[:, at]) < 10 else "no limit",
+                "95 % first order": _span(item, *first_order[:, at])
+                if item.name == BIAS or np.ptp(first_order[:, at]) < _OPEN
+                else "no limit",
                 "95 % bootstrap": _span(item, *results.bootstrap.interval[:, at]) if results.bootstrap else "",
                 "identified": "yes" if estimate.identified else "no",
                 "on a bound": "yes" if estimate.on_bound else "no",
                 "written": f"{estimate.value:.4g}",
-                "± [arcsec]" if item.name == BIAS else "± [%]": estimate.uncertainty
-                * (1 if item.name == BIAS else 100),
+                "standard uncertainty": f"{estimate.uncertainty:.3g} arcsec"
+                if item.name == BIAS
+                else f"{100 * estimate.uncertainty:.3g} %",
             }
         )
     return pd.DataFrame(rows)
@@ -60,8 +65,13 @@ def directions_table(results: IdentificationResults) -> pd.DataFrame:
         rows.append(
             {
                 "direction": number,
-                **{symbol: round(float(share), 3) for symbol, share in zip(results.symbols, item.loading, strict=True)},
-                "left by the data [%]": 100 * item.deviation if np.isfinite(item.deviation) else "no limit",
+                **{
+                    symbol: round(float(share), 3) + 0.0
+                    for symbol, share in zip(results.logarithms, item.loading, strict=True)
+                },
+                "standard error left by the data [%]": 100 * item.deviation
+                if item.deviation < item.room
+                else "no limit",
                 "left by the bounds alone [%]": 100 * item.room,
                 "fixed": "yes" if item.is_fixed else "no",
             }
@@ -83,9 +93,14 @@ def choices_table(results: IdentificationResults) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def short_choices_table(results: IdentificationResults) -> pd.DataFrame:
+    """Return every choice of parameters with its score alone, for a narrow screen."""
+    return choices_table(results)[["fitted", "units left out, over noise [-]", "chosen"]]
+
+
 def methods_table(results: IdentificationResults) -> pd.DataFrame:
     """Return how every method did over its seeds."""
-    least = min(float(item.objectives.min()) for item in results.comparison)
+    least = max(min(float(item.objectives.min()) for item in results.comparison), np.finfo(float).tiny)
     near = least * (1 + 1e-4) ** 2
     rows = []
     for item in results.comparison:

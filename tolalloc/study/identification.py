@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from tolalloc.identification.profile import profile
 from tolalloc.identification.resampling import FEWEST_UNITS, Candidate, bootstrap, judged, simplest
 from tolalloc.identification.result import Comparison, Identified
 from tolalloc.identification.searches import ALGORITHMS, search
-from tolalloc.identification.stand_in import StandIn, fit_stand_in
+from tolalloc.identification.stand_in import StandIn, anchored, fit_stand_in
 from tolalloc.measurement.records import Measurements
 from tolalloc.reducer.design import Reducer
 from tolalloc.report.identification_results import IdentificationResults
@@ -35,6 +36,7 @@ METHODS = {
 }
 """Name on the command line → method."""
 
+_ANY_BIAS = (-3600.0, 3600.0)
 _STARTS = 8
 """Starts of Gauss–Newton: flat directions end in several corners of the box [-]."""
 
@@ -123,13 +125,17 @@ def identify(
     found = _found(study, problem, quick, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
-    quick = quick.widened(own.variance_factor)
+    widened = problem.widened(own.variance_factor)
+    written = gauss_newton(replace(widened, evenly=True), found.coordinates[np.newaxis]).coordinates
+    at_written = kernel(written)
     progress.begin("what the data fix")
-    near = gauss_newton(quick, found.coordinates[np.newaxis]).coordinates
-    profiles = tuple(profile(quick, near, at, own) for at in range(len(study.parameters)))
+    here = widened.of(study.parameters, anchored(stand_in, found.coordinates, prediction))
+    near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
+    profiles = tuple(profile(here, near, at, own) for at in range(len(study.parameters)))
     several = data.units.size >= FEWEST_UNITS
     progress.begin("other choices")
     candidates = judged_candidates(quick, stand_in, reducer) if several else ()
+    spread = information(widened, at_written, written)
     return IdentificationResults(
         measurements=measurements,
         reducer=reducer,
@@ -138,10 +144,13 @@ def identify(
         found=found,
         at_start=kernel(problem.start),
         at_found=prediction,
+        at_written=at_written,
         information=own,
+        written=spread,
         profiles=profiles,
-        estimates=estimates(study.parameters, found.coordinates, own, profiles),
-        bootstrap=bootstrap(quick, near, seeds.child("bootstrap")) if several else None,
+        drift=float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max()),
+        estimates=estimates(study.parameters, own, spread, profiles),
+        bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
         candidates=candidates,
         chosen=simplest(candidates) if candidates else None,
         stand_in=stand_in.polynomial,
@@ -151,12 +160,14 @@ def identify(
 
 
 def _require_visible(study: IdentificationStudy, data: Data) -> None:
-    """Refuse a bias or a torque where no reading shows one."""
+    """Refuse a bias or a torque where no reading shows one, and a prior against readings without a stated noise."""
     names = [item.name for item in study.parameters]
     if BIAS in names and data.peak_to_peak is None:
         raise InputError(
             f"{study.data}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
         )
+    if not data.noise_stated and any(isfinite(item.prior) for item in study.parameters):
+        raise InputError(f"{study.data}: a prior can only be weighed against readings whose noise_arcsec is stated.")
     if TORQUE in names and all(block.kind == LOOP for block in data.blocks):
         raise InputError(
             f"{study.data}: parameter 'torque' needs peak-to-peaks or curves; loops measure their torque themselves."
@@ -170,25 +181,25 @@ def _require_close(study: IdentificationStudy, data: Data, stand_in: StandIn) ->
         bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in study.parameters)
         raise InputError(
             f"tolalloc identify: bounds {bounds} are too wide, polynomials of the model are off by "
-            f"{off / ARCSECOND:.2g}″ where the noise is {data.noise.min() / ARCSECOND:.2g}″; allowed are narrower ones, "
-            "such as half to double."
+            f"{off / ARCSECOND:.2g}″ where the noise is {data.noise.min() / ARCSECOND:.2g}″; allowed are narrower "
+            "ones, such as half to double."
         )
 
 
 def _found(
     study: IdentificationStudy, problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree
 ) -> Identified:
-    """Return the answer of the chosen method, its objective on the model itself."""
-    if METHODS[study.method] != GAUSS_NEWTON:
-        return on_the_model(problem, search(quick, METHODS[study.method], study.seed))
-    near = gauss_newton(quick, starts(quick, _STARTS, seeds.child("starts")), study.seed)
-    found = gauss_newton(problem, near.coordinates[np.newaxis], study.seed)
-    return replace(found, history=near.history.then(found.history))
+    """Return the answer of the chosen method on polynomials, finished on the model by Gauss–Newton from there.
 
-
-def on_the_model(problem: IdentificationProblem, found: Identified) -> Identified:
-    """Return a stand-in's answer with its objective on the model itself."""
-    return replace(found, objective=float(problem.objectives(found.coordinates[np.newaxis])[0]))
+    The reducer as given is another start on the model, should polynomials lead astray.
+    """
+    name = METHODS[study.method]
+    if name == GAUSS_NEWTON:
+        near = gauss_newton(quick, starts(quick, _STARTS, seeds.child("starts")), study.seed)
+    else:
+        near = search(quick, name, study.seed)
+    found = gauss_newton(problem, np.stack([near.coordinates, problem.start]), study.seed)
+    return replace(found, method=name, history=near.history.then(found.history))
 
 
 def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[Candidate, ...]:
@@ -208,10 +219,11 @@ def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: 
     if len(asked) > 1:
         choices.append(asked)
     if quick.data.peak_to_peak is not None:
-        own = next((item for item in quick.parameters if item.name == BIAS), parameter(BIAS, reducer))
-        choices[1:1] = [(own,)]
-        choices.append((*asked, own))
-    return tuple(judged(quick, stand_in, choice) for choice in choices)
+        bias = parameter(BIAS, reducer, _ANY_BIAS)
+        choices[1:1] = [(bias,)]
+        choices.append((*asked, bias))
+    most = quick.data.units.size - 2 if quick.data.only_peak_to_peak else quick.readings
+    return tuple(judged(quick, stand_in, choice) for choice in choices if len(choice) <= most)
 
 
 def compare(
@@ -239,5 +251,6 @@ def compare(
             else:
                 runs.append(search(quick, name, seed))
         best = min(runs, key=lambda run: run.objective)
-        methods.append(Comparison(runs=tuple(runs), on_model=on_the_model(problem, best).objective))
+        on_model = float(problem.objectives(best.coordinates[np.newaxis])[0])
+        methods.append(Comparison(runs=tuple(runs), on_model=on_model))
     return tuple(methods)
