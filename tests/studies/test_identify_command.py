@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.test_commands import refused, tolalloc
+from tests.studies.test_commands import ROOT, refused, tolalloc
 from tolalloc.cli.main import main
 from tolalloc.identification.simulation import Bench, random_units, simulated_bench
 from tolalloc.measurement.folder import write_measurements
@@ -658,3 +658,21 @@ def test_what_stands_on_the_command_line_is_not_looked_for_in_the_data_file(curv
     _, sentence = refusal(case, curves, tmp_path / "case")
     assert sentence.startswith("Error: tolalloc identify: ")
     assert word in sentence
+
+
+def test_the_study_of_liu2020(tmp_path):
+    """In quick mode, about a minute: printed pairs, three seeds of every method, ten repetitions."""
+    folder = tmp_path / "run"
+    command = [sys.executable, str(ROOT / "studies" / "liu2020_identification.py"), "--quick", "--out", str(folder)]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "A constant explains the printed residual better than any stiffness" in " ".join(result.stdout.split())
+    assert "K_b is not identified by these data" in result.stdout
+    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert answer["within three standard errors [-]"] >= 9
+    methods = {item["method"]: item for item in answer["peak-to-peaks"]["methods"]}
+    best = {name: min(item["objectives [-]"]) for name, item in methods.items()}
+    assert max(best.values()) <= (1 + 1e-4) ** 2 * min(best.values())
+    swarm, exact = (methods[name]["evaluations [-]"] for name in ("improved particle swarm", "Gauss–Newton"))
+    assert max(exact) <= min(swarm) / 20
+    assert "NaN" not in (folder / "summary.json").read_text(encoding="utf-8")

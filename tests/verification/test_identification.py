@@ -171,6 +171,15 @@ def test_a_profile_is_sharp_along_one_parameter_though_another_is_open(share):
     assert sharp.interval[1] == pytest.approx(middle - share * slanted.lower[1] + half, abs=0.02 * half)
 
 
+def test_a_profile_that_is_doubted_holds_the_first_order_interval_cut_at_the_bounds():
+    problem = straight_problem(40)
+    found = gauss_newton(problem, problem.start[np.newaxis]).coordinates
+    sharp = profile(problem, found, 0, information(problem, problem.predictor(found), found))
+    wider = sharp.widened(np.array([-100.0, sharp.interval[0]]))
+    assert wider.interval == (problem.lower[0], sharp.interval[1])
+    assert wider.open_ends == (True, False)
+
+
 def written_of(problem: IdentificationProblem) -> tuple[np.ndarray, IdentifiedStiffness]:
     found = gauss_newton(problem, problem.start[np.newaxis]).coordinates
     own = information(problem, problem.predictor(found), found)

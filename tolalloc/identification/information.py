@@ -60,11 +60,12 @@ class Direction:
         combination = " ".join(parts).removeprefix("+").replace("-", "−")
         if self.is_fixed:
             return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%} as standard error"
-        left = f"±{self.deviation:.2%}" if self.deviation < self.room else "no less than that"
-        return (
-            f"these data leave {combination} (relative changes) open: {left} as standard error, where the bounds alone "
-            f"leave ±{self.room:.2%}"
+        left = (
+            f"±{self.deviation:.2%} as standard error, where the bounds alone leave ±{self.room:.2%}"
+            if self.deviation < self.room
+            else f"they leave no less than the bounds alone, ±{self.room:.2%}"
         )
+        return f"these data leave {combination} (relative changes) open: {left}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,11 @@ class Profile:
     threshold: float
     interval: tuple[float, float]
 
+    def widened(self, interval: Float[np.ndarray, " 2"]) -> Profile:
+        """Return the profile with an interval that holds another one, cut at the bounds."""
+        low, high = np.clip(interval, self.coordinate[0], self.coordinate[-1])
+        return replace(self, interval=(min(self.interval[0], float(low)), max(self.interval[1], float(high))))
+
     @property
     def open_ends(self) -> tuple[bool, bool]:
         """Whether the interval reaches the lower and the upper bound."""

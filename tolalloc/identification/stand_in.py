@@ -14,6 +14,9 @@ from tolalloc.surrogate.polynomial import BoxPolynomial, fit_box_polynomial
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
+LARGE_DRIFT = 0.3
+"""Distance of polynomials' and model's least objective over the standard deviation that makes profiles doubtful [-]."""
+
 _DEGREES = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3}
 """Parameters → total degree; beyond them 2 [-]."""
 

@@ -9,15 +9,13 @@ import numpy as np
 from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
 from tolalloc.identification.parameters import BIAS
 from tolalloc.identification.resampling import Candidate
+from tolalloc.identification.stand_in import LARGE_DRIFT
 from tolalloc.report import identification_figures as figures
 from tolalloc.report import identification_tables as tables
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure
 from tolalloc.report.identification_results import IdentificationResults
 from tolalloc.units import ARCSECOND
-
-LARGE_DRIFT = 0.3
-"""Distance of polynomials' and model's least objective over the standard deviation that makes profiles doubtful [-]."""
 
 
 def baseline_sentences(results: IdentificationResults) -> tuple[str, ...]:
@@ -38,7 +36,8 @@ def _verdict(results: IdentificationResults) -> str:
     """Return whether a constant explains the peak-to-peaks, or the stiffness does, or nothing needs explaining."""
     asked = tuple(item.name for item in results.parameters)
     given, constant, whole = (results.candidate(*names) for names in ((), (BIAS,), asked))
-    assert given and constant and whole
+    if not (given and constant and whole):
+        return f"{results.count} are too few to judge the fit of all parameters by units that it has not seen."
 
     def left(item: Candidate, *, unseen: bool) -> float:
         return item.rms(results.data, PEAK_TO_PEAK, unseen=unseen) / ARCSECOND
@@ -99,7 +98,8 @@ def warnings(results: IdentificationResults) -> tuple[str, ...]:
     if results.drift > LARGE_DRIFT:
         found.append(
             f"The polynomials behind profiles and bootstrap have their least objective {results.drift:.2g} standard "
-            "deviations away from the model's: narrow the bounds, or ask for fewer parameters."
+            "deviations away from the model's, so first-order intervals of the model widen theirs: narrow the bounds, "
+            "or ask for fewer parameters."
         )
     return (*found, *(f"Repaired: {repair}." for repair in results.measurements.repairs))
 

@@ -20,7 +20,7 @@ from tolalloc.identification.profile import profile
 from tolalloc.identification.resampling import FEWEST_UNITS, Candidate, bootstrap, judged, simplest
 from tolalloc.identification.result import Comparison, Identified
 from tolalloc.identification.searches import ALGORITHMS, search
-from tolalloc.identification.stand_in import StandIn, anchored, fit_stand_in
+from tolalloc.identification.stand_in import LARGE_DRIFT, StandIn, anchored, fit_stand_in
 from tolalloc.measurement.records import Measurements
 from tolalloc.reducer.design import Reducer
 from tolalloc.report.identification_results import IdentificationResults
@@ -132,6 +132,9 @@ def identify(
     here = widened.of(study.parameters, anchored(stand_in, found.coordinates, prediction))
     near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
     profiles = tuple(profile(here, near, at, own) for at in range(len(study.parameters)))
+    drift = float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max())
+    if drift > LARGE_DRIFT:
+        profiles = tuple(item.widened(own.interval[:, at]) for at, item in enumerate(profiles))
     several = data.units.size >= FEWEST_UNITS
     progress.begin("other choices")
     candidates = judged_candidates(quick, stand_in, reducer) if several else ()
@@ -148,7 +151,7 @@ def identify(
         information=own,
         written=spread,
         profiles=profiles,
-        drift=float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max()),
+        drift=drift,
         estimates=estimates(study.parameters, own, spread, profiles),
         bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
         candidates=candidates,
