@@ -26,8 +26,8 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.identification import identification_document
-from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.report.identification.document import identification_document
+from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.study.identification import IdentificationStudy, identify
 from tolalloc.study.stages import Progress
 from tolalloc.uncertainty.seeds import SeedTree
@@ -201,7 +201,7 @@ def build(quick: bool) -> Document:
         warnings=tuple(f"Peak-to-peaks: {sentence}" for sentence in document.warnings),
         sections=(
             replace(printed, paragraphs=()),
-            *renamed(document.sections, "units", "50 simulated units"),
+            *renamed(document.sections, "peaks", "50 simulated units"),
             settings_section(first, _seeds(quick)),
             kinds_section(true, second.parameters, _every_kind(true, errors, seeds)),
             *renamed(curves.sections, "curves", "Curves and loops of five units"),

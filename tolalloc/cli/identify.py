@@ -54,8 +54,8 @@ def identify(
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
     from tolalloc.cli.document_script import written
     from tolalloc.measurement.files import load_measurements
-    from tolalloc.report.identification import identification_document
-    from tolalloc.report.identification_tables import estimates_table, short_choices_table
+    from tolalloc.report.identification.document import identification_document
+    from tolalloc.report.identification.tables import estimates_table, short_choices_table
     from tolalloc.study.identification import IdentificationStudy
     from tolalloc.study.identification import identify as identified
     from tolalloc.study.run_folder import require_usable

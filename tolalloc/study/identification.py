@@ -23,7 +23,7 @@ from tolalloc.identification.searches import ALGORITHMS, search
 from tolalloc.identification.stand_in import LARGE_DRIFT, StandIn, anchored, fit_stand_in
 from tolalloc.measurement.records import Measurements
 from tolalloc.reducer.design import Reducer
-from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.study.stages import Progress
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND

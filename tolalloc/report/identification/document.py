@@ -10,11 +10,10 @@ from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
 from tolalloc.identification.parameters import BIAS
 from tolalloc.identification.resampling import Candidate
 from tolalloc.identification.stand_in import LARGE_DRIFT
-from tolalloc.report import identification_figures as figures
-from tolalloc.report import identification_tables as tables
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure
-from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.report.identification import figures, tables
+from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.units import ARCSECOND
 
 

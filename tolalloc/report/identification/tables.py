@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.identification.parameters import BIAS, Parameter
-from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.units import ARCSECOND
 
 _OPEN = 10.0  # width of an interval of a logarithm beyond which it says nothing [-]

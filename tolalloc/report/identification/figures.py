@@ -7,7 +7,7 @@ import numpy as np
 from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK, Block
 from tolalloc.identification.parameters import BIAS
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.identification_results import IdentificationResults
+from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.search.history import quartiles
 from tolalloc.units import ARCSECOND, DEGREE
 
