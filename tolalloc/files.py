@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tomllib
 from collections.abc import Mapping
@@ -116,7 +117,7 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
 
 
 def require_new(path: Path) -> None:
-    """Refuse a file that is there already or whose folder is not, before anything long runs.
+    """Refuse a file that is there already or whose folder cannot be written, before anything long runs.
 
     Raises
     ------
@@ -124,6 +125,32 @@ def require_new(path: Path) -> None:
         The file cannot be made without losing another, or not at all.
     """
     if path.exists():
-        raise InputError(f"{path}: the file exists; allowed is a new one, so that nothing is overwritten.")
+        raise InputError(f"{path}: the file exists; name a new one, nothing is overwritten.")
     if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
         raise InputError(f"{path}: cannot be made there; allowed is a file in a folder that exists and may be written.")
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a new text file.
+
+    Raises
+    ------
+    InputError
+        The file is there already or cannot be made.
+    """
+    require_new(path)
+    try:
+        with path.open("x", encoding="utf-8", newline="") as file:
+            file.write(text)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); name another file.") from None
+
+
+def as_toml(value: str | float | tuple[str, ...]) -> str:
+    """Return text, a number or texts as TOML writes them."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(as_toml, value)) + "]"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for one character that JSON leaves as it is.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(float(value))

@@ -93,7 +93,7 @@ def test_a_stage_that_cannot_be_built_is_refused(tmp_path, changes, words):
         (["--law", "hertz"], ["hertz", "logarithmic"]),
         (["--phases", "0"], ["--phases", "1 to 3600"]),
         (["--profile", "disc.stl"], ["disc.stl", ".csv or .dxf"]),
-        (["--profile", "nowhere/disc.csv"], ["no folder", "nowhere"]),
+        (["--profile", "nowhere/disc.csv"], ["cannot be made there", "nowhere"]),
         (["--profile", "disc.csv", "--points", "7"], ["points per tooth", "7"]),
         (["--reducer", "rv41"], ["rv41", "rv40e"]),
     ],

@@ -537,7 +537,7 @@ CASES = (
     data(
         "stiffness file that exists",
         lambda folder: (folder / "found.toml").write_text("mine", encoding="utf-8"),
-        "Error: found.toml: the file exists; allowed is a new one, so that nothing is overwritten.",
+        "Error: found.toml: the file exists; name a new one, nothing is overwritten.",
     ),
     bad("stiffness file in no folder", f"--parameter {NAME} --stiffness HERE/no/found.toml", "a folder that exists"),
     data("out folder not empty", occupied, "report: the run folder is not empty; allowed is a new or empty one"),

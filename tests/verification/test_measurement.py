@@ -320,7 +320,7 @@ def test_what_is_written_is_read_back(tmp_path, generator):
 def test_nothing_is_overwritten(tmp_path, generator):
     data = simulated(generator)
     (tmp_path / "loop1.csv").write_text("mine")
-    with pytest.raises(InputError, match=r"loop1\.csv: the file exists; name a new folder, nothing is overwritten"):
+    with pytest.raises(InputError, match=r"loop1\.csv: the file exists; name a new one, nothing is overwritten"):
         write_measurements(data, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["loop1.csv"]
     write_units(data.units, tmp_path / "units.csv")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
+from tolalloc.files import as_toml, require_new, write_new
 from tolalloc.measurement.records import Measurements
 from tolalloc.uncertainty.unit_table import write_table, write_units
 from tolalloc.units import ARCSECOND, DEGREE
@@ -35,29 +35,33 @@ def write_measurements(measurements: Measurements, folder: str | Path) -> Path:
     """
     folder = Path(folder)
     tables = list(_tables(measurements))
-    for name in ("measurement.toml", "units.csv", *(table.file for table in tables)):
-        if (folder / name).exists():
-            raise InputError(f"{folder / name}: the file exists; name a new folder, nothing is overwritten.")
     neglected = tuple(dict.fromkeys(pattern for unit in measurements.units for pattern in unit.neglected))
     lines = [
-        f"name = {_toml(measurements.name)}",
-        f"source = {_toml(measurements.source)}",
+        f"name = {as_toml(measurements.name)}",
+        f"source = {as_toml(measurements.source)}",
         'units = "units.csv"',
-        f"neglected = {_toml(neglected)}",
-        f"assumptions = {_toml(measurements.assumptions)}",
+        f"neglected = {as_toml(neglected)}",
+        f"assumptions = {as_toml(measurements.assumptions)}",
     ]
     for table in tables:
         fields = {"file": table.file, **table.fields}
-        lines += ["", table.kind, *(f"{name} = {_toml(value)}" for name, value in fields.items() if value is not None)]
+        lines += [
+            "",
+            table.kind,
+            *(f"{name} = {as_toml(value)}" for name, value in fields.items() if value is not None),
+        ]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_units(measurements.units, folder / "units.csv")
-        for table in tables:
-            write_table(folder / table.file, table.headers, table.rows, table.comments)
-        (folder / "measurement.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{folder}: the folder cannot be written ({error.strerror}); name another one.") from None
-    return folder / "measurement.toml"
+        raise InputError(f"{folder}: the folder cannot be made ({error.strerror}); name another one.") from None
+    main = folder / "measurement.toml"
+    for path in (main, folder / "units.csv", *(folder / table.file for table in tables)):
+        require_new(path)  # all of them, before the first is written
+    write_units(measurements.units, folder / "units.csv")
+    for table in tables:
+        write_table(folder / table.file, table.headers, table.rows, table.comments)
+    write_new(main, "\n".join(lines) + "\n")
+    return main
 
 
 class _Table(NamedTuple):
@@ -120,10 +124,3 @@ def _pairs(first: Float[np.ndarray, " row"], second: Float[np.ndarray, " row"]) 
 
 def _arcsec(noise: float | None) -> float | None:
     return None if noise is None else noise / ARCSECOND
-
-
-def _toml(value: str | float | tuple[str, ...]) -> str:
-    """Return text, a number or a list of texts as TOML writes it."""
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(float(value))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from dataclasses import replace
 from math import pi
@@ -13,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError
-from tolalloc.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
 from tolalloc.reducer.stiffness_records import (
@@ -231,29 +230,18 @@ def write_identified_stiffness(identified: IdentifiedStiffness, path: Path) -> N
     InputError
         The file is there already or cannot be made, or a value could not be read back.
     """
-    lines = [f"source = {_quoted(identified.source)}", "notes = ["]
-    lines += [f"  {_quoted(note)}," for note in identified.notes]
+    lines = [f"source = {as_toml(identified.source)}", "notes = ["]
+    lines += [f"  {as_toml(note)}," for note in identified.notes]
     lines += ["]", "correlation = ["]
     lines += [f"  {row}," for row in identified.correlation.tolist()]
     lines += ["]"]
     for field, value in identified.values.items():
         uncertainty = identified.standard_uncertainty[field]
-        lines += ["", f"[stiffness.{field}]", f"value = {float(value)!r}"]
-        lines += [f"standard_uncertainty = {float(uncertainty)!r}"]
+        lines += ["", f"[stiffness.{field}]", f"value = {as_toml(value)}"]
+        lines += [f"standard_uncertainty = {as_toml(uncertainty)}"]
     text = "\n".join(lines) + "\n"
     _identified(tomllib.loads(text), path)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise InputError(f"{path}: the file exists; allowed is a new one, so that nothing is overwritten.") from None
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be made ({error.strerror}); name another.") from None
-
-
-def _quoted(text: str) -> str:
-    """Return a text as TOML writes it: JSON's escapes are TOML's, but for one character that JSON leaves as it is."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    write_new(path, text)
 
 
 def with_stiffness(reducer: Reducer, identified: IdentifiedStiffness) -> Reducer:

@@ -13,6 +13,7 @@ from tolalloc.cycloid.clearance import linear_clearance
 from tolalloc.cycloid.profile_points import ProfilePoints, profile_points, require_points
 from tolalloc.cycloid.tooth_profile import ToothProfile
 from tolalloc.exceptions import InputError
+from tolalloc.files import require_new
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
 
 
@@ -66,10 +67,7 @@ def require_profile_file(path: Path, per_tooth: int) -> None:
     require_points(per_tooth)
     if path.suffix.lower() not in WRITERS:
         raise InputError.at("profile file", "ending", path.name, " or ".join(WRITERS))
-    if path.exists():
-        raise InputError(f"{path}: the file exists; name a new one, nothing is overwritten.")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}.")
+    require_new(path)
 
 
 def write_profile(profile: ToothProfile, per_tooth: int, path: Path) -> ProfilePoints:

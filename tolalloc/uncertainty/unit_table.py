@@ -6,10 +6,12 @@ import csv
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from math import isfinite
 from pathlib import Path
 
 from tolalloc.exceptions import InputError
+from tolalloc.files import write_new
 from tolalloc.uncertainty.sources import ANGULAR
 from tolalloc.uncertainty.unit_file import BuiltUnit
 from tolalloc.units import MICROMETRE, MICRORADIAN
@@ -196,16 +198,12 @@ def write_table(
     InputError
         The file exists or cannot be written.
     """
-    try:
-        with path.open("x", encoding="utf-8", newline="") as file:
-            file.writelines(f"# {comment}\n" for comment in comments)
-            writer = csv.writer(file, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
-            writer.writerow(headers)
-            writer.writerows(rows)
-    except FileExistsError:
-        raise InputError(f"{path}: the file exists; name a new one, nothing is overwritten.") from None
-    except OSError as error:
-        raise InputError(f"{path}: the table cannot be written ({error.strerror}); name another file.") from None
+    text = StringIO(newline="")
+    text.writelines(f"# {comment}\n" for comment in comments)
+    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+    writer.writerow(headers)
+    writer.writerows(rows)
+    write_new(path, text.getvalue())
 
 
 def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
