@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from math import isnan
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -44,10 +45,17 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     """Print a table for a person."""
     table = Table(title=title)
     for number, name in enumerate(frame.columns):
-        table.add_column(escape(str(name)), justify="left" if number == 0 else "right")
+        table.add_column(escape(str(name)), justify="left" if number == 0 else "right", no_wrap=number == 0)
     for row in frame.itertuples(index=False):
-        table.add_row(*(escape(f"{cell:.4g}" if isinstance(cell, float) else str(cell)) for cell in row))
+        table.add_row(*(escape(_cell(value)) for value in row))
     screen.print(table)
+
+
+def _cell(value: object) -> str:
+    """Return a cell with four significant digits; what is not there stays empty."""
+    if isinstance(value, float):
+        return "" if isnan(value) else f"{value:.4g}"
+    return str(value)
 
 
 def say(document: Document) -> None:

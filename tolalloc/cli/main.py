@@ -1,4 +1,4 @@
-"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``, ``identify``."""
+"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``compare``."""
 
 from __future__ import annotations
 
@@ -228,6 +228,30 @@ def modify(
 
 
 app.command()(identify)
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(help="Folder of a finished run, A.")],
+    second: Annotated[Path, typer.Argument(help="Folder of another one, B.")],
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Two finished studies side by side: answers, rankings, zones."""
+    from tolalloc.cli.document_script import written
+    from tolalloc.report.comparison import Comparison, comparison_document, ranking_table, zones_table
+    from tolalloc.study.run_folder import read_run
+
+    comparison = Comparison(first=read_run(first), second=read_run(second))
+    document = comparison_document(comparison)
+    if out:
+        written(out, lambda: document)
+    if as_json:
+        print_json(document.summary)
+        return
+    print_table(ranking_table(comparison), "Which error drives it")
+    print_table(zones_table(comparison), "Zones and costs")
+    say(document)
 
 
 def _require_writable(out: Path | None, file: Path | None, points: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 from collections.abc import Iterator
@@ -11,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import pandas as pd
 
-from tolalloc.exceptions import RunFolderError
+from tolalloc.exceptions import InputError, RunFolderError
 from tolalloc.report import tables
+from tolalloc.report.comparison import HIGH, LOW, TOTAL, FinishedRun
 from tolalloc.report.document import write_json
 from tolalloc.report.excel import write_workbook
 from tolalloc.report.figure import save_png
@@ -24,6 +27,7 @@ from tolalloc.study.definition import Prepared
 from tolalloc.study.stages import Record
 from tolalloc.uncertainty.tolerance_table import table_frame
 
+_NEEDED = ("limit [arcsec]", "met", "yield [-]", "cost [cost units]")
 _LIBRARIES = ("numpy", "scipy", "numba", "cvxpy", "clarabel", "pymoo", "SALib", "pandas", "scikit-learn")
 
 
@@ -164,3 +168,56 @@ def write_run(folder: Path, prepared: Prepared, results: StudyResults, record: R
     for figure in study_figures(results):
         save_png(figure, folder / "figures" / f"{figure.name}.png")
     write_page(results, folder / "report.html")
+
+
+def read_run(folder: Path) -> FinishedRun:
+    """Return what a finished run's folder says.
+
+    Raises
+    ------
+    InputError
+        A file of the run is missing, broken or of another layout.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such run folder.")
+    summaries = {name: _read_json(folder / f"{name}.json") for name in ("summary", "manifest")}
+    return FinishedRun(
+        name=str(summaries["manifest"].get("study", folder.name)),
+        summary=_with(summaries["summary"], _NEEDED, folder / "summary.json"),
+        manifest=summaries["manifest"],
+        ranking=_read_table(folder / "sensitivity.csv", ("source", "rank [-]", TOTAL, LOW, HIGH)),
+        zones=_read_table(
+            folder / "allocation.csv", ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
+        ),
+    )
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON; is the file truncated? ({error}).") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: holds a {type(found).__name__}; allowed is what a run writes.")
+    return found
+
+
+def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
+    try:
+        found = pd.read_csv(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
+    _with(dict.fromkeys(found.columns), columns, path)
+    return found
+
+
+def _with(found: dict[str, Any], names: tuple[str, ...], path: Path) -> dict[str, Any]:
+    """Return what was found, or say which name is missing."""
+    for name in names:
+        if name not in found:
+            raise InputError(f"{path}: {name} is missing; the run is of another version, run the study again.")
+    return found

@@ -1,0 +1,110 @@
+"""``tolalloc compare`` on folders that hold what a run writes."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import pytest
+
+from tests.studies.test_commands import refused, tolalloc
+
+SUMMARY = {
+    "reducer": "RV-20E",
+    "torque [N·m]": -1.0,
+    "limit [arcsec]": 60.0,
+    "yield target [-]": 0.9973,
+    "met": True,
+    "yield [-]": 0.9987,
+    "yield interval 95 % [-]": [0.997, 0.999],
+    "cost [cost units]": 41.6,
+}
+
+
+def run_folder(place, cost=41.6, index=0.3, zone=4.0, **changes):
+    place.mkdir()
+    summary = SUMMARY | {"cost [cost units]": cost} | changes
+    (place / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    manifest = {"study": place.name, "study hash": place.name, "quick": False, "versions": {"tolalloc": "0.1.0"}}
+    (place / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    ranking = {
+        "rank [-]": [1, 2],
+        "source": ["disc1.pitch", "pin.diameter"],
+        "total index ST [-]": [index, 0.1],
+        "ST low 5 % [-]": [index - 0.02, 0.05],
+        "ST high 95 % [-]": [index + 0.02, 0.15],
+    }
+    pd.DataFrame(ranking).to_csv(place / "sensitivity.csv", index=False)
+    zones = {
+        "id": ["disc1.pitch", "pin.diameter"],
+        "unit": ["µm", "µm"],
+        "plus [unit]": [zone, 2.0],
+        "minus [unit]": [0.0, -2.0],
+        "cost [cost units]": [3.0, 1.0],
+    }
+    pd.DataFrame(zones).to_csv(place / "allocation.csv", index=False)
+    return place
+
+
+@pytest.fixture
+def runs(tmp_path):
+    return run_folder(tmp_path / "first"), run_folder(tmp_path / "second", cost=50.0, index=0.4, zone=5.0)
+
+
+def test_two_runs_side_by_side(runs, tmp_path):
+    result = tolalloc("compare", *runs, "--out", tmp_path / "report", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert (answer["A"], answer["B"], answer["same question"]) == ("first", "second", True)
+    cost = next(row for row in answer["answers"] if row["quantity"] == "cost [cost units]")
+    assert cost["B − A"] == pytest.approx(8.4)
+    assert [row["90 % intervals"] for row in answer["rankings"]] == ["apart", "overlap"]
+    pitch, pin = answer["zones"]
+    assert (pitch["zone A"], pitch["zone B"], pitch["B over A, less 1 [%]"]) == (4.0, 5.0, pytest.approx(25.0))
+    assert pin["zone A"] == 4.0
+    names = {"report.html", "results.xlsx", "summary.json", "manifest.json"}
+    assert {path.name for path in (tmp_path / "report").iterdir()} == names | {"figures"}
+    said = tolalloc("compare", *runs).stdout
+    assert "differ beyond their 90 % intervals: disc1.pitch." in " ".join(said.split())
+
+
+def test_runs_of_other_questions_and_the_same_run_are_told(runs, tmp_path):
+    other = run_folder(tmp_path / "other", **{"limit [arcsec]": 45.0})
+    warnings = json.loads(tolalloc("compare", runs[0], other, "--json").stdout)["warnings"]
+    assert any("not asked the same question" in sentence for sentence in warnings)
+    warnings = json.loads(tolalloc("compare", runs[0], runs[0], "--json").stdout)["warnings"]
+    assert any("one and the same study" in sentence for sentence in warnings)
+
+
+def test_a_source_of_one_run_alone_is_shown(runs):
+    table = pd.read_csv(runs[1] / "sensitivity.csv").iloc[:1]
+    table.to_csv(runs[1] / "sensitivity.csv", index=False)
+    answer = json.loads(tolalloc("compare", *runs, "--json").stdout)
+    assert answer["rankings"][1]["90 % intervals"] == "only in one"
+    assert answer["rankings"][1]["total index B [-]"] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("summary.json", None, ["no such file", "folder of a finished run"]),
+        ("summary.json", "{", ["cannot be read as JSON", "truncated"]),
+        ("summary.json", "[]", ["holds a list"]),
+        ("summary.json", "{}", ["limit [arcsec] is missing"]),
+        ("sensitivity.csv", None, ["no such file"]),
+        ("sensitivity.csv", "", ["cannot be read as a table"]),
+        ("allocation.csv", "id\nx\n", ["unit is missing"]),
+    ],
+)
+def test_broken_runs_are_refused_in_one_sentence(runs, tmp_path, name, text, words):
+    path = runs[1] / name
+    path.unlink()
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    refused(tolalloc("compare", *runs, "--out", tmp_path / "report"), name, *words)
+    assert not (tmp_path / "report").exists()
+
+
+def test_folders_that_are_none_or_in_use_are_refused(runs, tmp_path):
+    refused(tolalloc("compare", runs[0], tmp_path / "nowhere"), "no such run folder")
+    refused(tolalloc("compare", *runs, "--out", runs[0]), "not empty")

@@ -1,0 +1,210 @@
+"""Two finished studies side by side: answers, rankings with their intervals, zones and costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from tolalloc.report.document import Document, Section
+from tolalloc.report.figure import Figure, Series
+
+TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinishedRun:
+    """What a run folder says.
+
+    Parameters
+    ----------
+    name
+        How the comparison calls it.
+    summary, manifest
+        Answer and circumstances, units in the names.
+    ranking
+        Sources, largest total index first.
+    zones
+        The allocated tolerance table.
+    """
+
+    name: str
+    summary: dict[str, Any]
+    manifest: dict[str, Any]
+    ranking: pd.DataFrame
+    zones: pd.DataFrame
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Two runs.
+
+    Parameters
+    ----------
+    first, second
+        The runs, in the order in which they were named.
+    """
+
+    first: FinishedRun
+    second: FinishedRun
+
+    @property
+    def runs(self) -> tuple[FinishedRun, FinishedRun]:
+        """Both runs."""
+        return self.first, self.second
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of both runs; ``A`` and ``B`` in front tell runs of one name apart."""
+        return f"A: {self.first.name}", f"B: {self.second.name}"
+
+    @property
+    def same_question(self) -> bool:
+        """Whether both were asked for the same reducer, torque, limit and yield."""
+        asked = ("reducer", "torque [N·m]", "limit [arcsec]", "yield target [-]")
+        return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked)
+
+
+def headline_table(comparison: Comparison) -> pd.DataFrame:
+    """Return every number of the two answers, and the difference where there is one."""
+    first, second = (run.summary for run in comparison.runs)
+    rows = []
+    for name in dict.fromkeys([*first, *second]):
+        values = [summary.get(name) for summary in (first, second)]
+        if any(isinstance(value, list | dict) for value in values):
+            continue
+        row: dict[str, object] = {"quantity": name}
+        row |= {label: "–" if value is None else value for label, value in zip(comparison.names, values, strict=True)}
+        numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+        row["B − A"] = float(numbers[1] - numbers[0]) if len(numbers) == 2 else ""
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def ranking_table(comparison: Comparison) -> pd.DataFrame:
+    """Return every source with its rank and total index in both, and whether their intervals lie apart."""
+    columns = ["rank [-]", TOTAL, LOW, HIGH]
+    first, second = (run.ranking.set_index("source")[columns] for run in comparison.runs)
+    joint = first.join(second, how="outer", lsuffix=" A", rsuffix=" B")
+    apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
+    missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
+    return pd.DataFrame(
+        {
+            "source": joint.index,
+            "rank A [-]": joint["rank [-] A"].to_numpy(),
+            "rank B [-]": joint["rank [-] B"].to_numpy(),
+            "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
+            "total index B [-]": joint[f"{TOTAL} B"].to_numpy(),
+            "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
+        }
+    ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
+
+
+def zones_table(comparison: Comparison) -> pd.DataFrame:
+    """Return every zone and cost in both."""
+    parts = []
+    for run in comparison.runs:
+        zone = run.zones["plus [unit]"] - run.zones["minus [unit]"]
+        parts.append(pd.DataFrame({"zone": zone, "cost": run.zones["cost [cost units]"], "unit": run.zones["unit"]}))
+        parts[-1].index = pd.Index(run.zones["id"], name="source")
+    joint = parts[0].join(parts[1], how="outer", lsuffix=" A", rsuffix=" B")
+    change = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
+    return pd.DataFrame(
+        {
+            "source": joint.index,
+            "unit": joint["unit A"].fillna(joint["unit B"]).to_numpy(),
+            "zone A": joint["zone A"].to_numpy(),
+            "zone B": joint["zone B"].to_numpy(),
+            "B over A, less 1 [%]": change.to_numpy(),
+            "cost A [cost units]": joint["cost A"].to_numpy(),
+            "cost B [cost units]": joint["cost B"].to_numpy(),
+        }
+    )
+
+
+def _ranking_figure(comparison: Comparison) -> Figure:
+    """Draw the total indices of both with their intervals."""
+    names = list(ranking_table(comparison)["source"])
+    series = []
+    for label, run in zip(comparison.names, comparison.runs, strict=True):
+        own = run.ranking.set_index("source").reindex(names).fillna(0.0)
+        columns = (list(own[column].astype(float)) for column in (TOTAL, LOW, HIGH))
+        total, low, high = columns
+        series.append(Series(label=label, kind="bars", x=names, y=total, low=low, high=high))
+    return Figure(
+        name="rankings",
+        title="Total Sobol index of every source in both studies, with 90 % intervals",
+        x_label="total index ST [-]",
+        y_label="",
+        series=tuple(series),
+    )
+
+
+def answer(comparison: Comparison) -> tuple[str, ...]:
+    """Return the comparison in a few sentences."""
+    sentences = []
+    for label, run in zip(comparison.names, comparison.runs, strict=True):
+        found = run.summary
+        sentences.append(
+            f"{label}: limit {found['limit [arcsec]']:g}″ {'met' if found['met'] else 'NOT met'}, "
+            f"{found['yield [-]']:.2%} of units keep it, cost {found['cost [cost units]']:.2f} cost units."
+        )
+    table = ranking_table(comparison)
+    moved = list(table.loc[table["90 % intervals"] == "apart", "source"])
+    sentences.append(
+        f"Sources whose total indices differ beyond their 90 % intervals: {', '.join(moved)}."
+        if moved
+        else "No source's total index differs beyond its 90 % intervals."
+    )
+    return tuple(sentences)
+
+
+def warnings(comparison: Comparison) -> tuple[str, ...]:
+    """Return what makes the two hard to compare."""
+    found = []
+    if not comparison.same_question:
+        found.append("The two studies were not asked the same question: reducer, torque, limit or yield differ.")
+    versions = [run.manifest.get("versions") for run in comparison.runs]
+    if versions[0] != versions[1]:
+        found.append("The two studies ran with different versions of the program or its libraries.")
+    found += [
+        f"{label} is a quick run: its intervals are wide."
+        for label, run in zip(comparison.names, comparison.runs, strict=True)
+        if run.manifest.get("quick")
+    ]
+    if comparison.first.manifest.get("study hash") == comparison.second.manifest.get("study hash"):
+        found.append("Both are runs of one and the same study, seed included.")
+    return tuple(found)
+
+
+def comparison_document(comparison: Comparison) -> Document:
+    """Return the report of the comparison."""
+    headline, ranking, zones = headline_table(comparison), ranking_table(comparison), zones_table(comparison)
+    return Document(
+        title="Two studies side by side",
+        subtitle=f"{comparison.names[0]}; {comparison.names[1]}.",
+        answer=answer(comparison),
+        warnings=warnings(comparison),
+        sections=(
+            Section(heading="Answers", tables=(("answers", headline),)),
+            Section(
+                heading="Which error drives it",
+                paragraphs=("Overlap of intervals does not prove that two indices are the same.",),
+                figures=(_ranking_figure(comparison),),
+                tables=(("rankings", ranking),),
+            ),
+            Section(heading="What to write on the drawing", tables=(("zones", zones),)),
+        ),
+        assumptions=(),
+        summary={
+            "A": comparison.first.name,
+            "B": comparison.second.name,
+            "same question": comparison.same_question,
+            "answers": headline.to_dict("records"),
+            "rankings": ranking.astype(object).where(ranking.notna(), None).to_dict("records"),
+            "zones": zones.astype(object).where(zones.notna(), None).to_dict("records"),
+            "warnings": list(warnings(comparison)),
+        },
+    )
