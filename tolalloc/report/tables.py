@@ -10,6 +10,8 @@ import pandas as pd
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.report.results import StudyResults
+from tolalloc.sensitivity.capability import Limits, quantile_interval
+from tolalloc.sensitivity.capability import capability as sample_capability
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import with_zones
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
@@ -117,24 +119,28 @@ _CONTACT: dict[str, Callable[[Assessment], float]] = {
 """What the more loaded disc does, exact parts and Hertzian line contact at every pin."""
 
 
-def _statistics(label: str, design: VerifiedDesign, limit: float) -> dict[str, object]:
+def _statistics(label: str, design: VerifiedDesign, limit: float, target: float) -> dict[str, object]:
     """Return what a capability sheet says of one design."""
     values, achieved = design.sample.values, design.achieved
-    mean, sigma = float(values.mean()), float(values.std(ddof=1))
+    found, kept = sample_capability(values, Limits(upper=limit)), quantile_interval(values, target)
     return {
         "design": label,
         "Cost [cost units]": design.cost,
-        "Mean [arcsec]": mean,
-        "Sigma [arcsec]": sigma,
+        "Mean [arcsec]": found.mean,
+        "Sigma [arcsec]": found.deviation_overall,
         "Min [arcsec]": float(values.min()),
         "Max [arcsec]": float(values.max()),
         "USL [arcsec]": limit,
-        "Cpk [-]": (limit - mean) / (3 * sigma),
+        "Cpk [-]": found.cpk,
+        "Ppk [-]": found.ppk,
         "Yield [%]": achieved.estimate * 100,
         "Yield low 95 % [%]": achieved.low * 100,
         "Yield high 95 % [%]": achieved.high * 100,
         "% out [%]": (1 - achieved.estimate) * 100,
         "PPM [1e-6]": (1 - achieved.estimate) * 1e6,
+        "PPM if normal [1e-6]": found.normal_ppm,
+        f"{target:.2%} quantile, low 95 % [arcsec]": kept.low,
+        f"{target:.2%} quantile, high 95 % [arcsec]": kept.high if np.isfinite(kept.high) else "sample too small",
         "kept at the target yield [arcsec]": design.quantile_bound,
         "Units [-]": achieved.units,
         "OK": "yes" if design.met else "no",
@@ -143,14 +149,13 @@ def _statistics(label: str, design: VerifiedDesign, limit: float) -> dict[str, o
 
 def capability(results: StudyResults) -> pd.DataFrame:
     """Return baseline, scaling by hand and chosen design side by side, each on its own fresh units."""
-    allocation, limit = results.allocation, results.requirement.limit
-    return pd.DataFrame(
-        [
-            _statistics("tolerance table as it is", allocation.baseline, limit),
-            _statistics("all zones scaled alike", allocation.by_hand, limit),
-            _statistics("allocated", allocation.chosen, limit),
-        ]
-    )
+    allocation, asked = results.allocation, results.requirement
+    designs = {
+        "tolerance table as it is": allocation.baseline,
+        "all zones scaled alike": allocation.by_hand,
+        "allocated": allocation.chosen,
+    }
+    return pd.DataFrame([_statistics(label, design, asked.limit, asked.target) for label, design in designs.items()])
 
 
 def stack_up(results: StudyResults) -> pd.DataFrame:

@@ -1,0 +1,156 @@
+"""Capability against closed forms, and the coverage of its intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+from tolalloc.exceptions import InputError
+from tolalloc.sensitivity.capability import (
+    Limits,
+    capability,
+    defects_per_million_opportunities,
+    quantile_interval,
+    wilson_interval,
+)
+
+SAMPLE = np.array([9.0, 11.0, 10.0, 12.0, 8.0, 10.0])
+"""Mean 10, sum of squares 10, moving ranges 2 1 2 4 2, variances of its pairs 2 2 2."""
+
+
+def test_indices_by_hand():
+    found = capability(SAMPLE, Limits(lower=4.0, upper=13.0))
+    overall, within = np.sqrt(2.0), 2.2 * np.sqrt(np.pi) / 2
+    assert found.deviation_overall == pytest.approx(overall)
+    assert found.deviation_within == pytest.approx(within)
+    assert (found.cp, found.cpk) == pytest.approx((9 / (6 * within), 3 / (3 * within)))
+    assert (found.pp, found.ppk) == pytest.approx((9 / (6 * overall), 3 / (3 * overall)))
+    assert found.normal_ppm == pytest.approx(1e6 * (norm.cdf(-6 / overall) + norm.cdf(-3 / overall)))
+    assert (found.empirical_ppm, found.outside, found.units) == (0.0, 0, 6)
+
+
+def test_pairs_as_subgroups():
+    found = capability(SAMPLE, Limits(lower=4.0, upper=13.0), subgroup=2)
+    assert found.deviation_within == pytest.approx(np.sqrt(2.0))
+    assert found.cpk == pytest.approx(found.ppk)
+
+
+@pytest.mark.parametrize(
+    ("limits", "distance", "outside"),
+    [(Limits(upper=11.5), 1.5, 1), (Limits(lower=8.5), 1.5, 1), (Limits(lower=11.0), -1.0, 4)],
+)
+def test_one_limit(limits, distance, outside):
+    found = capability(SAMPLE, limits)
+    assert found.cp is found.pp is None
+    assert found.ppk == pytest.approx(distance / (3 * np.sqrt(2.0)))
+    assert found.outside == outside
+    assert found.empirical_ppm == pytest.approx(1e6 * outside / 6)
+    assert found.normal_ppm == pytest.approx(1e6 * norm.sf(distance / np.sqrt(2.0)))
+
+
+def test_three_sigma_is_2700_ppm(generator):
+    """Independent normal units with limits at ±3σ: all indices 1, and both figures 2700 per million."""
+    found = capability(generator.standard_normal(400_000), Limits(lower=-3.0, upper=3.0))
+    np.testing.assert_allclose([found.cp, found.cpk, found.pp, found.ppk], 1.0, atol=0.01)
+    assert found.normal_ppm == pytest.approx(2699.8, rel=0.03)
+    assert found.empirical_ppm == pytest.approx(2699.8, abs=4 * np.sqrt(2699.8 / 0.4))
+
+
+def test_drift_shows_in_the_overall_indices_only(generator):
+    steady = generator.standard_normal(5000)
+    drifting = capability(steady + np.linspace(-3, 3, 5000), Limits(lower=-6.0, upper=6.0), subgroup=5)
+    assert drifting.cp == pytest.approx(2.0, rel=0.03)
+    assert drifting.pp == pytest.approx(1.0, rel=0.03)
+
+
+def test_skewed_units_part_the_two_figures(generator):
+    found = capability(generator.exponential(size=200_000), Limits(upper=6.0))
+    assert found.empirical_ppm == pytest.approx(1e6 * np.exp(-6), rel=0.15)
+    assert found.normal_ppm < 5.0
+
+
+def test_defects_per_million_opportunities():
+    assert defects_per_million_opportunities(3, 1000, 4) == pytest.approx(750.0)
+    found = capability(SAMPLE, Limits(upper=11.5))
+    assert defects_per_million_opportunities(found.outside, found.units) == pytest.approx(found.empirical_ppm)
+
+
+def test_wilson_ends_solve_its_equation():
+    """Each end p satisfies |p̂ − p| = z·√(p·(1 − p)/n), from which the interval is derived."""
+    found = wilson_interval(200, 193, 0.9)
+    z = norm.isf(0.05)
+    for end in (found.low, found.high):
+        assert abs(found.estimate - end) == pytest.approx(z * np.sqrt(end * (1 - end) / 200))
+    assert found.low < found.estimate < found.high
+
+
+def test_wilson_of_extreme_yields():
+    assert wilson_interval(100, 100).high == 1.0
+    assert wilson_interval(100, 0).low == 0.0
+    z = norm.isf(0.025)
+    assert wilson_interval(100, 100).low == pytest.approx(100 / (100 + z**2))
+
+
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+def test_wilson_covers_on_average(confidence):
+    """Exact coverage over many yields: the mean as stated, and none far below."""
+    units, counts = 300, np.arange(301)
+    ends = [wilson_interval(units, int(count), confidence) for count in counts]
+    low, high = np.array([end.low for end in ends]), np.array([end.high for end in ends])
+    coverage = [binom.pmf(counts, units, p)[(low <= p) & (p <= high)].sum() for p in np.linspace(0.02, 0.98, 193)]
+    assert np.mean(coverage) == pytest.approx(confidence, abs=0.005)
+    assert min(coverage) > confidence - 0.05
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
+def test_quantile_interval_covers(generator, share):
+    """The true quantile of a skewed distribution lies inside as often as the attained confidence says."""
+    samples = generator.exponential(size=(4000, 600))
+    found = [quantile_interval(sample, share) for sample in samples]
+    inside = np.mean([item.low <= -np.log1p(-share) < item.high for item in found])
+    attained = found[0].attained
+    assert attained >= 0.95
+    assert inside == pytest.approx(attained, abs=4 * np.sqrt(attained * (1 - attained) / 4000))
+
+
+def test_no_nearer_order_statistics_would_do(generator):
+    """Moving either end inwards leaves more than half of the doubt on its side."""
+    sample = np.sort(generator.standard_normal(500))
+    found = quantile_interval(sample, 0.9, 0.99)
+    low, high = int(np.searchsorted(sample, found.low)) + 1, int(np.searchsorted(sample, found.high)) + 1
+    assert binom.cdf(low - 1, 500, 0.9) <= 0.005 < binom.cdf(low, 500, 0.9)
+    assert binom.sf(high - 1, 500, 0.9) <= 0.005 < binom.sf(high - 2, 500, 0.9)
+
+
+@pytest.mark.parametrize("share", [0.0027, 0.5, 0.9973])
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+def test_small_samples_say_so(generator, share, confidence):
+    needed = quantile_interval(np.zeros(1), share, confidence).needed
+    enough = quantile_interval(generator.standard_normal(needed), share, confidence)
+    wanting = quantile_interval(generator.standard_normal(needed - 1), share, confidence)
+    assert enough.bounded
+    assert np.isfinite([enough.low, enough.high]).all()
+    assert not wanting.bounded
+    assert not np.isfinite([wanting.low, wanting.high]).all()
+    assert f"{needed} would" in wanting.status
+    assert min(enough.attained, wanting.attained) >= confidence
+
+
+def test_arguments_out_of_range():
+    for call in (
+        lambda: Limits(),
+        lambda: Limits(lower=1.0, upper=1.0),
+        lambda: capability(SAMPLE[:1], Limits(upper=1.0)),
+        lambda: capability(np.array([1.0, np.nan]), Limits(upper=1.0)),
+        lambda: capability(np.ones(4), Limits(upper=1.0)),
+        lambda: capability(SAMPLE, Limits(upper=1.0), subgroup=4),
+        lambda: defects_per_million_opportunities(5, 2, 2),
+        lambda: wilson_interval(0, 0),
+        lambda: wilson_interval(10, 11),
+        lambda: wilson_interval(10, 5, 1.0),
+        lambda: quantile_interval(SAMPLE, 0.0),
+        lambda: quantile_interval(SAMPLE[:0], 0.5),
+    ):
+        with pytest.raises(InputError):
+            call()

@@ -1,0 +1,297 @@
+"""Capability of a characteristic: indices, parts per million, and intervals that assume no distribution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import binom, norm
+
+from tolalloc.exceptions import InputError
+
+MILLION = 1e6
+_MOVING_RANGE = 2 / np.sqrt(np.pi)
+"""d₂ of two units: the mean range of two normal values over their standard deviation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits of a characteristic, one of which may be absent.
+
+    Parameters
+    ----------
+    lower, upper
+        Limits, none for an open side [unit of the characteristic].
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.lower is None and self.upper is None:
+            raise InputError("Capability needs a lower limit, an upper limit or both.")
+        if self.lower is not None and self.upper is not None and not self.lower < self.upper:
+            raise InputError.at("capability", "upper limit", self.upper, f"a number above the lower one, {self.lower}")
+
+    def outside(self, sample: Float[np.ndarray, " unit"]) -> int:
+        """Return how many values lie beyond a limit."""
+        return int(np.count_nonzero((sample < self._low) | (sample > self._high)))
+
+    def distance(self, mean: float) -> float:
+        """Return the distance of a mean from the nearer limit, negative beyond it [unit of the characteristic]."""
+        return min(self._high - mean, mean - self._low)
+
+    def normal_share_outside(self, mean: float, deviation: float) -> float:
+        """Return the share of a normal distribution beyond the limits [-]."""
+        return float(norm.cdf((self._low - mean) / deviation) + norm.sf((self._high - mean) / deviation))
+
+    @property
+    def width(self) -> float | None:
+        """Distance between the limits, none if a side is open [unit of the characteristic]."""
+        return None if self.lower is None or self.upper is None else self.upper - self.lower
+
+    @property
+    def _low(self) -> float:
+        return -np.inf if self.lower is None else self.lower
+
+    @property
+    def _high(self) -> float:
+        return np.inf if self.upper is None else self.upper
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capability:
+    """Capability of a sample.
+
+    Parameters
+    ----------
+    mean
+        Mean of the sample [unit of the characteristic].
+    deviation_within, deviation_overall
+        Standard deviation within subgroups, and of the whole sample [unit of the characteristic].
+    cp, cpk
+        (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is
+        open [-].
+    pp, ppk
+        The same with the deviation of the whole sample [-].
+    normal_ppm
+        Units beyond the limits per million if the characteristic is normal with the sample's mean and overall
+        deviation; the only figure here besides the indices that assumes a normal distribution [-].
+    empirical_ppm
+        Units of the sample beyond the limits per million [-].
+    units, outside
+        Units of the sample, and how many lie beyond a limit [-].
+    """
+
+    mean: float
+    deviation_within: float
+    deviation_overall: float
+    cp: float | None
+    cpk: float
+    pp: float | None
+    ppk: float
+    normal_ppm: float
+    empirical_ppm: float
+    units: int
+    outside: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShareInterval:
+    """A share of units with its two-sided interval.
+
+    Parameters
+    ----------
+    estimate, low, high
+        Share and the ends of its interval [-].
+    confidence
+        Confidence of the interval [-].
+    """
+
+    estimate: float
+    low: float
+    high: float
+    confidence: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuantileInterval:
+    """A quantile with an interval that holds for every continuous distribution.
+
+    Parameters
+    ----------
+    share
+        Which quantile [-].
+    estimate
+        Empirical quantile [unit of the characteristic].
+    low, high
+        Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic].
+    confidence, attained
+        Confidence asked for, and the exact one of the order statistics chosen, which is not less [-].
+    units, needed
+        Units of the sample, and the fewest that bound both sides [-].
+    """
+
+    share: float
+    estimate: float
+    low: float
+    high: float
+    confidence: float
+    attained: float
+    units: int
+    needed: int
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the sample bounds both sides."""
+        return self.units >= self.needed
+
+    @property
+    def status(self) -> str:
+        """One sentence for a person."""
+        if self.bounded:
+            return f"The {self.share:.4%} quantile lies in the interval with {self.attained:.2%} confidence."
+        return f"{self.units} units do not bound the {self.share:.4%} quantile on both sides; {self.needed} would."
+
+
+def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int = 1) -> Capability:
+    """Return the capability of a sample in the order of its making.
+
+    Parameters
+    ----------
+    sample
+        Values of the characteristic [unit of the characteristic].
+    limits
+        One or two limits.
+    subgroup
+        Consecutive units that form a subgroup; 1 takes the mean moving range of neighbours instead [-].
+
+    Notes
+    -----
+    The deviation within subgroups is the root of the mean of their variances, or the mean moving range over
+    d₂ = 2/√π; that of the whole sample has the divisor n − 1. All indices read as yields only for a normal
+    distribution. For independent random units both deviations estimate the same.
+
+    References
+    ----------
+    ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery, Statistical Quality Control, ch. 8.
+    """
+    if sample.size < 2 or not np.isfinite(sample).all():
+        raise InputError.at("capability", "sample", f"{sample.size} values", "at least 2 values, all finite")
+    mean, overall = float(sample.mean()), float(sample.std(ddof=1))
+    within = _deviation_within(sample, subgroup)
+    if min(within, overall) <= 0:
+        raise InputError("Capability: the sample does not vary, so no index can be given.")
+    width, distance, outside = limits.width, limits.distance(mean), limits.outside(sample)
+    return Capability(
+        mean=mean,
+        deviation_within=within,
+        deviation_overall=overall,
+        cp=None if width is None else width / (6 * within),
+        cpk=distance / (3 * within),
+        pp=None if width is None else width / (6 * overall),
+        ppk=distance / (3 * overall),
+        normal_ppm=MILLION * limits.normal_share_outside(mean, overall),
+        empirical_ppm=MILLION * outside / sample.size,
+        units=sample.size,
+        outside=outside,
+    )
+
+
+def defects_per_million_opportunities(defects: int, units: int, opportunities: int = 1) -> float:
+    """Return defects per million opportunities, DPMO = 10⁶·defects / (units·opportunities) [-].
+
+    Parameters
+    ----------
+    defects
+        Violated limits over all units; one unit can have several [-].
+    units
+        Units inspected [-].
+    opportunities
+        Limited characteristics of one unit; with one, the figure is the empirical parts per million [-].
+    """
+    if units < 1 or opportunities < 1 or not 0 <= defects <= units * opportunities:
+        raise InputError.at("DPMO", "defects", defects, f"0 to {units} units × {opportunities} opportunities")
+    return MILLION * defects / (units * opportunities)
+
+
+def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> ShareInterval:
+    """Return a yield with its two-sided Wilson interval, which covers on average as stated, not at every yield.
+
+    Parameters
+    ----------
+    units, accepted
+        Units of the sample, and how many are within the limits [-].
+    confidence
+        Confidence of the interval [-].
+
+    References
+    ----------
+    Wilson 1927, (p + z²/2n ± z·√(p·(1 − p)/n + z²/4n²)) / (1 + z²/n).
+    """
+    _require_share("Wilson interval", "confidence", confidence)
+    if units < 1 or not 0 <= accepted <= units:
+        raise InputError.at("Wilson interval", "accepted", accepted, f"0 to {units} units")
+    z, share = float(norm.isf((1 - confidence) / 2)), accepted / units
+    centre = share + z**2 / (2 * units)
+    half = z * float(np.sqrt(share * (1 - share) / units + z**2 / (4 * units**2)))
+    scale = 1 + z**2 / units
+    return ShareInterval(
+        estimate=share,
+        # Rounding must not leave the ends of an extreme yield just off 0 and 1.
+        low=max(0.0, (centre - half) / scale) if accepted else 0.0,
+        high=min(1.0, (centre + half) / scale) if accepted < units else 1.0,
+        confidence=confidence,
+    )
+
+
+def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> QuantileInterval:
+    """Return a quantile with the two-sided interval of two order statistics, half of the doubt on each side.
+
+    Parameters
+    ----------
+    sample
+        Independent values of the characteristic [unit of the characteristic].
+    share
+        Which quantile [-].
+    confidence
+        Confidence of the interval [-].
+
+    References
+    ----------
+    David & Nagaraja, Order Statistics, ch. 7: P(X₍ᵣ₎ ≤ q < X₍ₛ₎) = P(r ≤ B < s) with B binomial (n, share).
+    """
+    _require_share("quantile interval", "share", share)
+    _require_share("quantile interval", "confidence", confidence)
+    if sample.size < 1 or not np.isfinite(sample).all():
+        raise InputError.at("quantile interval", "sample", f"{sample.size} values", "at least 1 value, all finite")
+    units, tail = sample.size, (1 - confidence) / 2
+    low = int(binom.ppf(tail, units, share))
+    high = int(binom.isf(tail, units, share)) + 1
+    ordered = np.sort(sample)
+    return QuantileInterval(
+        share=share,
+        estimate=float(np.quantile(sample, share)),
+        low=float(ordered[low - 1]) if low >= 1 else -np.inf,
+        high=float(ordered[high - 1]) if high <= units else np.inf,
+        confidence=confidence,
+        attained=float(binom.cdf(high - 1, units, share) - binom.cdf(low - 1, units, share)),
+        units=units,
+        needed=int(np.ceil(np.log(tail) / np.log(max(share, 1 - share)))),
+    )
+
+
+def _deviation_within(sample: Float[np.ndarray, " unit"], subgroup: int) -> float:
+    """Return the standard deviation within subgroups [unit of the characteristic]."""
+    if subgroup < 1 or sample.size % subgroup:
+        raise InputError.at("capability", "subgroup", subgroup, f"a divisor of the {sample.size} values")
+    if subgroup == 1:
+        return float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
+    return float(np.sqrt(sample.reshape(-1, subgroup).var(axis=1, ddof=1).mean()))
+
+
+def _require_share(place: str, field: str, value: float) -> None:
+    """Raise unless a value lies between 0 and 1."""
+    if not 0 < value < 1:
+        raise InputError.at(place, field, value, "a number between 0 and 1")
