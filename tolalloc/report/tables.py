@@ -12,9 +12,17 @@ from tolalloc.cycloid.assessment import Assessment
 from tolalloc.report.results import StudyResults
 from tolalloc.sensitivity.capability import Limits, quantile_interval
 from tolalloc.sensitivity.capability import capability as sample_capability
+from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import with_zones
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
+
+
+def _blocks(pair: Neighbours | None) -> str:
+    """Return how many more Sobol blocks would tell a source from the next one."""
+    if pair is None or pair.more_blocks is None:
+        return ""
+    return "told apart" if pair.separated else f"about {pair.more_blocks:.2g}"
 
 
 def ranking(results: StudyResults) -> pd.DataFrame:
@@ -28,7 +36,7 @@ def ranking(results: StudyResults) -> pd.DataFrame:
     alone = [*results.classical.alone, *undrawn]
     share = sobol.total / sobol.total.sum() * 100
     first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
-    among = sobol.among_first(3)
+    among, following = sobol.among_first(3), {pair.before: pair for pair in sobol.neighbours}
     rows = [
         {
             "rank [-]": place + 1,
@@ -45,6 +53,8 @@ def ranking(results: StudyResults) -> pd.DataFrame:
             "rank low 5 % [-]": rank[0, at],
             "rank high 95 % [-]": rank[1, at],
             "P(among first 3) [%]": among[at] * 100,
+            "P(before the next) [%]": following[at].probability * 100 if at in following else np.nan,
+            "more blocks to tell it from the next [-]": _blocks(following.get(at)),
             "zone [µm]": zones[at],
             "Sens of the quantile [arcsec/µm]": slopes[at],
             "alone at its limit [arcsec]": alone[at],

@@ -1,26 +1,24 @@
-"""Sobol indices per source through SALib, with the confidence of the ranking that they give.
+"""Sobol indices per source on SALib's design, with the confidence of the ranking that they give.
 
-SALib's traps and the guards against them: one NaN makes every index zero, so blocks with a failed sample
-are dropped whole and counted; seed 0 means unseeded, so seeds are positive; its ``conf`` is a multiple of
-a standard deviation, so intervals are percentiles of the kept resamples.
+SALib's traps and the guards against them: seed 0 means unseeded, so seeds are positive; one NaN makes every index zero
+and ``conf`` is a multiple of a standard deviation, so `tolalloc.sensitivity.saltelli` estimates, drops blocks with a
+failed sample whole, counts them, and keeps the resamples, from which intervals are percentiles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from SALib.analyze import sobol as sobol_analysis
 from SALib.sample import sobol as sobol_sample
 
-from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Response
+from tolalloc.sensitivity.ranking import Neighbours, among_first, neighbours, percentile_interval, rank_interval
+from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import ErrorModel
 
-INTERVAL = (0.05, 0.95)
 LARGEST_DROPPED_SHARE = 0.05
 _RESAMPLES = 400
 
@@ -55,12 +53,12 @@ class SobolIndices:
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
         """90 % percentile interval of the first-order indices [-]."""
-        return np.asarray(np.quantile(self.first_resamples, INTERVAL, axis=0))
+        return percentile_interval(self.first_resamples)
 
     @property
     def total_interval(self) -> Float[np.ndarray, "2 source"]:
         """90 % percentile interval of the total indices [-]."""
-        return np.asarray(np.quantile(self.total_resamples, INTERVAL, axis=0))
+        return percentile_interval(self.total_resamples)
 
     @property
     def order(self) -> list[int]:
@@ -70,13 +68,16 @@ class SobolIndices:
     @property
     def rank_interval(self) -> Float[np.ndarray, "2 source"]:
         """90 % percentile interval of each source's rank over the resamples, 1 for the largest [-]."""
-        ranks = np.argsort(np.argsort(-self.total_resamples, axis=1, kind="stable"), axis=1) + 1
-        return np.asarray(np.quantile(ranks, INTERVAL, axis=0, method="inverted_cdf").astype(float))
+        return rank_interval(self.total_resamples).astype(float)
+
+    @property
+    def neighbours(self) -> tuple[Neighbours, ...]:
+        """Sources that follow each other, largest total index first, and what would tell them apart."""
+        return neighbours(self.total, self.total_resamples, self.blocks)
 
     def among_first(self, count: int) -> Float[np.ndarray, " source"]:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
-        ranks = np.argsort(np.argsort(-self.total_resamples, axis=1, kind="stable"), axis=1)
-        return np.asarray((ranks < count).mean(axis=0))
+        return among_first(self.total_resamples, count)
 
 
 def sobol_indices(
@@ -117,32 +118,21 @@ def sobol_indices(
     tiny = np.finfo(float).tiny
     x = errors.deviations(errors.standard_values(np.clip(uniform, tiny, 1 - 1e-16)), zones)
     evaluation = response(x)
-    size = len(names) + 2
-    whole = evaluation.good.reshape(blocks, size).all(axis=1)
-    dropped = int(np.count_nonzero(~whole))
-    if dropped > LARGEST_DROPPED_SHARE * blocks:
-        raise SolveError(
-            f"Sobol indices: {dropped} of {blocks} blocks hold a failed sample; allowed is "
-            f"{LARGEST_DROPPED_SHARE:.0%}, because more would bias the indices."
-        )
-    y = evaluation.values[:, 0].reshape(blocks, size)[whole].ravel()
-    if np.ptp(y) == 0.0:
-        raise SolveError("Sobol indices: the output is the same for all samples, so no source can be ranked.")
-    result: dict[str, Any] = sobol_analysis.analyze(
-        problem,
-        y,
-        calc_second_order=False,
-        num_resamples=_RESAMPLES,
-        keep_resamples=True,
-        seed=seeds.child("resamples").integer(),
+    found = saltelli_indices(
+        evaluation,
+        len(names),
+        seeds.child("resamples"),
+        resamples=_RESAMPLES,
+        largest_dropped_share=LARGEST_DROPPED_SHARE,
     )
+    found.require_varying(0)
     return SobolIndices(
         sources=names,
-        first=np.asarray(result["S1"]),
-        total=np.asarray(result["ST"]),
-        first_resamples=np.asarray(result["S1_conf_all"]),
-        total_resamples=np.asarray(result["ST_conf_all"]),
-        blocks=blocks - dropped,
-        dropped=dropped,
+        first=found.first[0],
+        total=found.total[0],
+        first_resamples=found.first_resamples[0],
+        total_resamples=found.total_resamples[0],
+        blocks=found.blocks,
+        dropped=found.dropped,
         samples=x.shape[0],
     )

@@ -1,0 +1,222 @@
+"""Many outputs at once against SALib's own estimators on the same resamples, and what a failed sample may change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from SALib.analyze import sobol as salib
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.ranking import (
+    among_first,
+    before,
+    grow_until_stable,
+    indistinguishable_from_zero,
+    neighbours,
+    percentile_interval,
+    rank_interval,
+    ranks,
+)
+from tolalloc.sensitivity.saltelli import SaltelliIndices, resample_counts, saltelli_indices
+from tolalloc.uncertainty.seeds import SeedTree
+
+SOURCES, BLOCKS, RESAMPLES, OUTPUTS = 5, 96, 60, 7
+FIELDS = ("first", "total", "second", "first_resamples", "total_resamples", "second_resamples")
+
+
+def answers(blocks: int = BLOCKS, second_order: bool = True, seed: int = 1) -> np.ndarray:
+    """Return outputs of different size and offset of a Saltelli design, in SALib's order [block·sample, output]."""
+    generator = SeedTree(seed).child("answers").generator()
+    a, b, weight = (generator.normal(size=shape) for shape in ((blocks, 5), (blocks, 5), (SOURCES, OUTPUTS)))
+    rows = [a]
+    for outer, inner in ((a, b), (b, a))[: 1 + second_order]:
+        rows += [np.where(np.arange(SOURCES) == source, inner, outer) for source in range(SOURCES)]
+    x = np.stack([*rows, b], axis=1).reshape(-1, SOURCES)
+    return 10.0 ** np.arange(-9, -9 + OUTPUTS) * (x @ weight + x[:, :1] * x[:, 1:2] + np.arange(OUTPUTS))
+
+
+def evaluation(values: np.ndarray) -> Evaluation:
+    return Evaluation(values=values, status=np.zeros(values.shape[0], np.uint8))
+
+
+def indices(values: np.ndarray, second_order: bool = True, seed: int = 4, **options: object) -> SaltelliIndices:
+    found = saltelli_indices(
+        evaluation(values), SOURCES, SeedTree(seed), second_order=second_order, resamples=RESAMPLES, **options
+    )
+    assert found.pairs == tuple((j, k) for j in range(SOURCES) for k in range(j + 1, SOURCES))
+    return found
+
+
+def same_bits(one: SaltelliIndices, two: SaltelliIndices, outputs: object = slice(None)) -> None:
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(one, name)[outputs], getattr(two, name)[outputs])
+
+
+def close(ours: np.ndarray, theirs: np.ndarray) -> None:
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("second_order", [False, True])
+def test_estimates_are_those_of_salib(second_order):
+    values = answers(second_order=second_order)
+    found = indices(values, second_order)
+    problem = {"num_vars": SOURCES, "names": list("abcde"), "bounds": [[0.0, 1.0]] * SOURCES}
+    for output in range(OUTPUTS):
+        theirs = salib.analyze(problem, values[:, output], calc_second_order=second_order, num_resamples=2, seed=1)
+        close(found.first[output], theirs["S1"])
+        close(found.total[output], theirs["ST"])
+        if second_order:
+            close(found.second[output], [theirs["S2"][pair] for pair in found.pairs])
+
+
+def test_resamples_are_those_of_salib():
+    values = answers()
+    found = indices(values)
+    counts = resample_counts(BLOCKS, RESAMPLES, SeedTree(4))[1:].astype(int)
+    chosen = np.stack([np.repeat(np.arange(BLOCKS), row) for row in counts], axis=1)
+    for output in range(OUTPUTS):
+        y = values[:, output]
+        y = (y - y.mean()) / y.std()
+        a, b, ab, ba = salib.separate_output_values(y, SOURCES, BLOCKS, True)
+        for j in range(SOURCES):
+            own = (a[chosen], ab[chosen, j], b[chosen])
+            close(found.first_resamples[output, :, j], salib.first_order(*own))
+            close(found.total_resamples[output, :, j], salib.total_order(*own))
+        for at, (j, k) in enumerate(found.pairs):
+            theirs = salib.second_order(a[chosen], ab[chosen, j], ab[chosen, k], ba[chosen, j], b[chosen])
+            close(found.second_resamples[output, :, at], theirs)
+
+
+@pytest.mark.parametrize("blocks", [6, 7, 96])
+def test_resamples_without_the_only_different_block_have_no_index(blocks):
+    """The answers of such a resample are equal, so the difference of its moments is rounding, as large as an index."""
+    y = np.zeros((blocks, SOURCES + 2))
+    y[3, 0] = y[4, 2] = 1.0
+    found = saltelli_indices(evaluation(y.reshape(-1, 1)), SOURCES, SeedTree(4), resamples=RESAMPLES)
+    without = resample_counts(blocks, RESAMPLES, SeedTree(4))[1:, 3] == 0
+    assert without.any()
+    assert (found.first_resamples[0, without] == 0).all()
+    assert (found.total_resamples[0, without] == 0).all()
+    assert (found.total_resamples[0, ~without].max(axis=1) > 0).all()
+
+
+def test_a_single_source_has_no_pairs():
+    values = SeedTree(2).generator().normal(size=(64 * 4, 2))
+    found = saltelli_indices(evaluation(values), 1, SeedTree(4), second_order=True)
+    assert found.second is not None
+    assert (found.second.shape, found.pairs) == ((2, 0), ())
+
+
+@pytest.mark.parametrize("outputs_at_once", [2, 3, OUTPUTS, 100])
+def test_no_bit_depends_on_the_outputs_held_at_once(outputs_at_once):
+    values = answers()
+    same_bits(indices(values), indices(values, outputs_at_once=outputs_at_once))
+    alone = indices(values[:, [3]])
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(alone, name)[0], getattr(indices(values), name)[3])
+
+
+def test_one_failed_sample_drops_its_block_and_nothing_else():
+    values, size = answers(), 2 * SOURCES + 2
+    broken = values.copy()
+    broken[17 * size + 3, 2] = np.nan
+    found = indices(broken, largest_dropped_share=0.02)
+    assert (found.blocks, found.dropped) == (BLOCKS - 1, 1)
+    same_bits(found, indices(np.delete(values, np.arange(17 * size, 18 * size), axis=0)))
+    status = np.zeros(values.shape[0], np.uint8)
+    status[17 * size] = 1
+    by_status = saltelli_indices(
+        Evaluation(values=values, status=status),
+        SOURCES,
+        SeedTree(4),
+        second_order=True,
+        resamples=RESAMPLES,
+        largest_dropped_share=0.02,
+    )
+    same_bits(found, by_status)
+
+
+def test_too_many_failed_samples_stop_the_analysis():
+    values, size = answers(), 2 * SOURCES + 2
+    values[5] = np.inf
+    with pytest.raises(SolveError, match=r"1 of 96 blocks hold a failed sample; allowed is 0\.01"):
+        indices(values)
+    values[::size] = np.nan
+    with pytest.raises(SolveError, match="0 of 96 blocks are left"):
+        indices(values, largest_dropped_share=1.0)
+
+
+def test_an_output_that_does_not_vary_concerns_itself_alone():
+    values = answers()
+    flat = values.copy()
+    flat[:, 2] = 0.1
+    flat[:, 5] = 1e3 * (1 + np.finfo(float).eps * (np.arange(values.shape[0]) % 2))
+    found, others = indices(flat, outputs_at_once=3), np.array([0, 1, 3, 4, 6])
+    assert found.varies.tolist() == [True, True, False, True, True, False, True]
+    for name in FIELDS:
+        assert np.isnan(getattr(found, name)[[2, 5]]).all()
+    same_bits(found, indices(values), others)
+    found.require_varying(0)
+    with pytest.raises(SolveError, match="output 2 is the same for all samples"):
+        found.require_varying(2)
+
+
+def test_seed_zero_is_a_seed_like_every_other():
+    values = answers()
+    same_bits(indices(values, seed=0), indices(values, seed=0))
+    assert (indices(values, seed=0).first_resamples != indices(values, seed=1).first_resamples).any()
+
+
+def test_wrong_sizes_are_refused():
+    with pytest.raises(InputError, match="a multiple of 12"):
+        indices(answers()[:-1])
+    with pytest.raises(InputError, match="outputs at once is 0"):
+        indices(answers(), outputs_at_once=0)
+
+
+RESAMPLED = np.array([[0.5, 0.3, 0.2], [0.5, 0.2, 0.3], [0.6, 0.2, 0.1], [0.4, 0.3, -0.1]])
+
+
+def test_ranks_and_orders_of_a_ranking_made_by_hand():
+    assert ranks(RESAMPLED).tolist() == [[1, 2, 3], [1, 3, 2], [1, 2, 3], [1, 2, 3]]
+    assert rank_interval(RESAMPLED).tolist() == [[1, 2, 2], [1, 3, 3]]
+    np.testing.assert_array_equal(among_first(RESAMPLED, 2), [1.0, 0.75, 0.25])
+    np.testing.assert_array_equal(before(RESAMPLED), [[0.5, 1, 1], [0, 0.5, 0.75], [0, 0.25, 0.5]])
+    assert indistinguishable_from_zero(RESAMPLED).tolist() == [False, False, True]
+    np.testing.assert_allclose(percentile_interval(RESAMPLED, 0.5)[:, 0], [0.475, 0.525])
+    with pytest.raises(InputError, match="confidence is 1"):
+        percentile_interval(RESAMPLED, 1.0)
+    with pytest.raises(InputError, match="1 to 3"):
+        among_first(RESAMPLED, 4)
+
+
+def gaps(blocks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Return indices whose estimates are exact and whose resamples spread with one over the root of the blocks."""
+    values = np.array([0.2, 0.5, 0.22, 0.05])
+    return values, values + SeedTree(seed).generator().normal(size=(4000, 4)) * 0.5 / np.sqrt(blocks)
+
+
+def test_the_blocks_asked_for_tell_neighbours_apart():
+    found = neighbours(*gaps(512), 512, 0.9)
+    assert [(pair.before, pair.after) for pair in found] == [(1, 2), (2, 0), (0, 3)]
+    assert [pair.separated for pair in found] == [True, False, True]
+    more = found[1].more_blocks
+    assert more == pytest.approx(512 * ((1.2816 * 0.5 * np.sqrt(2 / 512) / 0.02) ** 2 - 1), rel=0.05)
+    assert found[0].more_blocks == 0
+    enough = neighbours(*gaps(512 + more, seed=7), 512 + more, 0.9)
+    assert enough[1].probability == pytest.approx(0.9, abs=0.02)
+    equal = neighbours(np.array([0.3, 0.3]), np.array([[0.3, 0.3], [0.2, 0.4], [0.4, 0.2]]), 64)
+    assert (equal[0].more_blocks, equal[0].separated) == (None, False)
+
+
+def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
+    found = grow_until_stable(gaps, 3, start=64, limit=1 << 14)
+    assert found.stable
+    assert [step.blocks for step in found.history] == [64 << at for at in range(len(found.history))]
+    assert found.history[-1].first == (1, 2, 0)
+    assert found.history[-1].probability >= 0.9 > found.history[-2].probability
+    stopped = grow_until_stable(gaps, 3, start=64, limit=200)
+    assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
+    with pytest.raises(InputError, match="first number of blocks"):
+        grow_until_stable(gaps, 3, start=64, limit=32)

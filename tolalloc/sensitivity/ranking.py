@@ -1,0 +1,242 @@
+"""How far a ranking can be trusted, from bootstrap resamples of the indices that it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.stats import norm
+
+from tolalloc.exceptions import InputError
+
+Resampled = tuple[Float[np.ndarray, " source"], Float[np.ndarray, "resample source"]]
+"""Indices of the sources, and the same from resamples [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neighbours:
+    """Two sources that follow each other in the ranking.
+
+    Parameters
+    ----------
+    before, after
+        Positions of the two sources [-].
+    difference, deviation
+        Difference of their indices, and its standard deviation over the resamples [-].
+    probability
+        Share of resamples in which they have this order [-].
+    separated
+        Whether that share reaches the confidence asked for.
+    more_blocks
+        Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal [-].
+    """
+
+    before: int
+    after: int
+    difference: float
+    deviation: float
+    probability: float
+    separated: bool
+    more_blocks: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One number of blocks on the way to a stable order.
+
+    Parameters
+    ----------
+    blocks
+        Number of blocks [-].
+    first
+        Positions of the first sources, largest index first [-].
+    probability
+        Share of resamples whose first sources are these in this order [-].
+    """
+
+    blocks: int
+    first: tuple[int, ...]
+    probability: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Growth:
+    """How the order settled as the blocks grew.
+
+    Parameters
+    ----------
+    history
+        One step per number of blocks.
+    stable
+        Whether the last step reached the probability asked for.
+    """
+
+    history: tuple[Step, ...]
+    stable: bool
+
+
+def percentile_interval(
+    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.9
+) -> Float[np.ndarray, "2 source"]:
+    """Return the two-sided percentile interval of every index [-]."""
+    return np.asarray(np.quantile(resamples, _tails(confidence), axis=0))
+
+
+def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "resample source"]:
+    """Return the rank of every source in every resample, 1 for the largest; the earlier one of equals leads [-]."""
+    return np.asarray(np.argsort(np.argsort(-resamples, axis=1, kind="stable"), axis=1, kind="stable") + 1)
+
+
+def rank_interval(
+    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.9
+) -> Int[np.ndarray, "2 source"]:
+    """Return the two-sided interval of every rank, of whole ranks that some resample has [-]."""
+    return np.asarray(np.quantile(ranks(resamples), _tails(confidence), axis=0, method="inverted_cdf").astype(int))
+
+
+def among_first(resamples: Float[np.ndarray, "resample source"], count: int) -> Float[np.ndarray, " source"]:
+    """Return the share of resamples in which each source is among the first ``count`` [-]."""
+    _require_count(count, resamples.shape[1])
+    return np.asarray((ranks(resamples) <= count).mean(axis=0))
+
+
+def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray, "source source"]:
+    """Return the share of resamples in which the row's source is larger than the column's; equals count half [-]."""
+    columns = resamples.T
+    return np.stack([((own > columns).mean(axis=1) + (own >= columns).mean(axis=1)) / 2 for own in columns])
+
+
+def indistinguishable_from_zero(
+    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.95
+) -> Bool[np.ndarray, " source"]:
+    """Return which indices are indistinguishable from 0, so that nobody reads a negative share.
+
+    Parameters
+    ----------
+    resamples
+        Resampled indices [-].
+    confidence
+        One-sided confidence with which an index must be above 0 to count [-].
+
+    Notes
+    -----
+    A total index is a mean of squares: it is flagged only if the output does not depend on the source at all.
+    """
+    _require_confidence(confidence)
+    return np.asarray(np.quantile(resamples, 1 - confidence, axis=0) <= 0)
+
+
+def neighbours(
+    indices: Float[np.ndarray, " source"],
+    resamples: Float[np.ndarray, "resample source"],
+    blocks: int,
+    confidence: float = 0.9,
+) -> tuple[Neighbours, ...]:
+    """Return every pair of neighbours in the ranking, and what would tell them apart.
+
+    Parameters
+    ----------
+    indices
+        Indices that make the ranking [-].
+    resamples
+        The same from resamples [-].
+    blocks
+        Blocks that they come from [-].
+    confidence
+        Share of resamples that must have the order for it to count [-].
+
+    Notes
+    -----
+    The blocks to add are an extrapolation: they take the difference for the true one, and its distribution for a
+    normal one whose variance falls with one over the blocks. A difference that is itself doubtful makes them so too.
+
+    References
+    ----------
+    One-sided normal quantile z with N′ = N·(z·σ/Δ)², from σ² ∝ 1/N; Efron & Tibshirani 1993, ch. 6.
+    """
+    _require_confidence(confidence)
+    order, found = np.argsort(-indices, kind="stable").tolist(), []
+    for leading, following in pairwise(order):
+        apart = resamples[:, leading] - resamples[:, following]
+        difference, deviation = float(indices[leading] - indices[following]), float(apart.std(ddof=1))
+        probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
+        separated = probability >= confidence
+        found.append(
+            Neighbours(
+                before=leading,
+                after=following,
+                difference=difference,
+                deviation=deviation,
+                probability=probability,
+                separated=separated,
+                more_blocks=0 if separated else _more_blocks(difference, deviation, blocks, confidence),
+            )
+        )
+    return tuple(found)
+
+
+def grow_until_stable(
+    resampled: Callable[[int], Resampled], count: int, *, start: int, limit: int, probability: float = 0.9
+) -> Growth:
+    """Double the blocks until the order of the first sources is stable.
+
+    Parameters
+    ----------
+    resampled
+        Gives the indices for a number of blocks; it may keep the answers of the blocks that it has had.
+    count
+        How many of the first sources must keep their order [-].
+    start, limit
+        First and largest number of blocks [-].
+    probability
+        Share of resamples that must have the order of the estimate [-].
+
+    Notes
+    -----
+    Looking several times makes a stop by chance likelier than one look does; the history shows whether the order
+    was the same before.
+    """
+    _require_confidence(probability)
+    if not 2 <= start <= limit:
+        raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
+    history: list[Step] = []
+    blocks = start
+    while blocks <= limit:
+        indices, resamples = resampled(blocks)
+        _require_count(count, indices.size)
+        first = np.argsort(-indices, kind="stable")[:count]
+        same = (np.argsort(-resamples, axis=1, kind="stable")[:, :count] == first).all(axis=1)
+        history.append(Step(blocks=blocks, first=tuple(first.tolist()), probability=float(same.mean())))
+        if history[-1].probability >= probability:
+            break
+        blocks *= 2
+    return Growth(history=tuple(history), stable=history[-1].probability >= probability)
+
+
+def _more_blocks(difference: float, deviation: float, blocks: int, confidence: float) -> int | None:
+    """Return the blocks to add until the confidence is reached, at least one; none if the indices are equal [-]."""
+    if difference <= 0:
+        return None
+    needed = blocks * (float(norm.ppf(confidence)) * deviation / difference) ** 2
+    return max(1, int(np.ceil(needed)) - blocks)
+
+
+def _tails(confidence: float) -> tuple[float, float]:
+    """Return the shares below the ends of a two-sided interval [-]."""
+    _require_confidence(confidence)
+    return (1 - confidence) / 2, (1 + confidence) / 2
+
+
+def _require_confidence(value: float) -> None:
+    """Raise unless a confidence lies between 0 and 1."""
+    if not 0 < value < 1:
+        raise InputError.at("ranking", "confidence", value, "a number between 0 and 1")
+
+
+def _require_count(count: int, sources: int) -> None:
+    """Raise unless so many sources exist."""
+    if not 1 <= count <= sources:
+        raise InputError.at("ranking", "number of first sources", count, f"1 to {sources}")
