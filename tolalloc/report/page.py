@@ -23,6 +23,7 @@ _RANKING_COLUMNS = (
     "ST low 5 % [-]",
     "ST high 95 % [-]",
     "S1 reading",
+    "P(before the next) [%]",
     "rank low 5 % [-]",
     "rank high 95 % [-]",
     "Sens of the quantile [arcsec/µm]",

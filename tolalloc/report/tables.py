@@ -22,7 +22,7 @@ def _blocks(pair: Neighbours | None) -> str:
     """Return how many more Sobol blocks would tell a source from the next one."""
     if pair is None or pair.more_blocks is None:
         return ""
-    return "told apart" if pair.separated else f"about {pair.more_blocks:.2g}"
+    return "told apart" if pair.separated else f"about {float(f'{pair.more_blocks:.2g}'):.0f}"
 
 
 def ranking(results: StudyResults) -> pd.DataFrame:
