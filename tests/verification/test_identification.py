@@ -84,7 +84,10 @@ def test_curves_and_loops_lose_their_mean_and_peak_to_peaks_do_not():
         mean = prediction.values[block.rows].mean() / ARCSECOND
         assert abs(mean) < 1e-9 if block.centred else mean > 10
     np.testing.assert_allclose(prediction.values[:2] - data.measured[:2], 2.0 * ARCSECOND, rtol=1e-9)
-    assert data.free == data.measured.size - 6  # two units with two curves and a loop each
+    problem = IdentificationProblem(
+        parameters=(), data=data, predictor=Straight(np.zeros((data.measured.size, 0))), weight=np.ones(2)
+    )
+    assert problem.readings == data.measured.size - 6  # two units with two curves and a loop each
 
 
 @dataclass(frozen=True)

@@ -76,11 +76,6 @@ class Data:
         """Whether there is nothing else."""
         return all(block.kind == PEAK_TO_PEAK for block in self.blocks)
 
-    @property
-    def free(self) -> int:
-        """Readings, less one for every mean that was removed [-]."""
-        return self.measured.size - sum(block.centred for block in self.blocks)
-
 
 def centred(values: Float[np.ndarray, "..."], blocks: tuple[Block, ...]) -> Float[np.ndarray, "..."]:
     """Return values, readings along the first axis, without the means of the blocks that have none."""
