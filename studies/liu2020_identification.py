@@ -186,7 +186,7 @@ def build(quick: bool) -> Document:
         first = _peak_to_peaks(given, true, errors, seeds, quick, progress)
         second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
     document, curves = identification_document(first), identification_document(second)
-    printed, repeated = printed_section(), recovery_section(again, second.symbols)
+    printed, repeated = printed_section(), recovery_section(again, second.logarithms)
     truth = ", ".join(f"{SYMBOLS[name]} = {value:.4g}" for name, value in TRUTH.items())
     return replace(
         document,
@@ -206,6 +206,12 @@ def build(quick: bool) -> Document:
             kinds_section(true, second.parameters, _every_kind(true, errors, seeds)),
             *renamed(curves.sections, "curves", "Curves and loops of five units"),
             repeated,
+        ),
+        assumptions=(
+            *document.assumptions,
+            f"50 simulated units: {LIKE_TABLE_7:g} times the zones of the tolerance table, so that their mean "
+            "peak-to-peak is that of Table 7; five units: its own zones",
+            "noise of peak-to-peaks and curves 1″, of loops 0.2″; true stiffness chosen inside the bounds of Table 5",
         ),
         summary={
             "peak-to-peaks": document.summary,

@@ -111,10 +111,6 @@ class IdentificationProblem:
         known = coordinates * prior_weights(self.parameters)
         return np.asarray(0.5 * ((own**2).sum(axis=1) + (known**2).sum(axis=1)))
 
-    def rms(self, objective: float) -> float:
-        """Return the root-mean-square residual over noise that an objective means: S of liu2020 over the noise [-]."""
-        return float(np.sqrt(2.0 * objective / self.data.measured.size))
-
     @property
     def freedom(self) -> int:
         """Readings less parameters, at least 1 [-]."""

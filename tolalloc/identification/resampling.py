@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK, Data
+from tolalloc.identification.data import Data
 from tolalloc.identification.gauss_newton import gauss_newton
 from tolalloc.identification.information import LEVEL
 from tolalloc.identification.parameters import Parameter
@@ -117,9 +117,6 @@ class Candidate:
         )
         values = (self.unseen if unseen else self.left)[rows]
         return float(np.sqrt((values**2).mean()))
-
-
-KINDS = (PEAK_TO_PEAK, CURVE, LOOP)
 
 
 def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequence[Parameter]) -> Candidate:

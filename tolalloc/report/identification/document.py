@@ -10,6 +10,7 @@ from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK
 from tolalloc.identification.parameters import BIAS
 from tolalloc.identification.resampling import Candidate
 from tolalloc.identification.stand_in import LARGE_DRIFT
+from tolalloc.identification.swarm import ASSUMED
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure
 from tolalloc.report.identification import figures, tables
@@ -51,7 +52,8 @@ def _verdict(results: IdentificationResults) -> str:
     return {
         "given": "Neither a constant nor the stiffness explains these peak-to-peaks better than the reducer as given: ",
         "bias": "A constant explains these peak-to-peaks better than the stiffness does: ",
-        "fit": "The stiffness explains these peak-to-peaks better than a constant does: ",
+        "fit": f"{'Stiffness and constant together explain' if BIAS in asked else 'The stiffness explains'} these "
+        "peak-to-peaks better than a constant does: ",
     }[best] + numbers
 
 
@@ -103,7 +105,10 @@ def warnings(results: IdentificationResults) -> tuple[str, ...]:
     return (*found, *(f"Repaired: {repair}." for repair in results.measurements.repairs))
 
 
-_SWARM = "improved particle swarm: ω = 0.9, C1 = C2 = 2, a ring of three, stop at the bounds; liu2020 prints none"
+_SWARM = (
+    f"improved particle swarm: ω = {ASSUMED.inertia:g}, C1 = C2 = {ASSUMED.acceleration:g}, "
+    f"{ASSUMED.neighbours} neighbour to either side on a ring, stop at the bounds; liu2020 prints none"
+)
 
 
 def assumptions(results: IdentificationResults) -> tuple[str, ...]:

@@ -78,11 +78,6 @@ class IdentificationResults:
     seed: int
 
     @property
-    def symbols(self) -> tuple[str, ...]:
-        """Symbols of the parameters."""
-        return tuple(item.symbol for item in self.parameters)
-
-    @property
     def logarithms(self) -> tuple[str, ...]:
         """Symbols of all parameters but the bias: those whose relative changes the directions combine."""
         return tuple(item.symbol for item in self.parameters if item.name != BIAS)
