@@ -30,8 +30,8 @@ from tolalloc.report.identification.document import identification_document
 from tolalloc.report.identification.results import IdentificationResults
 from tolalloc.study.identification import IdentificationStudy, identify
 from tolalloc.study.stages import Progress
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import BuiltUnit
 from tolalloc.units import ARCSECOND

@@ -16,8 +16,8 @@ from tests.studies.test_commands import tolalloc
 from tolalloc.identification.simulation import Bench, random_units, simulated_bench
 from tolalloc.measurement.folder import write_measurements
 from tolalloc.reducer.files import load_reducer
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.units import ARCSECOND
 

@@ -29,8 +29,8 @@ from tolalloc.identification.swarm import best_neighbours, velocity, weights
 from tolalloc.reducer.files import load_reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.surrogate.polynomial import fit_box_polynomial, total_degrees
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.units import ARCSECOND
 

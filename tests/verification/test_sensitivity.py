@@ -12,8 +12,9 @@ from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Evaluation
 from tolalloc.sensitivity.monte_carlo import allowed_rejections, monte_carlo, proportion
 from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel, Source
+from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.zones import Distribution, Feature
 
 

@@ -24,8 +24,8 @@ from tolalloc.response.stiffness import (
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.correlated import CorrelatedSource
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 FIELDS = ("crank_disc_bearing", "pin_contact")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import CHUNK, SeedTree
-from tolalloc.uncertainty.sources import ErrorModel, Source
+from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
 from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.uncertainty.zones import Distribution, Feature, at_limit, standard_values

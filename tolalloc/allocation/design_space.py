@@ -10,7 +10,8 @@ from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import CycloidStage, Modification
-from tolalloc.uncertainty.sources import ErrorModel, Source
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.sources import Source
 from tolalloc.units import MICROMETRE
 
 FLANK = "flank clearance [µm]"

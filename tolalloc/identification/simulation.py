@@ -11,8 +11,8 @@ from tolalloc.identification.data import CURVE, LOOP, PEAK_TO_PEAK, data_of
 from tolalloc.identification.prediction import KernelPredictor
 from tolalloc.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.reducer.design import Reducer
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 from tolalloc.uncertainty.unit_file import BuiltUnit
 
 _ANY = ("*",)

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Response
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 
 DIRECTIONS = 16
 

@@ -10,8 +10,8 @@ from scipy.stats import beta
 
 from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Evaluation, Response
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 
 CONFIDENCE = 0.95
 LARGEST_FAILED_SHARE = 0.01

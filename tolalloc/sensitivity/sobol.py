@@ -16,8 +16,8 @@ from SALib.sample import sobol as sobol_sample
 from tolalloc.response.interface import Response
 from tolalloc.sensitivity.ranking import Neighbours, among_first, neighbours, percentile_interval, rank_interval
 from tolalloc.sensitivity.saltelli import saltelli_indices
+from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import ErrorModel
 
 LARGEST_DROPPED_SHARE = 0.05
 _RESAMPLES = 400

@@ -23,7 +23,8 @@ from tolalloc.response.kernel import KernelResponse
 from tolalloc.response.stiffness import stiffness_source
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
 from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.sources import ErrorModel, neglected_columns
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.sources import neglected_columns
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
 from tolalloc.units import MICROMETRE

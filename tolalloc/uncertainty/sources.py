@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.zones import (
     Distribution,
     Feature,
@@ -147,77 +146,3 @@ class Source:
             return f"{reading}: normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
         axes = " on each axis" if self.feature is Feature.POSITION else ""
         return f"{reading}: normal, σ = {deviation:.3g} µm{axes} at Cp {self.cp:g}{shift}"
-
-
-@dataclass(frozen=True)
-class ErrorModel:
-    """All sources of a reducer: each random column is its zone times a standard value.
-
-    Parameters
-    ----------
-    sources
-        The rows of the tolerance table.
-    joint
-        What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and
-        its zone is 1. Rankings take it; allocation, tolerance tables and hand estimates have none.
-    """
-
-    sources: tuple[Source, ...]
-    joint: tuple[CorrelatedSource, ...] = ()
-
-    @cached_property
-    def active(self) -> tuple[Source, ...]:
-        """Sources with a zone above zero, the ones that vary."""
-        return tuple(source for source in self.sources if source.zone > 0.0)
-
-    @property
-    def _varying(self) -> tuple[Source | CorrelatedSource, ...]:
-        return (*self.active, *self.joint)
-
-    @cached_property
-    def columns(self) -> tuple[str, ...]:
-        """Columns of the active sources, then of the joint ones."""
-        return tuple(column for source in self._varying for column in source.columns)
-
-    @cached_property
-    def still(self) -> dict[str, float]:
-        """Columns of the sources with zone zero, which stay in the middle of it [m]."""
-        return {
-            column: source.middle / source.lever
-            for source in self.sources
-            if source.zone == 0.0
-            for column in source.columns
-        }
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """Orders of all spectra, ascending [-]."""
-        return tuple(sorted({order for source in self.sources for order, _ in source.spectrum}))
-
-    @cached_property
-    def source_of_column(self) -> tuple[str, ...]:
-        """Name of the source of each column."""
-        return tuple(source.name for source in self._varying for _ in source.columns)
-
-    @cached_property
-    def zones(self) -> Float[np.ndarray, " source"]:
-        """Zones of the active sources [m], then 1 for every joint one [-]."""
-        return np.array([*(source.zone for source in self.active), *(1.0 for _ in self.joint)])
-
-    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return all deviations per unit of zone for independent uniform numbers in (0, 1)."""
-        parts, start = [], 0
-        for source in self._varying:
-            own = uniform[:, start : start + len(source.columns)]
-            parts.append(source.standard_values(own))
-            start += len(source.columns)
-        return np.concatenate(parts, axis=1)
-
-    def deviations(
-        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
-    ) -> Float[np.ndarray, "sample column"]:
-        """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
-        counts = [len(source.columns) for source in self._varying]
-        middles = [*(source.middle / source.lever for source in self.active), *(0.0 for _ in self.joint)]
-        middle = np.repeat(middles, counts)
-        return np.asarray(standard * np.repeat(zones, counts) + middle)
