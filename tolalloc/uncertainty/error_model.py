@@ -116,7 +116,7 @@ class ErrorModel:
         """Return uniform numbers with the correlation of the sources from independent ones in (0, 1) [-]."""
         if not self.is_correlated:
             return uniform
-        return np.clip(ndtr(ndtri(uniform) @ self._factor), np.finfo(float).tiny, _BELOW_ONE)
+        return np.asarray(np.clip(ndtr(ndtri(uniform) @ self._factor), np.finfo(float).tiny, _BELOW_ONE))
 
     def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
