@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.equivalent.outputs import waves
 
 TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
 
@@ -70,15 +71,14 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
         parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)
     contribution = np.array(list(parts.values()))
-    count = contribution.shape[1]
-    waves = np.fft.rfft(contribution, axis=1)[:, 1 : (count + 1) // 2] * (2 / count)
-    total = waves.sum(axis=0)
+    parts_of_order = waves(contribution)
+    total = parts_of_order.sum(axis=0)
     amplitude = np.abs(total)
     direction = np.divide(total, amplitude, out=np.zeros_like(total), where=amplitude > 0)
     return Attribution(
         sources=tuple(parts),
         contribution=contribution,
         order=np.arange(1, amplitude.size + 1),
-        share=np.real(waves * direction.conj()),
+        share=np.real(parts_of_order * direction.conj()),
         amplitude=amplitude,
     )

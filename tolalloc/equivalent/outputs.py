@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Complex, Float, Int
 
 from tolalloc.equivalent.answers import Equilibria
 from tolalloc.equivalent.forces import Forces, forces
@@ -47,9 +47,20 @@ def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Ord
     transmission_error
         Curves over one whole turn, the end point left out [rad].
     """
-    angles = transmission_error.shape[1]
-    waves = np.fft.rfft(transmission_error, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles)
-    return Orders(order=np.arange(1, waves.shape[1] + 1), amplitude=np.abs(waves), phase=np.angle(waves))
+    found = waves(transmission_error)
+    return Orders(order=np.arange(1, found.shape[1] + 1), amplitude=np.abs(found), phase=np.angle(found))
+
+
+def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row order"]:
+    """Return the orders 1, 2, … of curves; the real part is the cosine's, minus the imaginary part the sine's.
+
+    Parameters
+    ----------
+    curve
+        Curves on equally spaced angles of one turn, the end point left out [any].
+    """
+    angles = curve.shape[1]
+    return np.asarray(np.fft.rfft(curve, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -107,7 +107,7 @@ class KernelResponse:
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
-        for rows, extremes in map_chunks(self._alone._extremes, x, self.mapper):
+        for rows, extremes in map_chunks(self.alone._extremes, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             self.observe(extremes.status)
@@ -120,7 +120,7 @@ class KernelResponse:
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
         by_stiffness: dict[str, Float[np.ndarray, " sample"]] = defaultdict(lambda: np.empty(x.shape[0]))
-        for rows, (extremes, derivatives) in map_chunks(self._alone._derivatives, x, self.mapper):
+        for rows, (extremes, derivatives) in map_chunks(self.alone._derivatives, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
             by_column[rows] = derivatives.by_error[:, varied] / ARCSECOND
@@ -136,7 +136,7 @@ class KernelResponse:
         )
 
     @property
-    def _alone(self) -> KernelResponse:
+    def alone(self) -> KernelResponse:
         """The response without what must stay in this process."""
         return replace(self, observe=_unobserved, mapper=map)
 
