@@ -16,6 +16,7 @@ from plotly.offline import get_plotlyjs
 
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, as_html, save_png
+from tolalloc.report.heat_map import HeatMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +37,7 @@ class Section:
 
     heading: str
     paragraphs: tuple[str, ...] = ()
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[Figure | HeatMap, ...] = ()
     tables: tuple[tuple[str, pd.DataFrame], ...] = ()
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from pathlib import Path
 from typing import Any, Literal
 
@@ -113,8 +114,14 @@ def _draw(axes: Any, figure: Figure, number: int) -> None:
         _draw_bars(axes, figure, number)
 
 
-def save_png(figure: Figure, path: Path) -> None:
-    """Draw the figure into a PNG file."""
+@singledispatch
+def save_png(figure: object, path: Path) -> None:
+    """Draw a figure into a PNG file."""
+    raise TypeError(f"{type(figure).__name__} is no figure for {path}")
+
+
+@save_png.register
+def _(figure: Figure, path: Path) -> None:
     canvas = Canvas(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
     axes = canvas.subplots()
     for number in range(len(figure.series)):
@@ -177,8 +184,14 @@ def _add(canvas: go.Figure, item: Series, colour: str) -> None:
         )
 
 
-def as_html(figure: Figure) -> str:
-    """Return the figure as a page fragment; the page itself carries plotly.js once."""
+@singledispatch
+def as_html(figure: object) -> str:
+    """Return a figure as a page fragment; the page itself carries plotly.js once."""
+    raise TypeError(f"{type(figure).__name__} is no figure")
+
+
+@as_html.register
+def _(figure: Figure) -> str:
     canvas = go.Figure()
     for number, item in enumerate(figure.series):
         _add(canvas, item, COLOURS[number % len(COLOURS)])
