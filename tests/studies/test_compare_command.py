@@ -63,7 +63,7 @@ def test_two_runs_side_by_side(runs, tmp_path):
     assert (pitch["zone A"], pitch["zone B"], pitch["B over A, less 1 [%]"]) == (4.0, 5.0, pytest.approx(25.0))
     assert pin["zone A"] == 4.0
     names = {"report.html", "results.xlsx", "summary.json", "manifest.json"}
-    assert {path.name for path in (tmp_path / "report").iterdir()} == names | {"figures"}
+    assert {path.name for path in (tmp_path / "report").iterdir()} == names | {"figures", "tables"}
     said = tolalloc("compare", *runs).stdout
     assert "differ beyond their 90 % intervals: disc1.pitch." in " ".join(said.split())
 

@@ -47,7 +47,8 @@ def test_contact_writes_report_and_profile(tmp_path):
     assert "chord error at most 0.61 µm" in result.stderr
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     figures = {f"figures/{name}.png" for name in ("profile", "clearance", "forces", "pins_in_contact")}
-    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json"} | figures
+    tables = {f"tables/{name}.csv" for name in ("profile", "loaded contact", "pins")}
+    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json"} | figures | tables
     drawing = ezdxf.readfile(file)
     (outline,) = drawing.modelspace().query("LWPOLYLINE")
     assert outline.closed

@@ -135,7 +135,8 @@ def test_the_report_folder_is_complete(run):
     names = {"report.html", "results.xlsx", "summary.json", "manifest.json", "identified.stiffness.toml"}
     of_curves = ("measured_curve", "curve_left", "curve_residuals")
     drawn = ("profiles", *of_curves, "measured_loop", "loop_left", "loop_residuals")
-    assert set(files(run.report)) == names | {f"figures/{name}.png" for name in drawn}
+    tables = {f"tables/{name}.csv" for name in ("parameters", "directions", "choices", "units")}
+    assert set(files(run.report)) == names | tables | {f"figures/{name}.png" for name in drawn}
     assert all(files(run.report).values())
     assert json.loads((run.report / "summary.json").read_text(encoding="utf-8")) == run.answer
     manifest = json.loads((run.report / "manifest.json").read_text(encoding="utf-8"))
@@ -237,6 +238,7 @@ def test_weak_data_leave_the_stiffness_open_and_say_so(peak_to_peaks, tmp_path):
     assert set(files(report)) == {
         *("report.html", "results.xlsx", "summary.json", "manifest.json", "identified.stiffness.toml"),
         *("figures/profiles.png", "figures/peak_to_peak_residuals.png"),
+        *("tables/parameters.csv", "tables/directions.csv", "tables/units.csv"),
     }
     assert warning in (report / "report.html").read_text(encoding="utf-8")
     identified = load_identified_stiffness(file)

@@ -94,7 +94,7 @@ def environment() -> Environment:
 
 
 def write_document(document: Document, folder: Path) -> None:
-    """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json`` and the figures as PNG.
+    """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json``, tables as CSV and figures as PNG.
 
     Parameters
     ----------
@@ -118,6 +118,9 @@ def write_document(document: Document, folder: Path) -> None:
     content = page.render(document=document, sections=sections, plotly=Markup(get_plotlyjs()))
     (folder / "report.html").write_text(content, encoding="utf-8")
     sheets = {name: frame for section in document.sections for name, frame in section.tables}
+    (folder / "tables").mkdir()
+    for name, frame in sheets.items():
+        frame.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
     write_sheets({**sheets, "assumptions": pd.DataFrame({"assumption": document.assumptions})}, folder / "results.xlsx")
     for section in document.sections:
         for figure in section.figures:
