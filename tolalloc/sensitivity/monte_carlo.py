@@ -11,6 +11,7 @@ from scipy.stats import beta
 from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Evaluation, Response
 from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.sampling import SamplingDesign, uniform_chunks
 from tolalloc.uncertainty.seeds import SeedTree
 
 CONFIDENCE = 0.95
@@ -20,6 +21,9 @@ LARGEST_FAILED_SHARE = 0.01
 @dataclass(frozen=True, kw_only=True)
 class Yield:
     """Share of units within the limit, with an exact two-sided interval (Clopper–Pearson).
+
+    The interval and the bound hold for independent units alone, those of the Monte Carlo design; for a Latin hypercube
+    or a Sobol' sequence only the estimate may be used.
 
     Parameters
     ----------
@@ -84,7 +88,7 @@ class MonteCarlo:
         Notes
         -----
         An order statistic: so many of the largest values are left out as the sample may reject. Infinite if the
-        sample is too small to show the target at all.
+        sample is too small to show the target at all. Like the bound of `Yield`, it holds for independent units alone.
         """
         units = self.evaluation.status.size
         allowed = allowed_rejections(units, target) - self.failed
@@ -113,7 +117,12 @@ def allowed_rejections(units: int, target: float) -> int:
 
 
 def monte_carlo(
-    response: Response, errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree, units: int
+    response: Response,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    units: int,
+    design: SamplingDesign = SamplingDesign.MONTE_CARLO,
 ) -> MonteCarlo:
     """Return random units at the given zones.
 
@@ -129,14 +138,21 @@ def monte_carlo(
         Node of the seed tree that this sample owns.
     units
         Number of units [-].
+    design
+        How the units are spread; all intervals assume the first one.
 
     Raises
     ------
     SolveError
         More than 1 % of the units failed.
+
+    Notes
+    -----
+    The deviations are kept, the uniform numbers behind them only for one chunk at a time. The response takes all units
+    at once and solves them in chunks of its own, so that an executor has many chunks to spread.
     """
-    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
-    x = errors.deviations(errors.standard_values(uniform), zones)
+    chunks = uniform_chunks(design, seeds, units, len(errors.columns))
+    x = np.concatenate([errors.deviations(errors.standard_values(uniform), zones) for uniform in chunks])
     result = MonteCarlo(x=x, evaluation=response(x))
     require_few_failures(result, ".".join(seeds.path))
     return result

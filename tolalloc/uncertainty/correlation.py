@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
@@ -26,11 +27,14 @@ class Pair:
         Names of the sources; the first column of one goes with the first of the other, and so on.
     correlation
         Of the standard normal numbers behind the columns; for normal sources that of the columns themselves [-].
+    place
+        Where it stands, for messages.
     """
 
     one: str
     other: str
     correlation: float
+    place: str = "correlations"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +46,7 @@ class Correlation:
     pairs
         Correlated pairs; all other pairs are independent.
     origin
-        File that they come from, for messages.
+        Where all of them stand, for messages.
     """
 
     pairs: tuple[Pair, ...] = ()
@@ -62,27 +66,34 @@ class Correlation:
             The pair that is not allowed.
         """
         shapes = {source.name: len(source.columns) for source in sources}
+        seen: dict[frozenset[str], Pair] = {}
         for pair in self.pairs:
-            place = f"{self.origin}, {pair.one} with {pair.other}"
-            for name in (pair.one, pair.other):
-                if name not in shapes:
-                    raise UnknownNameError.among(self.origin, "source", name, shapes)
-            if not -1 <= pair.correlation <= 1:
-                raise InputError.at(place, "correlation", pair.correlation, "-1 to 1")
-            if pair.one == pair.other or shapes[pair.one] != shapes[pair.other]:
+            _require_allowed(pair, shapes)
+            first = seen.setdefault(frozenset((pair.one, pair.other)), pair)
+            if abs(first.correlation - pair.correlation) > _ROUNDING:
                 raise InputError.at(
-                    place,
-                    "columns",
-                    f"{shapes[pair.one]} and {shapes[pair.other]}",
-                    "two different sources with equally many columns, such as two bores or two diameters",
+                    f"{pair.place}, {pair.one} with {pair.other}",
+                    "correlation",
+                    pair.correlation,
+                    f"one value for both orders of a pair, and {first.place} says {first.correlation:g}",
                 )
-        least = float(np.linalg.eigvalsh(self.source_matrix(sources)).min(initial=1.0))
-        if least < -_ROUNDING:
+        self._require_no_contradiction(sources)
+
+    def _require_no_contradiction(self, sources: Sequence[Source]) -> None:
+        """Raise if no random numbers can have these correlations."""
+        matrix = self.source_matrix(sources)
+        values, vectors = np.linalg.eigh(matrix)
+        if values.size and values[0] < -_ROUNDING:
+            # The eigenvalue is the sum of these parts; the most negative one is the pair that asks for too much.
+            parts = np.triu(matrix * np.outer(vectors[:, 0], vectors[:, 0]), 1)
+            one, other = (int(at) for at in np.unravel_index(parts.argmin(), parts.shape))
+            names = [source.name for source in sources if source.zone > 0.0]
             raise InputError.at(
                 self.origin,
                 "least eigenvalue of the correlation matrix",
-                f"{least:.3g}",
-                "0 or more; the correlations contradict each other",
+                float(f"{values[0]:.3g}"),
+                f"0 or more; the correlations contradict each other, above all {matrix[one, other]:g} of "
+                f"{names[one]} with {names[other]}",
             )
 
     def source_matrix(self, sources: Sequence[Source]) -> Float[np.ndarray, "source source"]:
@@ -102,3 +113,39 @@ class Correlation:
         for name, label in zip(names, labels, strict=True):
             members.setdefault(int(label), []).append(name)
         return tuple(tuple(block) for block in members.values())
+
+    def mappings(self, sources: Sequence[Source]) -> tuple[str, ...]:
+        """Return a sentence for every set of sources that depend on each other: which they are, and how strongly."""
+        matrix = self.source_matrix(sources)
+        position = {name: at for at, name in enumerate(source.name for source in sources if source.zone > 0.0)}
+        sentences = []
+        for block in (block for block in self.blocks(sources) if len(block) > 1):
+            pairs: dict[float, list[str]] = {}
+            for one, other in combinations(block, 2):
+                correlation = float(matrix[position[one], position[other]])
+                pairs.setdefault(correlation, []).append(f"{one} with {other}")
+            if len(pairs) == 1:
+                sentences.append(f"{', '.join(block)}: correlation {next(iter(pairs)):g} of each with each")
+            else:
+                parts = [f"{value:g} ({', '.join(names)})" for value, names in pairs.items() if value]
+                sentences.append(f"{', '.join(block)}: correlation {', '.join(parts)}")
+        return tuple(sentences)
+
+
+def _require_allowed(pair: Pair, shapes: Mapping[str, int]) -> None:
+    """Raise unless a pair names two sources with as many columns each, and a correlation."""
+    place = f"{pair.place}, {pair.one} with {pair.other}"
+    for name in (pair.one, pair.other):
+        if name not in shapes:
+            raise UnknownNameError.among(pair.place, "source", name, shapes)
+    if not -1 <= pair.correlation <= 1:
+        raise InputError.at(place, "correlation", pair.correlation, "-1 to 1")
+    if pair.one == pair.other:
+        raise InputError.at(place, "pair", pair.one, "two different sources")
+    if shapes[pair.one] != shapes[pair.other]:
+        raise InputError.at(
+            place,
+            "columns",
+            f"{shapes[pair.one]} and {shapes[pair.other]}",
+            "equally many of both sources, as two bores or two diameters have",
+        )

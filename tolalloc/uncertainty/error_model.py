@@ -89,19 +89,38 @@ class ErrorModel:
         return any(len(block) > 1 for block in self.blocks)
 
     @cached_property
-    def normal_correlation(self) -> Float[np.ndarray, "column column"]:
-        """Correlation of the standard normal numbers behind the columns [-]."""
-        matrix, where = np.eye(len(self.columns)), np.array(self.source_of_column)
-        for pair in self.correlation.among(self.sources):
-            one, other = np.flatnonzero(where == pair.one), np.flatnonzero(where == pair.other)
-            matrix[one, other] = matrix[other, one] = pair.correlation
+    def _correlated_blocks(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of the sources that depend on each other."""
+        names = [source.name for source in self._varying]
+        return tuple(tuple(names.index(name) for name in block) for block in self.blocks if len(block) > 1)
+
+    @cached_property
+    def source_correlation(self) -> Float[np.ndarray, "source source"]:
+        """Correlation of the standard normal numbers behind like columns of what varies [-]."""
+        matrix = np.eye(len(self._varying))
+        matrix[: len(self.active), : len(self.active)] = self.correlation.source_matrix(self.sources)
         return matrix
 
     @cached_property
-    def _factor(self) -> Float[np.ndarray, "column column"]:
-        """Symmetric root of the correlation; Cholesky's does not exist where columns are fully correlated [-]."""
-        values, vectors = np.linalg.eigh(self.normal_correlation)
+    def normal_correlation(self) -> Float[np.ndarray, "column column"]:
+        """Correlation of the standard normal numbers behind all columns [-]."""
+        matrix, blocks = np.eye(len(self.columns)), self._correlated_blocks
+        for one, other in ((one, other) for block in blocks for one in block for other in block):
+            own = np.eye(len(self._varying[one].columns)) * self.source_correlation[one, other]
+            matrix[self.columns_of_source[one], self.columns_of_source[other]] = own
+        return matrix
+
+    @cached_property
+    def _factor(self) -> Float[np.ndarray, "source source"]:
+        """Symmetric root of the correlation; Cholesky's does not exist where sources are fully correlated [-]."""
+        values, vectors = np.linalg.eigh(self.source_correlation)
         return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+    @cached_property
+    def columns_of_source(self) -> tuple[slice, ...]:
+        """Where the columns of each source stand."""
+        ends = np.cumsum([len(source.columns) for source in self._varying]).tolist()
+        return tuple(slice(start, end) for start, end in zip([0, *ends], ends, strict=False))
 
     @cached_property
     def zones(self) -> Float[np.ndarray, " source"]:
@@ -114,18 +133,39 @@ class ErrorModel:
 
     def dependent(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return uniform numbers with the correlation of the sources from independent ones in (0, 1) [-]."""
-        if not self.is_correlated:
-            return uniform
-        return np.asarray(np.clip(ndtr(ndtri(uniform) @ self._factor), np.finfo(float).tiny, _BELOW_ONE))
+        return self.mixed(uniform, self._factor)
+
+    def mixed(
+        self, uniform: Float[np.ndarray, "*sample column"], factor: Float[np.ndarray, "*#sample source source"]
+    ) -> Float[np.ndarray, "*sample column"]:
+        """Return independent uniform numbers in (0, 1) made dependent by roots of the correlation.
+
+        Parameters
+        ----------
+        uniform
+            Independent uniform numbers [-].
+        factor
+            For every sample or for all, F with F·Fᵀ the `source_correlation` [-].
+
+        Notes
+        -----
+        A source that depends on no other keeps its numbers. The sums run source by source, so that no bit of a sample
+        depends on how many samples stand beside it, as it would in a library's product of matrices.
+        """
+        mixed = uniform.copy()
+        for block in self._correlated_blocks:
+            normal = [ndtri(uniform[..., self.columns_of_source[source]]) for source in block]
+            for source in block:
+                own = np.zeros_like(normal[0])
+                for other, numbers in zip(block, normal, strict=True):
+                    own += factor[..., source, other, np.newaxis] * numbers
+                mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), np.finfo(float).tiny, _BELOW_ONE)
+        return mixed
 
     def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
-        parts, start = [], 0
-        for source in self._varying:
-            own = uniform[:, start : start + len(source.columns)]
-            parts.append(source.standard_values(own))
-            start += len(source.columns)
-        return np.concatenate(parts, axis=1)
+        parts = zip(self._varying, self.columns_of_source, strict=True)
+        return np.concatenate([source.standard_values(uniform[:, own]) for source, own in parts], axis=1)
 
     def deviations(
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]

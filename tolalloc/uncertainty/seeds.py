@@ -41,9 +41,12 @@ class SeedTree:
         """Return a positive integer for libraries that take 0 as no seed at all."""
         return int(self.generator().integers(1, 2**31 - 1))
 
+    def uniform_chunk(self, index: int, columns: int) -> Float[np.ndarray, "sample column"]:
+        """Return one whole chunk of uniform numbers in (0, 1) [-]."""
+        # Zero would be an infinite normal deviate; the next float above it is not.
+        return np.maximum(self.generator(index).random((CHUNK, columns)), np.finfo(float).tiny)
+
     def uniform_chunks(self, samples: int, columns: int) -> Iterator[Float[np.ndarray, "sample column"]]:
         """Yield uniform numbers in (0, 1) chunk by chunk."""
         for index, start in enumerate(range(0, samples, CHUNK)):
-            chunk = self.generator(index).random((CHUNK, columns))
-            # Zero would be an infinite normal deviate; the next float above it is not.
-            yield np.maximum(chunk[: min(CHUNK, samples - start)], np.finfo(float).tiny)
+            yield self.uniform_chunk(index, columns)[: samples - start]
