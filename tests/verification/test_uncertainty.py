@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tolalloc.uncertainty.distributions import Distribution
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import CHUNK, SeedTree
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
 from tolalloc.uncertainty.unit_file import load_unit
-from tolalloc.uncertainty.zones import Distribution, Feature, at_limit, standard_values
+from tolalloc.uncertainty.zones import Feature
 
 SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
 CASES = [
@@ -19,6 +20,12 @@ CASES = [
     (Feature.PITCH, SPECTRUM, 6),
     (Feature.RUNOUT, ((1, 1.0),), 2),
 ]
+
+
+def source(feature: Feature, spectrum, **more) -> Source:
+    return Source(
+        name="s", part="", feature=feature, zone=4e-6, minimum=0.0, maximum=1.0, cost=1.0, spectrum=spectrum, **more
+    )
 
 
 def measure(feature: Feature, spectrum, columns: np.ndarray) -> np.ndarray:
@@ -36,7 +43,7 @@ def measure(feature: Feature, spectrum, columns: np.ndarray) -> np.ndarray:
 def test_9973_percent_lie_inside_the_zone_at_cp_1(feature, spectrum, columns, generator):
     count = 200_000
     uniform = generator.random((count, columns))
-    values = standard_values(feature, Distribution.NORMAL, 1.0, 0.0, spectrum, uniform)
+    values = source(feature, spectrum).standard_values(uniform)
     inside = (measure(feature, spectrum, values) <= 1).mean()
     # Three standard errors of the share; the range's quantile itself is integrated to about a tenth of a percent.
     assert inside == pytest.approx(0.9973, abs=3 * np.sqrt(0.0027 / count) + 1e-4 * (len(spectrum) > 1))
@@ -45,7 +52,7 @@ def test_9973_percent_lie_inside_the_zone_at_cp_1(feature, spectrum, columns, ge
 @pytest.mark.parametrize(("feature", "spectrum", "columns"), CASES)
 def test_uniform_magnitudes_stay_inside_the_zone(feature, spectrum, columns, generator):
     uniform = generator.random((5000, columns))
-    values = standard_values(feature, Distribution.UNIFORM, 1.0, 0.0, spectrum, uniform)
+    values = source(feature, spectrum, distribution=Distribution.UNIFORM).standard_values(uniform)
     inside = measure(feature, spectrum, values)
     assert inside.max() <= 1 + 1e-12
     assert inside.max() > 0.8
@@ -53,13 +60,13 @@ def test_uniform_magnitudes_stay_inside_the_zone(feature, spectrum, columns, gen
 
 @pytest.mark.parametrize(("feature", "spectrum", "columns"), CASES)
 def test_errors_at_the_limit_fill_the_zone(feature, spectrum, columns, generator):
-    values = at_limit(feature, spectrum, generator.random((200, columns)))
+    values = source(feature, spectrum).at_limit(generator.random((200, columns)))
     np.testing.assert_allclose(measure(feature, spectrum, values), 1.0, rtol=2e-3)
 
 
 def test_cp_and_shift(generator):
     uniform = generator.random((100_000, 1))
-    values = standard_values(Feature.SIZE, Distribution.NORMAL, 2.0, 0.5, (), uniform)[:, 0]
+    values = source(Feature.SIZE, (), cp=2.0, shift=0.5).standard_values(uniform)[:, 0]
     assert values.std() == pytest.approx(1 / 12, rel=0.01)
     assert values.mean() == pytest.approx(0.25, abs=3 / 12 / np.sqrt(values.size))
 
@@ -67,12 +74,12 @@ def test_cp_and_shift(generator):
 def test_baseline_zones_are_the_magnitudes_of_table_4():
     """A bore 2 µm off centre is a position of Ø 4 µm; a range over a turn is that of the printed harmonics."""
     unit = load_unit("table4").deviations
-    for source in load_tolerance_table("rv20e_baseline"):
-        if source.zone == 0:
+    for row in load_tolerance_table("rv20e_baseline"):
+        if row.zone == 0:
             continue
-        errors = np.array([[unit[column] for column in source.columns]])
-        printed = measure(source.feature, source.spectrum, errors)[0]
-        assert source.zone == pytest.approx(printed, abs=0.06e-6), source.name
+        errors = np.array([[unit[column] for column in row.columns]])
+        printed = measure(row.feature, row.spectrum, errors)[0]
+        assert row.zone == pytest.approx(printed, abs=0.06e-6), row.name
 
 
 def test_like_features_deviate_alone_and_angles_are_taken_over_a_length(generator):

@@ -10,14 +10,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.uncertainty.zones import (
-    Distribution,
-    Feature,
-    Spectrum,
-    at_limit,
-    standard_deviation_per_zone,
-    standard_values,
-)
+from tolalloc.uncertainty.distributions import Distribution
+from tolalloc.uncertainty.measured_parts import MeasuredParts
+from tolalloc.uncertainty.mixtures import DEVIATIONS, MAGNITUDES, Batch, Parameters
+from tolalloc.uncertainty.zones import Feature, Spectrum, ZoneMapping
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 ANGULAR = ("tilt", "phase", "rotation")
@@ -63,11 +59,25 @@ class Source:
     distribution
         Shape of the deviation inside the zone.
     cp
-        Process capability; at 1, 99.73 % of parts lie in the zone [-].
+        Process capability; at 1, 99.73 % of parts lie in the zone, or all where the distribution is bounded [-].
     shift
         Mean shift over half the zone, for sizes only [-].
+    shape
+        Shape of a lognormal or Weibull distribution [-].
+    batches
+        Batches of a mixture.
+    measured
+        Parts that an empirical distribution follows.
+    sorted
+        Whether parts outside the zone are sorted out before assembly.
+    process
+        Process whose capability the table names, carried through.
     spectrum
         Order → relative amplitude of pitch and run-out deviations [-].
+    teeth
+        Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-].
+    written_spectrum
+        The spectrum as the table writes it.
     each
         Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
     over
@@ -94,7 +104,14 @@ class Source:
     distribution: Distribution = Distribution.NORMAL
     cp: float = 1.0
     shift: float = 0.0
+    shape: float = 0.0
+    batches: tuple[Batch, ...] = ()
+    measured: MeasuredParts | None = None
+    sorted: bool = False
+    process: str = ""
     spectrum: Spectrum = ()
+    teeth: int = 0
+    written_spectrum: str = ""
     each: int = 1
     over: float = 0.0
     group: str = ""
@@ -117,32 +134,94 @@ class Source:
         """What divides a length inside the zone to give the column: 1, or the length that an angle is taken over."""
         return self.over or 1.0
 
+    @cached_property
+    def zone_mapping(self) -> ZoneMapping:
+        """Distribution of the columns per unit of zone."""
+        kinds = DEVIATIONS if self.feature is Feature.SIZE else MAGNITUDES
+        parameters = Parameters(
+            shape=self.shape,
+            batches=self.batches,
+            measured=self.measured.relative if self.measured else np.empty(0),
+        )
+        return ZoneMapping(
+            feature=self.feature,
+            distribution=self.distribution,
+            base=kinds[self.distribution](parameters),
+            cp=self.cp,
+            shift=self.shift,
+            spectrum=self.spectrum,
+            teeth=self.teeth,
+            sorted=self.sorted,
+        )
+
     def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return the columns per unit of zone for independent uniform numbers in (0, 1)."""
         own = uniform.reshape(uniform.shape[0] * self.each, -1)
-        values = standard_values(self.feature, self.distribution, self.cp, self.shift, self.spectrum, own)
-        return np.asarray(values.reshape(uniform.shape) / self.lever)
+        return np.asarray(self.zone_mapping.standard_values(own).reshape(uniform.shape) / self.lever)
 
     def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return columns per unit of zone that fill the zone exactly, for independent uniform numbers in (0, 1)."""
         own = uniform.reshape(uniform.shape[0] * self.each, -1)
-        return np.asarray(at_limit(self.feature, self.spectrum, own).reshape(uniform.shape) / self.lever)
+        return np.asarray(self.zone_mapping.at_limit(own).reshape(uniform.shape) / self.lever)
 
     @property
     def mapping(self) -> str:
         """Sentence that says how the zone became a distribution."""
-        zone = self.zone / MICROMETRE
-        reading = f"{zone:.3g} µm, {self.feature.zone_meaning}"
+        reading = f"{self.zone / MICROMETRE:.3g} µm, {self.feature.zone_meaning}"
+        if self.teeth:
+            reading += f", taken at {self.teeth} teeth"
         if self.over:
             reading += f" over a length of {self.over / MILLIMETRE:g} mm"
         if self.each > 1:
             reading += f", each of {self.each} on its own"
-        if self.distribution is Distribution.UNIFORM:
-            return f"{reading}: uniform magnitude up to the zone, any phase"
-        deviation = standard_deviation_per_zone(self.feature, self.cp, self.spectrum) * zone
-        shift = f", mean shifted by {self.shift * zone / 2:.3g} µm" if self.shift else ""
+        is_normal = self.distribution is Distribution.NORMAL and not self.sorted
+        process = f"; process {self.process}" if self.process else ""
+        return f"{reading}: {self._normal if is_normal else self._other}{process}"
+
+    @property
+    def _normal(self) -> str:
+        """What the zone became, where it became normal numbers."""
+        deviation = self.zone_mapping.wave_deviation * self.zone / MICROMETRE
+        if self.teeth:
+            return f"normal, σ = {deviation:.3g} µm per unit of the spectrum {self.written_spectrum} at Cp {self.cp:g}"
         if self.spectrum:
             waves = ", ".join(f"{deviation * amplitude:.3g} (order {order})" for order, amplitude in self.spectrum)
-            return f"{reading}: normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
-        axes = " on each axis" if self.feature is Feature.POSITION else ""
-        return f"{reading}: normal, σ = {deviation:.3g} µm{axes} at Cp {self.cp:g}{shift}"
+            return f"normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
+        if self.feature is Feature.POSITION:
+            return f"normal, σ = {deviation:.3g} µm on each axis at Cp {self.cp:g}"
+        shift = f", mean shifted by {self.shift * self.zone / MICROMETRE / 2:.3g} µm" if self.shift else ""
+        return f"normal, σ = {deviation:.3g} µm at Cp {self.cp:g}{shift}"
+
+    @property
+    def _other(self) -> str:
+        """What the zone became, where it became anything else."""
+        mean, deviation = (number * self.zone / MICROMETRE for number in self.zone_mapping.moments)
+        if self.feature is Feature.SIZE:
+            spread = f"{self._kind}, mean {mean:+.3g} µm off the middle, σ = {deviation:.3g} µm"
+        elif self.feature is Feature.POSITION:
+            spread = f"radius {self._kind}, mean {mean:.3g} µm, σ = {deviation:.3g} µm, any phase"
+        else:
+            waves = ", ".join(
+                f"{mean * amplitude:.3g} ± {deviation * amplitude:.3g} (order {order})"
+                for order, amplitude in self.spectrum
+            )
+            spread = f"amplitude of every order {self._kind}, mean ± σ = {waves} µm, any phase"
+        if self.distribution is not Distribution.EMPIRICAL:
+            spread += f", at Cp {self.cp:g}"
+        if len(self.spectrum) > 1:
+            return spread
+        inside = 100.0 * self.zone_mapping.inside
+        kept = f", the other {100.0 - inside:.2g} % sorted out" if self.sorted else ""
+        return f"{spread}, {inside:.4g} % of all parts inside the zone{kept}"
+
+    @property
+    def _kind(self) -> str:
+        """The distribution with its parameters."""
+        if self.measured:
+            return self.measured.sentence
+        if self.batches:
+            return "mixture of batches " + ", ".join(
+                f"{batch.weight:g} of all with shift {batch.shift:g} and spread {batch.spread:g}"
+                for batch in self.batches
+            )
+        return f"{self.distribution.value}, shape {self.shape:g}" if self.shape else self.distribution.value

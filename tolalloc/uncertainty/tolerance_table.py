@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
 import pandas as pd
-from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record, shipped_or_path, validated
-from tolalloc.uncertainty.sources import ANGULAR, Source
+from tolalloc.files import shipped_or_path, validated
+from tolalloc.uncertainty.process_capability import load_process_capabilities, with_process
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_cells import batches_text, spectrum_text, typed_cells
+from tolalloc.uncertainty.tolerance_row import ToleranceRow
 from tolalloc.uncertainty.unit_file import DATA
-from tolalloc.uncertainty.zones import Distribution, Feature, Spectrum
+from tolalloc.uncertainty.zones import Feature
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
-LARGEST_ZONE = 200.0
-"""Largest zone that is believed [µm]; a metre typed for a millimetre is far above it."""
+SMALLEST_KEPT = 0.01
+"""Smallest share that sorting may leave of all parts [-]."""
 
-UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
 HEADERS = {
     "id": "id",
     "part": "part",
@@ -34,6 +33,12 @@ HEADERS = {
     "distribution": "distribution",
     "Cp": "Cp [-]",
     "shift": "shift [half zone]",
+    "shape": "shape [-]",
+    "batches": "batches [weight:shift:spread]",
+    "measured": "measured",
+    "measured_zone": "measured_zone [unit]",
+    "sorted": "sorted",
+    "process": "process",
     "group": "group",
     "locked": "locked",
     "min": "min [unit]",
@@ -48,95 +53,15 @@ HEADERS = {
 REQUIRED = ("id", "part", "feature", "plus", "minus", "unit", "min", "max", "cost")
 
 
-class ToleranceRow(Record):
-    """One row; the fields are the column headers without their unit."""
-
-    id: Annotated[str, Field(min_length=1)]
-    part: Annotated[str, Field(min_length=1)]
-    feature: Feature
-    nominal: float = 0.0
-    plus: float
-    minus: float
-    unit: Annotated[str, Field(pattern="^(µm|um|mm)$")]
-    distribution: Distribution = Distribution.NORMAL
-    Cp: Annotated[float, Field(ge=0.1, le=10)] = 1.0
-    shift: Annotated[float, Field(ge=-1, le=1)] = 0.0
-    group: str = ""
-    locked: bool = False
-    min: Annotated[float, Field(ge=0)]
-    max: Annotated[float, Field(ge=0)]
-    cost: Annotated[float, Field(ge=0, le=1e9)]
-    grade: str = ""
-    spectrum: str = ""
-    each: Annotated[int, Field(ge=1, le=1000)] = 1
-    over: Annotated[float, Field(gt=0, le=1000)] | None = None
-    note: str = ""
-
-    @model_validator(mode="after")
-    def _zone_makes_sense(self) -> ToleranceRow:
-        zone, factor = self.plus - self.minus, UNITS[self.unit]
-        if not 0 <= zone * factor <= LARGEST_ZONE:
-            raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
-        if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
-            raise ValueError(f"minus and shift must be 0 for feature {self.feature.value}, whose zone is plus")
-        if zone > 0 and not self.locked and not 0 < self.min <= zone <= self.max <= LARGEST_ZONE / factor:
-            raise ValueError(
-                f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:g} µm: "
-                f"min {self.min:g}, zone {zone:g}, max {self.max:g} {self.unit}"
-            )
-        if zone > 0 and not self.locked and self.cost == 0:
-            raise ValueError("the cost must be above 0 for a zone that allocation may change; or lock it")
-        angular = self.id.rsplit(".", 1)[-1] in ANGULAR
-        if angular != (self.over is not None):
-            raise ValueError(
-                f"{self.id} {'is an angle and needs' if angular else 'is a length and has no'} over, the length in mm "
-                "over which the zone limits it"
-            )
-        needs_spectrum = self.feature in (Feature.PITCH, Feature.RUNOUT)
-        if needs_spectrum != bool(self.parsed_spectrum):
-            raise ValueError(
-                f"feature {self.feature.value} {'needs' if needs_spectrum else 'has no'} spectrum such as '1:9.2 2:4.3'"
-            )
-        if needs_spectrum and self.each > 1:
-            raise ValueError("each must be 1 for a feature with a spectrum; single teeth are sources of feature size")
-        return self
-
-    @property
-    def parsed_spectrum(self) -> Spectrum:
-        """The spectrum as numbers."""
-        pairs = [re.fullmatch(r"(\d+):(\d+\.?\d*)", item) for item in self.spectrum.split()]
-        if any(pair is None for pair in pairs):
-            raise ValueError("the spectrum must read like '1:9.2 2:4.3 4:1.0' (order:amplitude)")
-        return tuple((int(pair[1]), float(pair[2])) for pair in pairs if pair)
-
-    def source(self) -> Source:
-        """Return the source in SI units."""
-        factor = UNITS[self.unit] * MICROMETRE
-        return Source(
-            name=self.id,
-            part=self.part,
-            feature=self.feature,
-            zone=(self.plus - self.minus) * factor,
-            middle=(self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0,
-            nominal=self.nominal * MILLIMETRE,
-            minimum=self.min * factor,
-            maximum=self.max * factor,
-            cost=self.cost,
-            distribution=self.distribution,
-            cp=self.Cp,
-            shift=self.shift,
-            spectrum=self.parsed_spectrum,
-            each=self.each,
-            over=(self.over or 0.0) * MILLIMETRE,
-            group=self.group or self.id,
-            locked=self.locked,
-            grade=self.grade,
-            note=self.note,
-        )
-
-
-def load_tolerance_table(name: str | Path) -> tuple[Source, ...]:
+def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic") -> tuple[Source, ...]:
     """Return the sources of a tolerance table by shipped name or from the user's CSV or XLSX file.
+
+    Parameters
+    ----------
+    name
+        Shipped name, or path of the table.
+    capabilities
+        Shipped name, or path of the process capability library that the table's processes are looked up in.
 
     Raises
     ------
@@ -147,15 +72,20 @@ def load_tolerance_table(name: str | Path) -> tuple[Source, ...]:
     frame = _read(path)
     if frame.empty:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    sources = []
+    processes = load_process_capabilities(capabilities)
+    sources: dict[str, Source] = {}
     for number, row in enumerate(frame.to_dict("records"), start=2):
         identity = str(row.get("id", "")).strip()
         place = f"{path}, row {number} ({identity or 'no id'})"
-        cells = {str(key): _cell(str(key), value, place) for key, value in row.items() if str(value).strip() != ""}
-        sources.append(validated(ToleranceRow, cells, place).source())
-        if identity in {source.name for source in sources[:-1]}:
+        cells = typed_cells(ToleranceRow, {str(key): str(value) for key, value in row.items()}, place)
+        source = validated(ToleranceRow, with_process(cells, processes, place), place).source(path.parent)
+        if identity in sources:
             raise InputError(f"{place}: id is {identity!r} for the second time; each source has one row.")
-    return tuple(sources)
+        if source.sorted and source.zone_mapping.inside < SMALLEST_KEPT:
+            left = f"no, as it would leave less than {SMALLEST_KEPT:.0%} of all parts"
+            raise InputError.at(place, "sorted", "yes", left)
+        sources[identity] = source
+    return tuple(sources.values())
 
 
 def _read(path: Path) -> pd.DataFrame:
@@ -186,32 +116,6 @@ def _read(path: Path) -> pd.DataFrame:
     return frame.fillna("")
 
 
-def _cell(header: str, text: str, place: str) -> object:
-    """Return a cell as the type that its column asks for."""
-    value = str(text).strip()
-    annotation = ToleranceRow.model_fields[header].annotation
-    if header == "each":
-        if not value.isdecimal():
-            raise InputError.at(place, header, value, "a whole number, 1 or more")
-        return int(value)
-    if annotation is bool:
-        answers = {"yes": True, "no": False, "true": True, "false": False}
-        if value.lower() not in answers:
-            raise InputError.at(place, header, value, "yes or no")
-        return answers[value.lower()]
-    if annotation is float or header == "over":
-        try:
-            return float(value)
-        except ValueError:
-            raise InputError.at(place, header, value, "a number with a decimal point") from None
-    if header in ("feature", "distribution"):
-        kinds: type[Feature] | type[Distribution] = Feature if header == "feature" else Distribution
-        if value not in list(kinds):
-            raise InputError.at(place, header, value, "one of " + ", ".join(kinds))
-        return kinds(value)
-    return value
-
-
 def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
     """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
     rows = []
@@ -230,13 +134,19 @@ def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
                 "distribution": source.distribution.value,
                 "Cp": source.cp,
                 "shift": source.shift,
+                "shape": source.shape or "",
+                "batches": batches_text(source.batches),
+                "measured": source.measured.path.as_posix() if source.measured else "",
+                "measured_zone": source.measured.zone / MICROMETRE if source.measured else "",
+                "sorted": "yes" if source.sorted else "no",
+                "process": source.process,
                 "group": source.group,
                 "locked": "yes" if source.locked else "no",
                 "min": round(source.minimum / MICROMETRE, 4),
                 "max": round(source.maximum / MICROMETRE, 4),
                 "cost": round(source.cost, 6),
                 "grade": source.grade,
-                "spectrum": " ".join(f"{order}:{amplitude:g}" for order, amplitude in source.spectrum),
+                "spectrum": source.written_spectrum or spectrum_text(source.spectrum),
                 "each": source.each,
                 "over": source.over / MILLIMETRE if source.over else "",
                 "note": source.note,

@@ -1,22 +1,22 @@
 """From a drawing's zone to the distribution of the columns: the one place where that mapping stands.
 
 The measure that the drawing limits (deviation, radius, total deviation over a turn) lies inside the zone
-for 99.73 % of parts at Cp = 1, whatever the feature; a Cp of 1.33 divides the spread by 1.33.
+for 99.73 % of parts at Cp = 1, whatever the feature, and for all parts where the distribution ends there; a Cp of 1.33
+divides the spread by 1.33.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
-from math import log, sqrt
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-INSIDE_AT_CP_1 = 0.9973
-_RADIUS_QUANTILE = sqrt(-2.0 * log(1.0 - INSIDE_AT_CP_1))
+from tolalloc.uncertainty.distributions import INSIDE_AT_CP_1, RAYLEIGH, Distribution, Marginal, Placed, Sorted, moments
 
 Spectrum = tuple[tuple[int, float], ...]
 """Order of the turn and relative amplitude, one pair per harmonic."""
@@ -41,101 +41,148 @@ class Feature(StrEnum):
         }[self]
 
 
-class Distribution(StrEnum):
-    """Shape of the deviation inside its zone."""
-
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-
-
 @lru_cache(maxsize=64)
-def harmonic_range_quantile(spectrum: Spectrum) -> float:
+def harmonic_range_quantile(spectrum: Spectrum, teeth: int = 0, base: Marginal = RAYLEIGH) -> float:
     """Return the 99.73 % quantile of the range over a turn of random harmonics of this spectrum.
 
     Parameters
     ----------
     spectrum
-        Each order's cosine and sine amplitudes are normal with its relative amplitude as σ [-].
+        Order → relative amplitude; an order's wave is this times a random amplitude, at any phase [-].
+    teeth
+        Number of teeth on which the range is taken; 0: over the whole turn [-].
+    base
+        Distribution of the random amplitude of every order.
 
     Notes
     -----
-    One order has the closed form 2·3.44·σ; several are integrated over 2¹⁴ points of a fixed Sobol sequence.
+    One order has a closed form; several are integrated over a fixed Sobol sequence, of 2¹⁴ points or, where the range
+    is taken over few teeth, 2¹⁵. Its standard error is below a hundredth of the quantile.
     """
-    if len(spectrum) == 1:
-        return 2.0 * _RADIUS_QUANTILE * spectrum[0][1]
-    waves = ndtri(qmc.Sobol(2 * len(spectrum), rng=np.random.default_rng(1)).random_base2(14))
+    if len(spectrum) == 1 and not teeth:
+        return 2.0 * base.reach * spectrum[0][1]
+    uniform = qmc.Sobol(2 * len(spectrum), rng=np.random.default_rng(1)).random_base2(15 if teeth else 14)
+    turn = _waves_over_turn(spectrum, teeth)
+    columns = ndtri(uniform) if base == RAYLEIGH else _vectors(base.quantile(uniform[:, 0::2]), uniform[:, 1::2])
     weights = np.repeat([amplitude for _, amplitude in spectrum], 2)
-    return float(np.quantile(np.ptp((waves * weights) @ _waves_over_turn(spectrum), axis=1), INSIDE_AT_CP_1))
+    ranges = [np.ptp((part * weights) @ turn, axis=1) for part in np.split(columns, columns.shape[0] // 2048)]
+    return float(np.quantile(np.concatenate(ranges), INSIDE_AT_CP_1))
 
 
-def _waves_over_turn(spectrum: Spectrum) -> Float[np.ndarray, "column point"]:
-    """Return the cosine and sine of every order on fine points of one turn."""
-    points = 96 * max(order for order, _ in spectrum)
+def _waves_over_turn(spectrum: Spectrum, teeth: int) -> Float[np.ndarray, "column point"]:
+    """Return the cosine and sine of every order at every tooth or on fine points of one turn."""
+    points = teeth or 96 * max(order for order, _ in spectrum)
     turn = 2 * np.pi * np.arange(points) / points
     return np.concatenate([np.stack([np.cos(order * turn), np.sin(order * turn)]) for order, _ in spectrum])
 
 
-def standard_deviation_per_zone(feature: Feature, cp: float, spectrum: Spectrum) -> float:
-    """Return σ of a normal deviation over the zone; for harmonics, per unit of relative amplitude [-]."""
-    if feature is Feature.SIZE:
-        return 1.0 / (6.0 * cp)
-    if feature is Feature.POSITION:
-        return 1.0 / (2.0 * _RADIUS_QUANTILE * cp)
-    return 1.0 / (harmonic_range_quantile(spectrum) * cp)
-
-
-def standard_values(
-    feature: Feature,
-    distribution: Distribution,
-    cp: float,
-    shift: float,
-    spectrum: Spectrum,
-    uniform: Float[np.ndarray, "sample column"],
+def _vectors(
+    magnitude: Float[np.ndarray, "sample vector"], uniform: Float[np.ndarray, "sample vector"]
 ) -> Float[np.ndarray, "sample column"]:
-    """Return the columns' deviations per unit of zone for uniform random numbers in (0, 1).
+    """Return both components of vectors at any phase."""
+    phase = 2 * np.pi * uniform
+    pairs = np.stack([magnitude * np.cos(phase), magnitude * np.sin(phase)], axis=-1)
+    return pairs.reshape(uniform.shape[0], -1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZoneMapping:
+    """Distribution of a source's columns per unit of zone.
 
     Parameters
     ----------
-    feature, distribution, cp, shift, spectrum
-        As in `tolalloc.uncertainty.sources.Source`.
-    uniform
-        Independent uniform numbers, as many as the source has columns [-].
+    feature, distribution, cp, shift, spectrum, teeth, sorted
+        As in `tolalloc.uncertainty.sources.Source` [-].
+    base
+        The distribution with its parameters.
 
     Notes
     -----
-    Uniform distribution: a size anywhere in its zone; for vectors and harmonics the magnitude anywhere up to
-    the largest that the zone admits, at any phase.
+    A size spreads around the middle of its zone; a one-sided distribution starts at the lower limit. The radius of a
+    position and the amplitudes of harmonics start at zero, at any phase. Bounded amplitudes of several orders fill the
+    zone where all orders are at their largest.
     """
-    if distribution is Distribution.NORMAL:
-        weights = np.repeat([amplitude for _, amplitude in spectrum], 2) if spectrum else np.ones(1)
-        scale = standard_deviation_per_zone(feature, cp, spectrum) * weights
-        return np.asarray(ndtri(uniform) * scale + shift / 2.0)
-    if feature is Feature.SIZE:
-        return uniform - 0.5 + shift / 2.0
-    amplitudes = np.array([amplitude for _, amplitude in spectrum]) if spectrum else np.ones(1)
-    magnitude = uniform[:, 0::2] * amplitudes / (2.0 * amplitudes.sum())
-    phase = 2 * np.pi * uniform[:, 1::2]
-    return np.stack([magnitude * np.cos(phase), magnitude * np.sin(phase)], axis=-1).reshape(uniform.shape)
 
+    feature: Feature
+    distribution: Distribution
+    base: Marginal
+    cp: float
+    shift: float
+    spectrum: Spectrum
+    teeth: int
+    sorted: bool
 
-def at_limit(
-    feature: Feature, spectrum: Spectrum, uniform: Float[np.ndarray, "sample column"]
-) -> Float[np.ndarray, "sample column"]:
-    """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases.
+    @cached_property
+    def amplitudes(self) -> Float[np.ndarray, " order"]:
+        """Relative amplitudes; a position is one vector of amplitude 1 [-]."""
+        return np.array([amplitude for _, amplitude in self.spectrum]) if self.spectrum else np.ones(1)
 
-    Parameters
-    ----------
-    feature, spectrum
-        As in `tolalloc.uncertainty.sources.Source`.
-    uniform
-        Independent uniform numbers, as many as the source has columns [-].
-    """
-    if feature is Feature.SIZE:
-        return np.where(uniform < 0.5, -0.5, 0.5)
-    phase = 2 * np.pi * uniform[:, 0::2]
-    waves = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
-    if feature is Feature.POSITION:
-        return np.asarray(0.5 * waves.reshape(uniform.shape))
-    waves *= np.array([amplitude for _, amplitude in spectrum])[:, np.newaxis]
-    columns = waves.reshape(uniform.shape)
-    return np.asarray(columns / np.ptp(columns @ _waves_over_turn(spectrum), axis=1)[:, np.newaxis])
+    @cached_property
+    def extent(self) -> float:
+        """Diameter or range that is as large as the zone at Cp = 1 [unit of the base]."""
+        if self.distribution.is_bounded or not self.spectrum:
+            return 2.0 * float(self.amplitudes.sum()) * self.base.reach
+        return harmonic_range_quantile(self.spectrum, self.teeth, self.base)
+
+    @cached_property
+    def unsorted(self) -> Marginal:
+        """Deviation [half zone], or magnitude [unit of the base], before parts are sorted out."""
+        if self.feature is not Feature.SIZE:
+            return self.base
+        if self.distribution.is_one_sided:
+            return Placed(self.base, self.shift - 1.0, 2.0 / (self.base.reach * self.cp))
+        return Placed(self.base, self.shift, 1.0 / (self.base.reach * self.cp))
+
+    @cached_property
+    def marginal(self) -> Marginal:
+        """Deviation [half zone], or magnitude [unit of the base]."""
+        return Sorted(self.unsorted, *self.limits) if self.sorted else self.unsorted
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Where the zone ends [unit of the marginal]."""
+        return (-1.0, 1.0) if self.feature is Feature.SIZE else (0.0, self.base.reach * self.cp)
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """Mean and standard deviation of the deviation from the middle, or of the magnitude, per unit of zone [-]."""
+        mean, deviation = moments(self.marginal)
+        unit = 2.0 if self.feature is Feature.SIZE else self.extent * self.cp
+        return mean / unit, deviation / unit
+
+    @property
+    def inside(self) -> float:
+        """Share of parts inside the zone before any are sorted out, for sizes and single vectors [-]."""
+        low, high = self.unsorted.probability(np.array(self.limits))
+        return float(high - low) if self.feature is Feature.SIZE else float(high)
+
+    @property
+    def wave_deviation(self) -> float:
+        """σ of a component of a normal vector per unit of relative amplitude and of zone [-]."""
+        return 1.0 / (self.extent * self.cp)
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return the columns' deviations per unit of zone for independent uniform numbers in (0, 1)."""
+        if self.feature is Feature.SIZE:
+            return np.asarray(self.marginal.quantile(uniform) / 2.0)
+        if self.marginal == RAYLEIGH:  # a normal number on each axis is the same, and needs no phase
+            return np.asarray(ndtri(uniform) * (self.wave_deviation * np.repeat(self.amplitudes, 2)))
+        magnitude = self.marginal.quantile(uniform[:, 0::2]) * self.amplitudes / (self.extent * self.cp)
+        return _vectors(magnitude, uniform[:, 1::2])
+
+    def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases.
+
+        Parameters
+        ----------
+        uniform
+            Independent uniform numbers, as many as the source has columns [-].
+        """
+        if self.feature is Feature.SIZE:
+            return np.where(uniform < 0.5, -0.5, 0.5)
+        if self.feature is Feature.POSITION:
+            return _vectors(np.full(uniform[:, 0::2].shape, 0.5), uniform[:, 0::2])
+        columns = _vectors(np.broadcast_to(self.amplitudes, uniform[:, 0::2].shape), uniform[:, 0::2])
+        return np.asarray(
+            columns / np.ptp(columns @ _waves_over_turn(self.spectrum, self.teeth), axis=1)[:, np.newaxis]
+        )

@@ -1,0 +1,402 @@
+"""Every distribution in every feature: share inside the zone, printed moments, sorting, measured parts, teeth."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from tolalloc.exceptions import InputError, TolallocError
+from tolalloc.uncertainty.distributions import Distribution
+from tolalloc.uncertainty.measured_parts import MeasuredParts
+from tolalloc.uncertainty.mixtures import Batch
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_cells import parsed_spectrum
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
+from tolalloc.uncertainty.zones import Feature, harmonic_range_quantile
+
+SAMPLES = 100_000
+ZONE = 4e-6
+ONE, THREE = ((2, 1.5),), ((1, 9.2), (2, 4.3), (4, 1.0))
+KINDS = {
+    "normal": {},
+    "uniform": {"distribution": Distribution.UNIFORM},
+    "triangular": {"distribution": Distribution.TRIANGULAR},
+    "lognormal": {"distribution": Distribution.LOGNORMAL, "shape": 0.5},
+    "weibull": {"distribution": Distribution.WEIBULL, "shape": 1.5},
+    "mixture": {"distribution": Distribution.MIXTURE},
+    "empirical": {"distribution": Distribution.EMPIRICAL},
+}
+SHIFTED = (Batch(weight=7.0, shift=-0.3, spread=0.8), Batch(weight=3.0, shift=0.5, spread=0.6))
+CENTRED = (Batch(weight=0.7, shift=0.0, spread=0.6), Batch(weight=0.3, shift=0.0, spread=1.2))
+PARTS = 0.5e-6 + 0.6e-6 * stats.weibull_min(2.5).ppf((np.arange(60) + 0.5) / 60)
+SPECTRA = {Feature.SIZE: (), Feature.POSITION: (), Feature.PITCH: THREE, Feature.RUNOUT: ONE}
+CASES = [
+    (kind, feature)
+    for kind in KINDS
+    for feature in SPECTRA
+    if not (kind == "empirical" and SPECTRA[feature]) and not (kind == "mixture" and feature is Feature.PITCH)
+]
+
+
+def source(kind: str, feature: Feature, **more) -> Source:
+    parameters = dict(KINDS[kind])
+    if kind == "mixture":
+        parameters["batches"] = SHIFTED if feature is Feature.SIZE else CENTRED
+    if kind == "empirical":
+        parameters["measured"] = MeasuredParts(
+            path=Path("parts.csv"),
+            values=tuple(PARTS.tolist()),
+            are_radii=feature is not Feature.SIZE,
+            zone=ZONE,
+            middle=0.0,
+        )
+    return Source(
+        name="s",
+        part="",
+        feature=feature,
+        zone=ZONE,
+        minimum=0.0,
+        maximum=1.0,
+        cost=1.0,
+        **{"spectrum": SPECTRA[feature], **parameters, **more},
+    )
+
+
+def limited(of: Source, columns: np.ndarray) -> np.ndarray:
+    """Return what the drawing limits, over the zone: 1 is just inside."""
+    if of.feature is Feature.SIZE:
+        return 2 * np.abs(columns[:, 0])
+    radius = np.hypot(columns[:, 0::2], columns[:, 1::2])
+    if len(of.spectrum) < 2:
+        return 2 * radius[:, 0]
+    turn = 2 * np.pi * np.arange(360) / 360
+    waves = np.concatenate([[np.cos(order * turn), np.sin(order * turn)] for order, _ in of.spectrum])
+    return np.ptp(columns @ waves, axis=1)
+
+
+def mixture_share() -> float:
+    """Return the share of the shifted batches inside the zone."""
+    return sum(
+        batch.weight / 10 * np.diff(stats.norm(batch.shift, batch.spread / 3).cdf([-1, 1]))[0] for batch in SHIFTED
+    )
+
+
+def rayleigh_share() -> float:
+    """Return the share of the centred batches inside the zone."""
+    return sum(batch.weight * (1 - 0.0027 ** (1 / batch.spread**2)) for batch in CENTRED)
+
+
+@pytest.mark.parametrize(("kind", "feature"), CASES)
+def test_share_inside_the_zone_at_cp_1(kind, feature, generator):
+    own = source(kind, feature)
+    inside = (limited(own, own.standard_values(generator.random((SAMPLES, len(own.columns))))) <= 1 + 1e-12).mean()
+    share = {"uniform": 1.0, "triangular": 1.0}.get(kind, 0.9973)
+    if kind == "mixture":
+        share = mixture_share() if feature is Feature.SIZE else rayleigh_share()
+    if kind == "empirical":
+        share = own.zone_mapping.inside
+    # Four standard errors; ranges of several orders are integrated over 2¹⁴ points, with four errors of their own.
+    integrated = 4 * np.sqrt(0.0027 / 2**14) * (len(own.spectrum) > 1)
+    assert inside == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / SAMPLES) + integrated)
+    if len(own.spectrum) < 2:
+        assert own.zone_mapping.inside == pytest.approx(share, abs=2e-5)
+
+
+@pytest.mark.parametrize(("kind", "feature"), CASES)
+@pytest.mark.parametrize("sorting", [False, True])
+def test_printed_mean_and_deviation_are_the_sampled_ones(kind, feature, sorting, generator):
+    if sorting and feature is Feature.PITCH:
+        return
+    spread = {} if kind in ("mixture", "empirical") else {"cp": 0.8}
+    shift = {"shift": 0.2} if feature is Feature.SIZE and spread else {}
+    own = source(kind, feature, sorted=sorting, **spread, **shift)
+    columns = ZONE * 1e6 * own.standard_values(generator.random((SAMPLES, len(own.columns))))
+    if feature is Feature.SIZE or (kind == "normal" and not sorting):
+        sampled = columns[:, 0]
+    else:
+        sampled = np.hypot(columns[:, 0], columns[:, 1])
+    number = r"([-+]?\d[\d.]*(?:e-?\d+)?)"
+    sentence = own.mapping
+    deviation = re.search(rf"σ = {number}", sentence)
+    mean = re.search(rf"mean {number} µm|shifted by {number}", sentence)
+    if waves := re.search(rf"mean ± σ = {number} ± {number}", sentence):
+        printed = float(waves[1]), float(waves[2])
+    else:
+        printed = float(mean[1] or mean[2]) if mean else 0.0, float(deviation[1])
+    # Four standard errors, and the rounding to three digits.
+    error = sampled.std() / np.sqrt(SAMPLES)
+    assert sampled.mean() == pytest.approx(printed[0], abs=4 * error + 5e-3 * abs(printed[0]) + 1e-9)
+    variance_error = np.sqrt(stats.kurtosis(sampled, fisher=False) - 1) / 2 * error
+    assert sampled.std() == pytest.approx(printed[1], abs=4 * variance_error + 5e-3 * printed[1])
+
+
+@pytest.mark.parametrize(("kind", "feature"), [case for case in CASES if case[1] is not Feature.PITCH])
+def test_sorted_keeps_everything_inside_and_the_distribution_there(kind, feature, generator):
+    spread = {} if kind in ("mixture", "empirical") else {"cp": 0.5}
+    plain, own = source(kind, feature, **spread), source(kind, feature, sorted=True, **spread)
+    uniform = generator.random((20_000, len(own.columns)))
+    kept, before = limited(own, own.standard_values(uniform)), limited(plain, plain.standard_values(uniform))
+    assert kept.max() <= 1 + 1e-12
+    below = before[before <= 1]
+    # Rejected parts leave the same distribution; 1e-4 is about four standard errors.
+    assert stats.ks_2samp(kept, below).pvalue > 1e-4
+    assert own.zone_mapping.inside == pytest.approx(below.size / 20_000, abs=4 * 0.5 / np.sqrt(20_000))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("feature", [Feature.SIZE, Feature.POSITION])
+@pytest.mark.parametrize("sorting", [False, True])
+def test_quantiles_rise_and_meet_their_probabilities(kind, feature, sorting):
+    marginal = source(kind, feature, sorted=sorting).zone_mapping.marginal
+    tails = 10.0 ** -np.arange(1, 16)
+    probability = np.sort(np.concatenate([[5e-324], tails, np.linspace(0.001, 0.999, 999), 1 - tails, [1 - 2**-53]]))
+    values = marginal.quantile(probability)
+    assert np.isfinite(values).all()
+    assert (np.diff(values) >= 0).all()
+    middle = slice(15, -15)
+    np.testing.assert_allclose(marginal.probability(values[middle]), probability[middle], atol=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "feature"), CASES)
+def test_samples_do_not_depend_on_what_they_are_computed_with(kind, feature, generator):
+    own = source(kind, feature)
+    uniform = generator.random((1001, len(own.columns)))
+    parts = [own.standard_values(part) for part in np.split(uniform, [1, 4, 517, 1000])]
+    np.testing.assert_array_equal(np.concatenate(parts), own.standard_values(uniform))
+
+
+def test_narrow_batches_far_apart_keep_their_shares():
+    batches = (Batch(weight=0.25, shift=-1.5, spread=0.01), Batch(weight=0.75, shift=1.0, spread=2.0))
+    own = replace(source("mixture", Feature.SIZE), batches=batches).zone_mapping.marginal
+    values = np.linspace(-3, 3, 1001)
+    exact = sum(batch.weight * stats.norm(batch.shift, batch.spread / 3).cdf(values) for batch in batches)
+    np.testing.assert_allclose(own.probability(values), exact, atol=1e-5)
+
+
+@pytest.mark.parametrize("feature", [Feature.SIZE, Feature.POSITION])
+def test_smoothed_parts_keep_the_mean_square_and_follow_the_parts(feature, generator):
+    own = source("empirical", feature)
+    columns = own.standard_values(generator.random((SAMPLES, len(own.columns)))) * ZONE
+    values = columns[:, 0] if feature is Feature.SIZE else np.hypot(*columns.T)
+    square_error = (values**2).std() / np.sqrt(SAMPLES)
+    assert (values**2).mean() == pytest.approx((PARTS**2).mean(), abs=4 * square_error)
+    assert stats.kstest(PARTS, np.sort(values)).statistic < 0.06
+    assert values.max() > PARTS.max()
+
+
+def test_the_fit_finds_the_distribution_that_the_parts_came_from(generator):
+    def fitted(values, are_radii=False):
+        return MeasuredParts(
+            path=Path("parts.csv"),
+            values=tuple(values.tolist()),
+            are_radii=are_radii,
+            zone=12e-6,
+            middle=0.0,
+        ).fit
+
+    normal = fitted(1e-6 * generator.standard_normal(2000) + 1e-6)
+    assert normal.best.distribution is Distribution.NORMAL
+    # σ and the mean of 2000 parts, four standard errors.
+    assert normal.cp == pytest.approx(2.0, abs=4 * 2.0 / np.sqrt(4000))
+    assert normal.cpk == pytest.approx(5 / 3, abs=4 * (5 / 3 / np.sqrt(4000) + 1 / 3 / np.sqrt(2000)))
+    weibull = fitted(2e-6 * generator.weibull(1.5, 2000) - 6e-6)
+    assert weibull.best.distribution is Distribution.WEIBULL
+    assert weibull.best.shape == pytest.approx(1.5, abs=4 * 0.78 * 1.5 / np.sqrt(2000))
+    lognormal = fitted(2e-6 * generator.lognormal(0.0, 0.4, 2000) - 6e-6)
+    assert lognormal.best.distribution is Distribution.LOGNORMAL
+    assert lognormal.best.shape == pytest.approx(0.4, abs=4 * 0.4 / np.sqrt(4000))
+    assert lognormal.best.scale == pytest.approx(2e-6, rel=4 * 0.4 / np.sqrt(2000))
+    assert [fit.aic for fit in lognormal.fits] == sorted(fit.aic for fit in lognormal.fits)
+    assert max(fit.fits[0].distance for fit in (normal, weibull, lognormal)) < 1.6 / np.sqrt(2000)
+    radii = fitted(np.hypot(*generator.standard_normal((2, 2000))) * 1e-6, are_radii=True)
+    assert {fit.distribution for fit in radii.fits if fit.aic < radii.best.aic + 6} >= {Distribution.NORMAL}
+    assert radii.cp == pytest.approx(6 / 3.44, rel=4 / np.sqrt(8000) + 0.001)
+    below = fitted(np.linspace(-7e-6, 3e-6, 50))
+    assert [fit.distribution for fit in below.fits] == [Distribution.NORMAL]
+
+
+@pytest.mark.parametrize("teeth", [39, 40])
+def test_random_teeth_have_the_deviation_and_the_range_of_independent_teeth(teeth, generator):
+    spectrum, found = parsed_spectrum(f"random:2.0/{teeth}")
+    assert (found, len(spectrum)) == (teeth, teeth // 2)
+    turn = 2 * np.pi * (np.arange(teeth) + 0.3) / teeth
+    variance = sum(
+        amplitude**2 * (np.cos(order * turn) ** 2 + np.sin(order * turn) ** 2) for order, amplitude in spectrum
+    )
+    np.testing.assert_allclose(variance, 4.0 * (1 - 1 / teeth))  # all but the mean over the teeth
+    start = perf_counter()
+    quantile = harmonic_range_quantile.__wrapped__(spectrum, teeth)
+    seconds = perf_counter() - start
+    assert seconds < 5  # about half a second where nothing else runs
+    ranges = np.ptp(2.0 * generator.standard_normal((400_000, teeth)), axis=1)
+    # Four standard errors of both: 400,000 ranges, and 2¹⁵ points.
+    assert (ranges <= quantile).mean() == pytest.approx(0.9973, abs=4 * np.sqrt(0.0027 * (1 / 400_000 + 1 / 2**15)))
+
+
+def test_random_teeth_add_to_named_orders_in_quadrature():
+    alone, _ = parsed_spectrum("random:1.0/40")
+    both, teeth = parsed_spectrum("1:9.2 3:0.5 random:1.0/40")
+    for (order, amplitude), (_, random) in zip(both, alone, strict=True):
+        assert amplitude == pytest.approx(np.hypot({1: 9.2, 3: 0.5}.get(order, 0.0), random))
+    own = source("normal", Feature.PITCH, spectrum=both, teeth=teeth)
+    filled = own.at_limit(np.random.default_rng(0).random((50, len(own.columns))))
+    turn = 2 * np.pi * np.arange(40) / 40
+    waves = np.concatenate([[np.cos(order * turn), np.sin(order * turn)] for order, _ in both])
+    np.testing.assert_allclose(np.ptp(filled @ waves, axis=1), 1.0)
+    assert "taken at 40 teeth" in own.mapping
+
+
+def test_the_random_part_prints_the_deviation_of_one_tooth(generator):
+    text = "1:2.5 random:1.5/40"
+    spectrum, teeth = parsed_spectrum(text)
+    own = source("normal", Feature.PITCH, spectrum=spectrum, teeth=teeth, written_spectrum=text)
+    unit = float(re.search(r"σ = ([\d.]+) µm per unit of the spectrum 1:2.5 random:1.5/40", own.mapping)[1])
+    turn = 2 * np.pi * np.arange(40) / 40
+    waves = np.concatenate([[np.cos(order * turn), np.sin(order * turn)] for order, _ in spectrum])
+    deviation = ZONE * 1e6 * own.standard_values(generator.random((SAMPLES, len(own.columns)))) @ waves
+    expected = unit * np.sqrt(2.5**2 + 1.5**2 * (1 - 1 / 40))
+    # Four standard errors at one tooth, and the rounding to three digits.
+    assert deviation[:, 7].std() == pytest.approx(expected, rel=4 / np.sqrt(2 * SAMPLES) + 5e-3)
+    inside = (np.ptp(deviation, axis=1) <= ZONE * 1e6).mean()
+    assert inside == pytest.approx(0.9973, abs=4 * np.sqrt(0.0027 * (1 / SAMPLES + 1 / 2**15)))
+
+
+HEADER = (
+    "id,part,feature,plus,minus,unit,min,max,cost,distribution,Cp,shift,shape,batches,measured,sorted,spectrum,process"
+)
+BASE = {
+    "id": "a",
+    "part": "p",
+    "feature": "size",
+    "plus": "2",
+    "minus": "-2",
+    "unit": "µm",
+    "min": "1",
+    "max": "9",
+    "cost": "1",
+}
+POSITION = {"feature": "position", "plus": "4", "minus": "0"}
+PITCH = {"feature": "pitch", "plus": "4", "minus": "0", "spectrum": "1:2 2:1"}
+
+
+def write_table(folder, *rows):
+    pd.DataFrame([BASE | row for row in rows], columns=HEADER.split(",")).to_csv(folder / "t.csv", index=False)
+    return folder / "t.csv"
+
+
+def write_parts(folder, header="deviation [µm]", rows=None):
+    rows = [f"{value:.4f}" for value in 1e6 * PARTS] if rows is None else rows
+    (folder / "parts.csv").write_text("\n".join([header, *map(str, rows)]), encoding="utf-8")
+
+
+def test_every_column_survives_writing_and_reading_at_other_zones_and_from_another_folder(tmp_path, generator):
+    write_parts(tmp_path)
+    sources = load_tolerance_table(
+        write_table(
+            tmp_path,
+            {"id": "a", "distribution": "weibull", "shape": "1.234567890123", "Cp": "1.1", "shift": "0.1"},
+            {"id": "b", "distribution": "mixture", "batches": "0.7:-0.3:0.81234567 0.3:0.5:0.6", "sorted": "yes"},
+            {"id": "c", "distribution": "empirical", "measured": "parts.csv"},
+            {"id": "d", "process": "honed to limit"},
+            {"id": "e", **PITCH, "spectrum": "1:9.2 3:0.123456789 random:1.0/40"},
+        )
+    )
+    moved = with_zones(sources, [0.8 * own.zone for own in sources])
+    (tmp_path / "elsewhere").mkdir()
+    table_frame(moved).to_csv(tmp_path / "elsewhere" / "t.csv", index=False)
+    again = load_tolerance_table(tmp_path / "elsewhere" / "t.csv")
+    for own, other in zip(moved, again, strict=True):
+        uniform = generator.random((100, len(own.columns)))
+        np.testing.assert_allclose(other.standard_values(uniform), own.standard_values(uniform), rtol=1e-12, atol=1e-12)
+        assert other.written_spectrum == own.written_spectrum
+        assert (other.process, other.sorted, other.shape) == (own.process, own.sorted, own.shape)
+        assert other.mapping == own.mapping
+    assert "3.2 µm, full width" in again[2].mapping
+    assert "assumed to scale with the zone from the 4 µm" in again[2].mapping
+
+
+def test_measured_positions_are_read_as_axes_or_as_radii(tmp_path):
+    rows = [f"{0.1 * k},{0.05 * k}" for k in range(20)]
+    write_parts(tmp_path, "x [µm],y [µm]", rows)
+    table = write_table(tmp_path, POSITION | {"distribution": "empirical", "measured": "parts.csv"})
+    axes = load_tolerance_table(table)[0]
+    write_parts(tmp_path, "radius [mm]", [np.hypot(0.1, 0.05) * k / 1000 for k in range(20)])
+    radii = load_tolerance_table(table)[0]
+    np.testing.assert_allclose(axes.measured.values, radii.measured.values, rtol=1e-12)
+    assert axes.measured.are_radii
+
+
+BAD_ROWS = [
+    ({"distribution": "truncated"}, "allowed is one of normal, .*; a truncated one is written .* sorted = yes"),
+    ({"distribution": "beta"}, "distribution is 'beta'; allowed is one of normal, uniform"),
+    ({"distribution": "weibull"}, "needs a shape from 0.3 to 20: none"),
+    ({"distribution": "lognormal", "shape": "9"}, "needs a shape from 0.02 to 1.5: 9"),
+    ({"shape": "2"}, "normal has no shape"),
+    ({"distribution": "weibull", "shape": "two"}, "shape is 'two'; allowed is a number"),
+    ({"distribution": "mixture"}, "go together"),
+    ({"batches": "1:0:1"}, "go together"),
+    ({"distribution": "mixture", "batches": "0.5:0.1"}, "must read like '0.7:-0.3:0.8"),
+    ({"distribution": "mixture", "batches": "0.5:3:1"}, "shift -2 to 2"),
+    (
+        {"distribution": "mixture", "batches": "1:0:1", "Cp": "2"},
+        "batches .* state their spreads, so Cp must be 1: 2",
+    ),
+    (POSITION | {"distribution": "mixture", "batches": "1:0.2:1"}, "shift of a batch must be 0 for feature position"),
+    ({"distribution": "empirical"}, "go together"),
+    ({"measured": "parts.csv"}, "go together"),
+    (
+        {"distribution": "empirical", "measured": "parts.csv", "Cp": "1.3"},
+        "show spread and mean, so Cp must be 1",
+    ),
+    ({"distribution": "empirical", "measured": "none.csv"}, "none.csv: no such file"),
+    (PITCH | {"distribution": "empirical", "measured": "parts.csv"}, "is for sizes and positions, not for pitch"),
+    (PITCH | {"sorted": "yes"}, "sorted concerns all orders of a part at once.*: 2 orders"),
+    (PITCH | {"distribution": "mixture", "batches": "1:0:1"}, "mixture concerns all orders"),
+    (PITCH | {"distribution": "uniform", "spectrum": "random:1/40"}, "random part of the spectrum is normal"),
+    (PITCH | {"spectrum": "random:1/2"}, "on 4 to 400 teeth"),
+    (PITCH | {"spectrum": "random:1/40 random:1/40"}, "at most one random part"),
+    (PITCH | {"spectrum": "21:1 random:1/40"}, "highest order must be 20 or less"),
+    (PITCH | {"spectrum": "1:2 1:3"}, "1:3 must be an order from 1 up, each once"),
+    ({"sorted": "maybe"}, "sorted is 'maybe'; allowed is yes or no"),
+    ({"distribution": "mixture", "batches": "1:2:0.1", "sorted": "yes"}, "would leave less than 1% of all parts"),
+]
+
+
+@pytest.mark.parametrize(("row", "sentence"), BAD_ROWS)
+def test_bad_rows_are_refused_in_one_sentence(row, sentence, tmp_path):
+    write_parts(tmp_path)
+    with pytest.raises(TolallocError, match=sentence) as caught:
+        load_tolerance_table(write_table(tmp_path, row))
+    assert "row 2 (a)" in str(caught.value) or "none.csv" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+BAD_PARTS = [
+    ("deviation [µm]", range(19), "number of measured parts is 19; allowed is 20 or more"),
+    ("deviation [µm]", [*range(19), "x"], r"parts.csv, row 21: deviation \[µm\] is 'x'; allowed is a number"),
+    ("deviation [µm]", [*range(19), 900], "row 21: .* is '900'; allowed is a number from -200 to 200 µm"),
+    ("deviation [µm]", [*range(19), "nan"], "row 21: .* is 'nan'"),
+    ("deviation", range(30), "the unit of column 'deviation' is ''"),
+    ("radius [µm]", range(30), "columns for feature size is .*; allowed is deviation"),
+    ("deviation [µm]", [3] * 30, "parts that differ"),
+]
+
+
+@pytest.mark.parametrize(("header", "rows", "sentence"), BAD_PARTS)
+def test_bad_measured_parts_are_refused_in_one_sentence(header, rows, sentence, tmp_path):
+    write_parts(tmp_path, header, rows)
+    with pytest.raises(InputError, match=sentence):
+        load_tolerance_table(write_table(tmp_path, {"distribution": "empirical", "measured": "parts.csv"}))
+
+
+def test_a_negative_radius_is_refused(tmp_path):
+    write_parts(tmp_path, "radius [µm]", [*range(20), -1])
+    with pytest.raises(InputError, match=r"row 22: radius \[µm\] is '-1 µm'; allowed is 0 or more"):
+        load_tolerance_table(write_table(tmp_path, POSITION | {"distribution": "empirical", "measured": "parts.csv"}))

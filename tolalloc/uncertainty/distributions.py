@@ -1,0 +1,182 @@
+"""Distributions of one number by their quantile function, each in a unit of its own; `zones` puts them into a zone."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from math import log, sqrt
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from scipy import stats
+from scipy.special import ndtr
+
+Numbers = Float[np.ndarray, "..."]
+
+INSIDE_AT_CP_1 = 0.9973
+LEVELS = np.linspace(-8.2, 8.2, 4097)
+"""Standard normal numbers that cover all probabilities between 0 and the float below 1 [-]."""
+LEVELS.setflags(write=False)
+
+
+class Distribution(StrEnum):
+    """Shape of the deviation inside its zone."""
+
+    NORMAL = "normal"
+    UNIFORM = "uniform"
+    TRIANGULAR = "triangular"
+    LOGNORMAL = "lognormal"
+    WEIBULL = "weibull"
+    MIXTURE = "mixture"
+    EMPIRICAL = "empirical"
+
+    @property
+    def is_one_sided(self) -> bool:
+        """Whether a size starts at the lower limit of its zone rather than spreading around the middle."""
+        return self in SHAPES
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether it ends, at Cp = 1 at the limit of the zone."""
+        return self in (Distribution.UNIFORM, Distribution.TRIANGULAR)
+
+
+SHAPES = {Distribution.LOGNORMAL: (0.02, 1.5), Distribution.WEIBULL: (0.3, 20.0)}
+"""Smallest and largest shape that is believed, for the distributions that have one [-]."""
+
+
+@runtime_checkable
+class Marginal(Hashable, Protocol):
+    """Distribution of one number."""
+
+    @property
+    def reach(self) -> float:
+        """Value at the limit of the zone at Cp = 1: what 99.73 % of parts keep, or the end of a bounded one."""
+        ...
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities in (0, 1) [own unit]."""
+        ...
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Family:
+    """A distribution with a closed form.
+
+    Parameters
+    ----------
+    name
+        As in scipy.stats.
+    arguments
+        Its shape, start and width as scipy.stats takes them; without them it is the standard one [-].
+    end
+        Value at the limit of the zone at Cp = 1; without it the 99.73 % quantile [own unit].
+    """
+
+    name: str
+    arguments: tuple[float, ...] = ()
+    end: float | None = None
+
+    @property
+    def reach(self) -> float:
+        """Value at the limit of the zone at Cp = 1 [own unit]."""
+        return float(getattr(stats, self.name).ppf(INSIDE_AT_CP_1, *self.arguments)) if self.end is None else self.end
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities in (0, 1) [own unit]."""
+        return np.asarray(getattr(stats, self.name).ppf(probability, *self.arguments))
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        return np.asarray(getattr(stats, self.name).cdf(value, *self.arguments))
+
+
+NORMAL = Family("norm", end=3.0)
+"""Deviation in units of its σ."""
+RAYLEIGH = Family("rayleigh", end=sqrt(-2.0 * log(1.0 - INSIDE_AT_CP_1)))
+"""Length of a vector with two normal components, in units of their σ."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A distribution moved and scaled.
+
+    Parameters
+    ----------
+    base
+        What is moved and scaled.
+    offset, scale
+        Where its 0 comes to lie, and the length of its unit [half zone].
+    """
+
+    base: Marginal
+    offset: float
+    scale: float
+
+    @property
+    def reach(self) -> float:
+        """Value at the limit of the zone at Cp = 1 [half zone]."""
+        return self.offset + self.scale * self.base.reach
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities [half zone]."""
+        return np.asarray(self.base.quantile(probability) * self.scale + self.offset)
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        return self.base.probability((value - self.offset) / self.scale)
+
+
+@dataclass(frozen=True)
+class Sorted:
+    """What is left of a distribution when everything outside two limits is sorted out.
+
+    Parameters
+    ----------
+    base
+        Distribution before sorting.
+    low, high
+        The limits [unit of the base].
+    """
+
+    base: Marginal
+    low: float
+    high: float
+
+    @property
+    def reach(self) -> float:
+        """Value at the limit of the zone at Cp = 1 [unit of the base]."""
+        return self.base.reach
+
+    @cached_property
+    def kept(self) -> float:
+        """Share of parts that is not sorted out [-]."""
+        return float(np.subtract(*self._ends[::-1]))
+
+    @cached_property
+    def _ends(self) -> Float[np.ndarray, "2"]:
+        return self.base.probability(np.array([self.low, self.high]))
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities [unit of the base]."""
+        before = self.base.quantile(self._ends[0] + self.kept * probability)
+        return np.asarray(np.clip(before, self.low, self.high))
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        return np.asarray(np.clip((self.base.probability(value) - self._ends[0]) / self.kept, 0.0, 1.0))
+
+
+def moments(marginal: Marginal) -> tuple[float, float]:
+    """Return mean and standard deviation [own unit], by the trapezoidal rule over standard normal numbers."""
+    weights = np.exp(-(LEVELS**2) / 2.0)
+    values, weights = marginal.quantile(ndtr(LEVELS)), weights / weights.sum()
+    mean = float(weights @ values)
+    return mean, sqrt(float(weights @ (values - mean) ** 2))
