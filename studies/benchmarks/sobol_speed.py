@@ -76,7 +76,7 @@ def difference(answers: Answers, own: tuple[np.ndarray, np.ndarray], others: lis
     largest = 0.0
     for output, other in enumerate(others):
         y = np.ascontiguousarray(answers[:, output].reshape(blocks, -1).T)[np.newaxis]
-        _, first, total, _ = one_pass(y, counts, SOURCES)
+        _, _, first, total, _ = one_pass(y, counts, SOURCES)
         pairs = (
             (own[0][output], other["S1"]),
             (own[1][output], other["ST"]),

@@ -8,10 +8,11 @@ from SALib.analyze import sobol as salib
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.growth import grow_until_stable
 from tolalloc.sensitivity.ranking import (
+    Ranking,
     among_first,
     before,
-    grow_until_stable,
     indistinguishable_from_zero,
     neighbours,
     percentile_interval,
@@ -22,7 +23,10 @@ from tolalloc.sensitivity.saltelli import SaltelliIndices, resample_counts, salt
 from tolalloc.uncertainty.seeds import SeedTree
 
 SOURCES, BLOCKS, RESAMPLES, OUTPUTS = 5, 96, 60, 7
-FIELDS = ("first", "total", "second", "first_resamples", "total_resamples", "second_resamples")
+FIELDS = (
+    *("first", "total", "second", "first_resamples", "total_resamples", "second_resamples"),
+    *("variance", "variance_resamples"),
+)
 
 
 def answers(blocks: int = BLOCKS, second_order: bool = True, seed: int = 1) -> np.ndarray:
@@ -121,7 +125,7 @@ def test_one_failed_sample_drops_its_block_and_nothing_else():
     values, size = answers(), 2 * SOURCES + 2
     broken = values.copy()
     broken[17 * size + 3, 2] = np.nan
-    found = indices(broken, largest_dropped_share=0.02)
+    found = indices(broken, largest_failed_share=0.02)
     assert (found.blocks, found.dropped) == (BLOCKS - 1, 1)
     same_bits(found, indices(np.delete(values, np.arange(17 * size, 18 * size), axis=0)))
     status = np.zeros(values.shape[0], np.uint8)
@@ -132,7 +136,7 @@ def test_one_failed_sample_drops_its_block_and_nothing_else():
         SeedTree(4),
         second_order=True,
         resamples=RESAMPLES,
-        largest_dropped_share=0.02,
+        largest_failed_share=0.02,
     )
     same_bits(found, by_status)
 
@@ -144,7 +148,7 @@ def test_too_many_failed_samples_stop_the_analysis():
         indices(values)
     values[::size] = np.nan
     with pytest.raises(SolveError, match="0 of 96 blocks are left"):
-        indices(values, largest_dropped_share=1.0)
+        indices(values, largest_failed_share=1.0)
 
 
 def test_an_output_that_does_not_vary_concerns_itself_alone():
@@ -154,12 +158,21 @@ def test_an_output_that_does_not_vary_concerns_itself_alone():
     flat[:, 5] = 1e3 * (1 + np.finfo(float).eps * (np.arange(values.shape[0]) % 2))
     found, others = indices(flat, outputs_at_once=3), np.array([0, 1, 3, 4, 6])
     assert found.varies.tolist() == [True, True, False, True, True, False, True]
-    for name in FIELDS:
+    for name in FIELDS[:6]:
         assert np.isnan(getattr(found, name)[[2, 5]]).all()
     same_bits(found, indices(values), others)
-    found.require_varying(0)
-    with pytest.raises(SolveError, match="output 2 is the same for all samples"):
-        found.require_varying(2)
+    assert (found.variance[[2, 5]] == 0).all()
+    assert (found.variance_resamples[[2, 5]] == 0).all()
+
+
+def test_the_variance_is_that_of_a_and_b_in_the_units_of_the_output():
+    values = answers()
+    found, counts = indices(values), resample_counts(BLOCKS, RESAMPLES, SeedTree(4))
+    base = values.reshape(BLOCKS, -1, OUTPUTS)[:, [0, -1]]
+    for output in range(OUTPUTS):
+        expected = [np.repeat(base[:, :, output], row.astype(int), axis=0).var() for row in counts]
+        np.testing.assert_allclose(found.variance[output], expected[0], rtol=1e-10)
+        np.testing.assert_allclose(found.variance_resamples[output], expected[1:], rtol=1e-10)
 
 
 def test_seed_zero_is_a_seed_like_every_other():
@@ -210,13 +223,36 @@ def test_the_blocks_asked_for_tell_neighbours_apart():
     assert (equal[0].more_blocks, equal[0].separated) == (None, False)
 
 
+def ranking(total: list[float], resamples: np.ndarray, sources: str = "abc") -> Ranking:
+    return Ranking(sources=tuple(sources), total=np.array(total), total_resamples=resamples, blocks=64)
+
+
+def test_promised_orders_are_counted_that_another_ranking_reproduces():
+    """Promised at 0.9 are a before b and a before c; b before c, at 0.75, is not."""
+    first = ranking([0.5, 0.3, 0.2], RESAMPLED)
+    found = first.reproduced_by(ranking([0.3, 0.2, 0.4], RESAMPLED))
+    assert (found.promised, found.reproduced, found.share) == (2, 1, 0.5)
+    assert first.reproduced_by(ranking([0.3, 0.1, 0.2], RESAMPLED)).share == 1.0
+    assert first.reproduced_by(ranking([0.3, 0.1, 0.2], RESAMPLED), 0.7).promised == 3
+    equal = ranking([0.3, 0.3, 0.3], np.full((4, 3), 0.3))
+    assert first.reproduced_by(equal).reproduced == 0
+    assert np.isnan(equal.reproduced_by(first).share)
+    with pytest.raises(InputError, match="not of the same sources"):
+        first.reproduced_by(ranking([0.3, 0.1, 0.2], RESAMPLED, "abd"))
+    with pytest.raises(InputError, match=r"confidence is 0\.5"):
+        first.reproduced_by(first, 0.5)
+
+
 def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
     found = grow_until_stable(gaps, 3, start=64, limit=1 << 14)
     assert found.stable
     assert [step.blocks for step in found.history] == [64 << at for at in range(len(found.history))]
     assert found.history[-1].first == (1, 2, 0)
     assert found.history[-1].probability >= 0.9 > found.history[-2].probability
+    assert found.status.startswith("The order of the first 3 is stable: ")
     stopped = grow_until_stable(gaps, 3, start=64, limit=200)
     assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
+    assert "not stable at the largest number of blocks allowed" in stopped.status
+    assert "resamples of 128 blocks" in stopped.status
     with pytest.raises(InputError, match="first number of blocks"):
         grow_until_stable(gaps, 3, start=64, limit=32)

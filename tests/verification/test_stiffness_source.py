@@ -21,7 +21,7 @@ from tolalloc.response.stiffness import (
     stiffness_effect,
     stiffness_source,
 )
-from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.error_model import ErrorModel
@@ -90,7 +90,7 @@ def test_share_of_the_variance_against_direct_monte_carlo(response):
     """Pairs of the same unit with two draws of the stiffness give the total index without Sobol's scheme."""
     stiffness = source(0.6, -0.5)
     errors = replace(few_sources(), joint=(stiffness,))
-    found = sobol_indices(response, errors, errors.zones, SeedTree(3), 64)
+    found = sobol_indices(response, errors, errors.zones, SeedTree(3), SobolEffort(start=64, limit=64)).of(0)
     at = found.sources.index(NAME)
     x, draws = units(400, 4), np.random.default_rng(5).multivariate_normal(np.zeros(2), stiffness.covariance, (2, 400))
     first, second = (response(np.concatenate([x, draw], axis=1)).values[:, 0] for draw in draws)
@@ -120,14 +120,16 @@ def test_correlation_inside_the_group_counts(correlation, variance):
     errors = few_sources()
     rest = float(units(100_000, 1).sum(axis=1).var())
     errors = replace(errors, joint=(source(float(np.sqrt(rest / 2)), correlation),))
-    found = sobol_indices(Sum(errors.columns), errors, errors.zones, SeedTree(1), 2048)
+    found = sobol_indices(
+        Sum(errors.columns), errors, errors.zones, SeedTree(1), SobolEffort(start=2048, limit=2048)
+    ).of(0)
     assert found.total[-1] == pytest.approx(variance / (variance + 2), abs=0.04)
     assert found.first[-1] == pytest.approx(variance / (variance + 2), abs=0.06)
 
 
 def test_a_stiffness_without_uncertainty_has_no_share(response):
     errors = replace(few_sources(), joint=(source(0.0, 0.3),))
-    found = sobol_indices(response, errors, errors.zones, SeedTree(3), 16)
+    found = sobol_indices(response, errors, errors.zones, SeedTree(3), SobolEffort(start=16, limit=16)).of(0)
     assert found.total[-1] == 0.0
     assert found.sources == ("disc1.bore1.position", "pin.diameter", NAME)
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.quantile import LocalQuantile, local_quantile
 from tolalloc.response.kernel import KernelResponse, WithDerivatives
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, Yield, require_few_failures
+from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import MICROMETRE
 
@@ -90,6 +90,8 @@ class Verifier:
         Node of the seed tree; every verification takes its own child.
     units
         Units per verification [-].
+    largest_failed_share
+        Share of them that may fail [-].
     """
 
     space: DesignSpace
@@ -97,6 +99,7 @@ class Verifier:
     requirement: Requirement
     seeds: SeedTree
     units: int
+    largest_failed_share: float = LARGEST_FAILED_SHARE
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design judged by fresh units of its own.
@@ -104,7 +107,7 @@ class Verifier:
         Raises
         ------
         SolveError
-            More than 1 % of the units failed.
+            More units failed.
         """
         errors, zones = self.space.errors, self.space.zones(design)
         uniform = np.concatenate(list(self.seeds.child(name).uniform_chunks(self.units, len(errors.columns))))
@@ -113,7 +116,7 @@ class Verifier:
         x = errors.deviations(standard, zones)
         answers = response.with_derivatives(x)
         sample = MonteCarlo(x=x, evaluation=answers.evaluation)
-        require_few_failures(sample, name)
+        require_few_failures(sample, name, self.largest_failed_share)
         bound = sample.quantile_bound(self.requirement.target)
         by_zone, by_clearance = self._gradient(standard, answers, min(bound, float(sample.values.max())))
         by_scale = np.bincount(

@@ -15,7 +15,7 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.stiffness import StiffnessEffect
 from tolalloc.sensitivity.classical import ClassicalEstimate
-from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.surrogate.regression import NEEDED_Q2, Surrogate
 from tolalloc.uncertainty.unit_file import BuiltUnit
 

@@ -10,58 +10,27 @@ import pandas as pd
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.report.results import StudyResults
+from tolalloc.report.sobol_table import sobol_table
 from tolalloc.sensitivity.capability import Limits, quantile_interval
 from tolalloc.sensitivity.capability import capability as sample_capability
-from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import with_zones
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
 
 
-def _blocks(pair: Neighbours | None) -> str:
-    """Return how many more Sobol blocks would tell a source from the next one."""
-    if pair is None or pair.more_blocks is None:
-        return ""
-    return "told apart" if pair.separated else f"about {float(f'{pair.more_blocks:.2g}'):.0f}"
-
-
 def ranking(results: StudyResults) -> pd.DataFrame:
     """Return the sources, largest total Sobol index first, with intervals and the hand estimate beside them.
 
-    A source that stands on no drawing has no zone and no hand estimate.
+    A source that stands on no drawing, or a block of correlated ones, has no zone and no hand estimate.
     """
-    sobol, undrawn = results.sobol, [np.nan] * (len(results.sobol.sources) - len(results.space.errors.active))
-    zones = [*results.space.errors.zones / MICROMETRE, *undrawn]
-    slopes = [*results.allocation.baseline.by_zone * MICROMETRE, *undrawn]
-    alone = [*results.classical.alone, *undrawn]
-    share = sobol.total / sobol.total.sum() * 100
-    first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
-    among, following = sobol.among_first(3), {pair.before: pair for pair in sobol.neighbours}
-    rows = [
-        {
-            "rank [-]": place + 1,
-            "source": sobol.sources[at],
-            "contribution [%]": share[at],
-            "cumulative [%]": share[sobol.order[: place + 1]].sum(),
-            "total index ST [-]": sobol.total[at],
-            "ST low 5 % [-]": total[0, at],
-            "ST high 95 % [-]": total[1, at],
-            "first index S1 [-]": sobol.first[at],
-            "S1 low 5 % [-]": first[0, at],
-            "S1 high 95 % [-]": first[1, at],
-            "S1 reading": "indistinguishable from 0" if first[0, at] <= 0 else "above 0",
-            "rank low 5 % [-]": rank[0, at],
-            "rank high 95 % [-]": rank[1, at],
-            "P(among first 3) [%]": among[at] * 100,
-            "P(before the next) [%]": following[at].probability * 100 if at in following else np.nan,
-            "more blocks to tell it from the next [-]": _blocks(following.get(at)),
-            "zone [µm]": zones[at],
-            "Sens of the quantile [arcsec/µm]": slopes[at],
-            "alone at its limit [arcsec]": alone[at],
-        }
-        for place, at in enumerate(sobol.order)
-    ]
-    return pd.DataFrame(rows)
+    frame, names = sobol_table(results.sobol), [source.name for source in results.space.errors.active]
+    for header, values in {
+        "zone [µm]": results.space.errors.zones / MICROMETRE,
+        "Sens of the quantile [arcsec/µm]": results.allocation.baseline.by_zone * MICROMETRE,
+        "alone at its limit [arcsec]": results.classical.alone,
+    }.items():
+        frame[header] = frame["source"].map(dict(zip(names, values, strict=True)))
+    return frame
 
 
 def allocated_sources(results: StudyResults) -> tuple[Source, ...]:

@@ -123,6 +123,7 @@ def monte_carlo(
     seeds: SeedTree,
     units: int,
     design: SamplingDesign = SamplingDesign.MONTE_CARLO,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> MonteCarlo:
     """Return random units at the given zones.
 
@@ -140,11 +141,13 @@ def monte_carlo(
         Number of units [-].
     design
         How the units are spread; all intervals assume the first one.
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     SolveError
-        More than 1 % of the units failed.
+        More units failed.
 
     Notes
     -----
@@ -154,21 +157,30 @@ def monte_carlo(
     chunks = uniform_chunks(design, seeds, units, len(errors.columns))
     x = np.concatenate([errors.deviations(errors.standard_values(uniform), zones) for uniform in chunks])
     result = MonteCarlo(x=x, evaluation=response(x))
-    require_few_failures(result, ".".join(seeds.path))
+    require_few_failures(result, ".".join(seeds.path), largest_failed_share)
     return result
 
 
-def require_few_failures(result: MonteCarlo, name: str) -> None:
+def require_few_failures(result: MonteCarlo, name: str, largest_failed_share: float = LARGEST_FAILED_SHARE) -> None:
     """Raise if more units failed than a trustworthy figure admits.
+
+    Parameters
+    ----------
+    result
+        The units.
+    name
+        Which sample they are, for the message.
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     SolveError
-        More than 1 % of the units failed.
+        More units failed.
     """
     units = result.evaluation.status.size
-    if result.failed > LARGEST_FAILED_SHARE * units:
+    if result.failed > largest_failed_share * units:
         raise SolveError(
             f"Monte Carlo {name}: {result.failed} of {units} units have no usable answer; allowed is "
-            f"{LARGEST_FAILED_SHARE:.0%}, because more would bias every figure."
+            f"{largest_failed_share:.4g} of them, because more would bias every figure."
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,9 +10,6 @@ from jaxtyping import Bool, Float, Int
 from scipy.stats import norm
 
 from tolalloc.exceptions import InputError
-
-Resampled = tuple[Float[np.ndarray, " source"], Float[np.ndarray, "resample source"]]
-"""Indices of the sources, and the same from resamples [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,38 +40,96 @@ class Neighbours:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step:
-    """One number of blocks on the way to a stable order.
+class Reproduction:
+    """How much of what a ranking promised another one has shown, which had other samples.
 
     Parameters
     ----------
-    blocks
-        Number of blocks [-].
-    first
-        Positions of the first sources, largest index first [-].
-    probability
-        Share of resamples whose first sources are these in this order [-].
+    confidence
+        Share of resamples from which an order counts as promised [-].
+    promised, reproduced
+        Pairs of sources whose order was promised, and those among them that the other ranking has in that order [-].
+
+    Notes
+    -----
+    Most promised pairs lie far above the confidence, so a share just at it is a weak result. Pairs share sources and
+    depend on each other: the share has no binomial error.
     """
 
-    blocks: int
-    first: tuple[int, ...]
-    probability: float
+    confidence: float
+    promised: int
+    reproduced: int
+
+    @property
+    def share(self) -> float:
+        """Share of the promised pairs that was reproduced, NaN if none was promised [-]."""
+        return self.reproduced / self.promised if self.promised else float("nan")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Growth:
-    """How the order settled as the blocks grew.
+class Ranking:
+    """Sources by their total index.
 
     Parameters
     ----------
-    history
-        One step per number of blocks.
-    stable
-        Whether the last step reached the probability asked for.
+    sources
+        Names, in the order of all arrays.
+    total, total_resamples
+        Total index, and the same from bootstrap resamples of the blocks [-].
+    blocks
+        Saltelli blocks used [-].
     """
 
-    history: tuple[Step, ...]
-    stable: bool
+    sources: tuple[str, ...]
+    total: Float[np.ndarray, " source"]
+    total_resamples: Float[np.ndarray, "resample source"]
+    blocks: int
+
+    @property
+    def total_interval(self) -> Float[np.ndarray, "2 source"]:
+        """90 % percentile interval of the total indices [-]."""
+        return percentile_interval(self.total_resamples)
+
+    @property
+    def order(self) -> list[int]:
+        """Positions of the sources, largest total index first."""
+        return [int(at) for at in np.argsort(-self.total, kind="stable")]
+
+    @property
+    def rank_interval(self) -> Float[np.ndarray, "2 source"]:
+        """90 % percentile interval of each source's rank over the resamples, 1 for the largest [-]."""
+        return rank_interval(self.total_resamples).astype(float)
+
+    @property
+    def neighbours(self) -> tuple[Neighbours, ...]:
+        """Sources that follow each other, largest total index first, and what would tell them apart."""
+        return neighbours(self.total, self.total_resamples, self.blocks)
+
+    def among_first(self, count: int) -> Float[np.ndarray, " source"]:
+        """Return the share of resamples in which each source is among the first ``count`` [-]."""
+        return among_first(self.total_resamples, count)
+
+    def reproduced_by(self, other: Ranking, confidence: float = 0.9) -> Reproduction:
+        """Return how many of the orders promised here another ranking of the same sources has, made of other samples.
+
+        Parameters
+        ----------
+        other
+            The same analysis with another seed.
+        confidence
+            Share of resamples that makes an order a promise [-].
+        """
+        if not 0.5 < confidence < 1:
+            raise InputError.at("reproduction", "confidence", confidence, "a number between 0.5 and 1")
+        if other.sources != self.sources:
+            raise InputError("Reproduction: the two rankings are not of the same sources.")
+        promised = before(self.total_resamples) >= confidence
+        found = promised & (other.total[:, np.newaxis] > other.total)
+        return Reproduction(
+            confidence=confidence,
+            promised=int(np.count_nonzero(promised)),
+            reproduced=int(np.count_nonzero(found)),
+        )
 
 
 def percentile_interval(
@@ -99,7 +153,7 @@ def rank_interval(
 
 def among_first(resamples: Float[np.ndarray, "resample source"], count: int) -> Float[np.ndarray, " source"]:
     """Return the share of resamples in which each source is among the first ``count`` [-]."""
-    _require_count(count, resamples.shape[1])
+    require_places(count, resamples.shape[1])
     return np.asarray((ranks(resamples) <= count).mean(axis=0))
 
 
@@ -125,7 +179,7 @@ def indistinguishable_from_zero(
     -----
     A total index is a mean of squares: it is flagged only if the output does not depend on the source at all.
     """
-    _require_confidence(confidence)
+    require_confidence(confidence)
     return np.asarray(np.quantile(resamples, 1 - confidence, axis=0) <= 0)
 
 
@@ -157,7 +211,7 @@ def neighbours(
     ----------
     One-sided normal quantile z with N′ = N·(z·σ/Δ)², from σ² ∝ 1/N; Efron & Tibshirani 1993, ch. 6.
     """
-    _require_confidence(confidence)
+    require_confidence(confidence)
     order, found = np.argsort(-indices, kind="stable").tolist(), []
     for leading, following in pairwise(order):
         apart = resamples[:, leading] - resamples[:, following]
@@ -178,44 +232,6 @@ def neighbours(
     return tuple(found)
 
 
-def grow_until_stable(
-    resampled: Callable[[int], Resampled], count: int, *, start: int, limit: int, probability: float = 0.9
-) -> Growth:
-    """Double the blocks until the order of the first sources is stable.
-
-    Parameters
-    ----------
-    resampled
-        Gives the indices for a number of blocks; it may keep the answers of the blocks that it has had.
-    count
-        How many of the first sources must keep their order [-].
-    start, limit
-        First and largest number of blocks [-].
-    probability
-        Share of resamples that must have the order of the estimate [-].
-
-    Notes
-    -----
-    Looking several times makes a stop by chance likelier than one look does; the history shows whether the order
-    was the same before.
-    """
-    _require_confidence(probability)
-    if not 2 <= start <= limit:
-        raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
-    history: list[Step] = []
-    blocks = start
-    while blocks <= limit:
-        indices, resamples = resampled(blocks)
-        _require_count(count, indices.size)
-        first = np.argsort(-indices, kind="stable")[:count]
-        same = (np.argsort(-resamples, axis=1, kind="stable")[:, :count] == first).all(axis=1)
-        history.append(Step(blocks=blocks, first=tuple(first.tolist()), probability=float(same.mean())))
-        if history[-1].probability >= probability:
-            break
-        blocks *= 2
-    return Growth(history=tuple(history), stable=history[-1].probability >= probability)
-
-
 def _more_blocks(difference: float, deviation: float, blocks: int, confidence: float) -> int | None:
     """Return the blocks to add until the confidence is reached, at least one; none if the indices are equal [-]."""
     if difference <= 0:
@@ -226,17 +242,17 @@ def _more_blocks(difference: float, deviation: float, blocks: int, confidence: f
 
 def _tails(confidence: float) -> tuple[float, float]:
     """Return the shares below the ends of a two-sided interval [-]."""
-    _require_confidence(confidence)
+    require_confidence(confidence)
     return (1 - confidence) / 2, (1 + confidence) / 2
 
 
-def _require_confidence(value: float) -> None:
+def require_confidence(value: float) -> None:
     """Raise unless a confidence lies between 0 and 1."""
     if not 0 < value < 1:
         raise InputError.at("ranking", "confidence", value, "a number between 0 and 1")
 
 
-def _require_count(count: int, sources: int) -> None:
+def require_places(count: int, sources: int) -> None:
     """Raise unless so many sources exist."""
     if not 1 <= count <= sources:
         raise InputError.at("ranking", "number of first sources", count, f"1 to {sources}")

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from tolalloc.blas import one_blas_thread
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
 from tolalloc.uncertainty.seeds import SeedTree
@@ -36,6 +37,8 @@ class SaltelliIndices:
         Second-order index of the pairs in the order of ``pairs``, none if the design has no BA samples [-].
     first_resamples, total_resamples, second_resamples
         The same from bootstrap resamples of the blocks, the same blocks for all outputs [-].
+    variance, variance_resamples
+        Variance of A and B together, of which the indices are shares [output²].
     varies
         Whether the output varies; only then do its indices exist.
     blocks, dropped
@@ -48,6 +51,8 @@ class SaltelliIndices:
     first_resamples: Float[np.ndarray, "output resample source"]
     total_resamples: Float[np.ndarray, "output resample source"]
     second_resamples: Float[np.ndarray, "output resample pair"] | None
+    variance: Float[np.ndarray, " output"]
+    variance_resamples: Float[np.ndarray, "output resample"]
     varies: Bool[np.ndarray, " output"]
     blocks: int
     dropped: int
@@ -57,17 +62,6 @@ class SaltelliIndices:
         """Positions of the two sources of every pair."""
         return tuple(combinations(range(self.first.shape[1]), 2))
 
-    def require_varying(self, output: int) -> None:
-        """Raise if an output has no indices.
-
-        Raises
-        ------
-        SolveError
-            The output is the same for all samples.
-        """
-        if not self.varies[output]:
-            raise SolveError(f"Sobol indices: output {output} is the same for all samples, so no source can be ranked.")
-
 
 def saltelli_indices(
     evaluation: Evaluation,
@@ -76,7 +70,7 @@ def saltelli_indices(
     *,
     second_order: bool = False,
     resamples: int = 400,
-    largest_dropped_share: float = 0.01,
+    largest_failed_share: float = 0.01,
     outputs_at_once: int = 1,
 ) -> SaltelliIndices:
     """Return the indices of all outputs of a Saltelli design.
@@ -93,7 +87,7 @@ def saltelli_indices(
         Whether the design has the BA samples.
     resamples
         Bootstrap resamples [-].
-    largest_dropped_share
+    largest_failed_share
         Share of blocks that may hold a failed sample [-].
     outputs_at_once
         Outputs held in memory as a copy of their own; no bit of the result depends on it [-].
@@ -122,14 +116,15 @@ def saltelli_indices(
         raise InputError.at("Sobol indices", "samples", evaluation.status.size, f"a multiple of {size}")
     whole = evaluation.good.reshape(-1, size).all(axis=1)
     blocks = int(np.count_nonzero(whole))
-    _require_blocks(whole.size, blocks, largest_dropped_share)
+    _require_blocks(whole.size, blocks, largest_failed_share)
     values = evaluation.values.reshape(whole.size, size, -1)
     counts = resample_counts(blocks, resamples, seeds)
-    found = [
-        one_pass(np.ascontiguousarray(values[:, :, part][whole].transpose(2, 1, 0)), counts, sources)
-        for part in _parts(values.shape[2], outputs_at_once)
-    ]
-    varies, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    with one_blas_thread():
+        found = [
+            one_pass(np.ascontiguousarray(values[:, :, part][whole].transpose(2, 1, 0)), counts, sources)
+            for part in _parts(values.shape[2], outputs_at_once)
+        ]
+    varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return SaltelliIndices(
         first=first[:, 0],
         total=total[:, 0],
@@ -137,6 +132,8 @@ def saltelli_indices(
         first_resamples=first[:, 1:],
         total_resamples=total[:, 1:],
         second_resamples=second[:, 1:] if second_order else None,
+        variance=variance[:, 0],
+        variance_resamples=variance[:, 1:],
         varies=varies,
         blocks=blocks,
         dropped=whole.size - blocks,
@@ -156,11 +153,12 @@ def one_pass(
     answers: Float[np.ndarray, "output sample block"], counts: Float[np.ndarray, "row block"], sources: int
 ) -> tuple[
     Bool[np.ndarray, " output"],
+    Float[np.ndarray, "output row"],
     Float[np.ndarray, "output row source"],
     Float[np.ndarray, "output row source"],
     Float[np.ndarray, "output row pair"],
 ]:
-    """Return which outputs vary, and first-order, total and second-order indices for every row of counts [-].
+    """Return which outputs vary, and variance [output²], first-order, total and second-order indices for every row [-].
 
     Parameters
     ----------
@@ -172,7 +170,7 @@ def one_pass(
         Groups of columns that were exchanged; without BA samples there are no pairs [-].
     """
     blocks = counts.shape[1]
-    y, varies = _standardised(answers)
+    y, deviation, varies = _standardised(answers)
     a, ab, b = y[:, :1], y[:, 1 : sources + 1], y[:, -1:]
     ba = y[:, sources + 1 : -1]
     own = np.concatenate([a + b, a**2 + b**2, a * b, b * (ab - a), (a - ab) ** 2], axis=1)
@@ -193,18 +191,20 @@ def one_pass(
     ]
     for values in (first, total, *second):
         values[~varies] = np.nan
-    return varies, first, total, np.concatenate([first[:, :, :0], *second], axis=2)
+    in_units = variance[:, :, 0] * deviation[:, np.newaxis] ** 2
+    return varies, in_units, first, total, np.concatenate([first[:, :, :0], *second], axis=2)
 
 
 def _standardised(
     answers: Float[np.ndarray, "output sample block"],
-) -> tuple[Float[np.ndarray, "output sample block"], Bool[np.ndarray, " output"]]:
-    """Return answers of mean 0 and deviation 1 [-], and which outputs vary; those that do not are all 0."""
+) -> tuple[Float[np.ndarray, "output sample block"], Float[np.ndarray, " output"], Bool[np.ndarray, " output"]]:
+    """Return answers of mean 0 and deviation 1 [-], their deviation [output], and which vary; others are all 0."""
     flat = answers.reshape(answers.shape[0], -1)
     base = answers[:, [0, -1]].reshape(answers.shape[0], -1)
     varies = np.asarray(np.ptp(base, axis=1) > _LEAST_RANGE * np.abs(base).max(axis=1))
-    deviation = np.where(varies, flat.std(axis=1), np.inf)
-    return ((flat - flat.mean(axis=1, keepdims=True)) / deviation[:, np.newaxis]).reshape(answers.shape), varies
+    deviation = flat.std(axis=1)
+    divisor = np.where(varies, deviation, np.inf)[:, np.newaxis]
+    return ((flat - flat.mean(axis=1, keepdims=True)) / divisor).reshape(answers.shape), deviation, varies
 
 
 def _over_variance(
@@ -226,12 +226,12 @@ def _require_positive(**counts: int) -> None:
             raise InputError.at("Sobol indices", field.replace("_", " "), value, "1 or more")
 
 
-def _require_blocks(drawn: int, whole: int, largest_dropped_share: float) -> None:
+def _require_blocks(drawn: int, whole: int, largest_failed_share: float) -> None:
     """Raise unless the blocks that are left can be trusted."""
-    if drawn - whole > largest_dropped_share * drawn:
+    if drawn - whole > largest_failed_share * drawn:
         raise SolveError(
             f"Sobol indices: {drawn - whole} of {drawn} blocks hold a failed sample; allowed is "
-            f"{largest_dropped_share:.4g} of them, because more would bias the indices."
+            f"{largest_failed_share:.4g} of them, because more would bias the indices."
         )
     if whole < 2:
         raise SolveError(f"Sobol indices: {whole} of {drawn} blocks are left; at least 2 are needed.")

@@ -1,138 +1,188 @@
-"""Sobol indices per source on SALib's design, with the confidence of the ranking that they give.
+"""Sobol indices of all outputs from one Saltelli design that grows until the ranking is stable.
 
 SALib's traps and the guards against them: seed 0 means unseeded, so seeds are positive; one NaN makes every index zero
 and ``conf`` is a multiple of a standard deviation, so `tolalloc.sensitivity.saltelli` estimates, drops blocks with a
-failed sample whole, counts them, and keeps the resamples, from which intervals are percentiles.
+failed sample whole, counts them, and keeps the resamples, from which intervals are percentiles; the design is held
+whole, so `tolalloc.sensitivity.saltelli_design` gives the same samples in chunks.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from jaxtyping import Float
-from SALib.sample import sobol as sobol_sample
 
-from tolalloc.response.interface import Response
-from tolalloc.sensitivity.ranking import Neighbours, among_first, neighbours, percentile_interval, rank_interval
-from tolalloc.sensitivity.saltelli import saltelli_indices
+from tolalloc.exceptions import InputError
+from tolalloc.response.interface import Evaluation, Response
+from tolalloc.sensitivity.growth import Resampled, grow_until_stable
+from tolalloc.sensitivity.saltelli import SaltelliIndices, saltelli_indices
+from tolalloc.sensitivity.saltelli_design import SaltelliDesign
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, overall_ranking
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
 
-LARGEST_DROPPED_SHARE = 0.05
-_RESAMPLES = 400
+_HALF_STEP = 2.0**-31
+"""Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
+
+
+class Player(StrEnum):
+    """Whose share of the variance an index is."""
+
+    SOURCE = "source"
+    """One source; the sources must be independent."""
+    BLOCK = "block"
+    """Sources that depend on each other, together; one source where it depends on no other."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SobolIndices:
-    """Indices of every source for one output.
+class SobolEffort:
+    """How much a Sobol analysis may compute.
 
     Parameters
     ----------
-    sources
-        Names, in the order of all arrays.
-    first, total
-        First-order and total index [-].
-    first_resamples, total_resamples
-        The same from bootstrap resamples of the blocks [-].
-    blocks, dropped
-        Saltelli blocks used, and blocks dropped because one of their samples failed [-].
-    samples
-        Samples evaluated [-].
+    start, limit
+        First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-].
+    places
+        First places whose order must be stable in the ranking over all outputs [-].
+    probability
+        Share of resamples that must have that order [-].
+    resamples
+        Bootstrap resamples [-].
+    second_order
+        Whether pairs of sources get an index, at nearly twice the samples.
+    largest_failed_share
+        Share of blocks that may hold a failed sample [-].
     """
 
-    sources: tuple[str, ...]
-    first: Float[np.ndarray, " source"]
-    total: Float[np.ndarray, " source"]
-    first_resamples: Float[np.ndarray, "resample source"]
-    total_resamples: Float[np.ndarray, "resample source"]
-    blocks: int
-    dropped: int
-    samples: int
+    start: int = 512
+    limit: int = 65_536
+    places: int = 3
+    probability: float = 0.9
+    resamples: int = 400
+    second_order: bool = False
+    largest_failed_share: float = 0.01
 
-    @property
-    def first_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the first-order indices [-]."""
-        return percentile_interval(self.first_resamples)
+    def __post_init__(self) -> None:
+        if self.start < 2 or self.start & (self.start - 1):
+            raise InputError.at("Sobol indices", "first number of blocks", self.start, "a power of two, 2 or more")
+        if self.places < 1:
+            raise InputError.at("Sobol indices", "number of stable places", self.places, "1 or more")
 
-    @property
-    def total_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the total indices [-]."""
-        return percentile_interval(self.total_resamples)
 
-    @property
-    def order(self) -> list[int]:
-        """Positions of the sources, largest total index first."""
-        return [int(at) for at in np.argsort(-self.total, kind="stable")]
+@dataclass
+class _Answers:
+    """Answers of the blocks so far; only new blocks are evaluated."""
 
-    @property
-    def rank_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of each source's rank over the resamples, 1 for the largest [-]."""
-        return rank_interval(self.total_resamples).astype(float)
+    response: Response
+    errors: ErrorModel
+    zones: Float[np.ndarray, " source"]
+    design: SaltelliDesign
+    blocks: int = 0
+    parts: list[Evaluation] = field(default_factory=list)
 
-    @property
-    def neighbours(self) -> tuple[Neighbours, ...]:
-        """Sources that follow each other, largest total index first, and what would tell them apart."""
-        return neighbours(self.total, self.total_resamples, self.blocks)
-
-    def among_first(self, count: int) -> Float[np.ndarray, " source"]:
-        """Return the share of resamples in which each source is among the first ``count`` [-]."""
-        return among_first(self.total_resamples, count)
+    def up_to(self, blocks: int) -> Evaluation:
+        """Return the answers of the first blocks."""
+        for uniform in self.design.chunks(self.blocks, blocks):
+            standard = self.errors.standard_values(np.maximum(uniform, _HALF_STEP))
+            self.parts.append(self.response(self.errors.deviations(standard, self.zones)))
+        self.blocks = blocks
+        joined = Evaluation(
+            values=np.concatenate([part.values for part in self.parts]),
+            status=np.concatenate([part.status for part in self.parts]),
+        )
+        self.parts = [joined]
+        return joined
 
 
 def sobol_indices(
-    response: Response, errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree, blocks: int
-) -> SobolIndices:
-    """Return first-order and total indices with one group per source.
+    response: Response,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    effort: SobolEffort,
+    player: Player = Player.SOURCE,
+    ranked: tuple[str, ...] = (),
+) -> SobolAnalysis:
+    """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
     Parameters
     ----------
     response
-        What answers; its columns are those of the error model and its first output is analysed.
+        What answers; its columns are those of the error model.
     errors
-        The sources, independent of each other.
+        The sources.
     zones
         Zones of the active sources [m].
     seeds
         Node of the seed tree.
-    blocks
-        Base samples, a power of two; the response is called (sources + 2) times as often [-].
+    effort
+        Blocks, from a first number doubled up to a limit, and what stops them.
+    player
+        Whether each source has an index, or each block of sources that depend on each other.
+    ranked
+        Outputs that count in the ranking over all, which is the one that must become stable; all of them if empty.
 
     Raises
     ------
+    InputError
+        An index per source is asked for although sources are correlated.
     SolveError
-        More than 5 % of the blocks hold a failed sample.
+        Too many blocks hold a failed sample, or no output varies.
+
+    Notes
+    -----
+    Correlations act between the columns of one block only, so exchanging all its independent uniform numbers exchanges
+    the block and nothing else. A sample without one of its outputs is a failed one for all of them.
 
     References
     ----------
-    Saltelli et al. 2010 (first order), Jansen 1999 (total), as SALib implements them.
+    Saltelli et al. 2010 (first order), Jansen 1999 (total), Saltelli 2002 (second order), as SALib implements them;
+    groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
     """
-    problem = {
-        "num_vars": len(errors.columns),
-        "names": list(errors.columns),
-        "groups": list(errors.source_of_column),
-        "bounds": [[0.0, 1.0]] * len(errors.columns),
-    }
-    names = tuple(dict.fromkeys(errors.source_of_column))
-    uniform = sobol_sample.sample(problem, blocks, calc_second_order=False, seed=seeds.child("sample").integer())
-    tiny = np.finfo(float).tiny
-    x = errors.deviations(errors.standard_values(np.clip(uniform, tiny, 1 - 1e-16)), zones)
-    evaluation = response(x)
-    found = saltelli_indices(
-        evaluation,
-        len(names),
-        seeds.child("resamples"),
-        resamples=_RESAMPLES,
-        largest_dropped_share=LARGEST_DROPPED_SHARE,
+    players, counted = _players(errors, player), ranked or response.outputs
+    design = SaltelliDesign(players=players, seed=seeds.child("sample").integer(), second_order=effort.second_order)
+    answers, steps = _Answers(response, errors, zones, design), list[SaltelliIndices]()
+
+    def resampled(blocks: int) -> Resampled:
+        steps.append(
+            saltelli_indices(
+                answers.up_to(blocks),
+                len(design.names),
+                seeds.child("resamples"),
+                second_order=effort.second_order,
+                resamples=effort.resamples,
+                largest_failed_share=effort.largest_failed_share,
+            )
+        )
+        ranking = overall_ranking(design.names, response.outputs, counted, steps[-1])
+        return ranking.total, ranking.total_resamples
+
+    growth = grow_until_stable(
+        resampled,
+        min(effort.places, len(design.names)),
+        start=effort.start,
+        limit=effort.limit,
+        probability=effort.probability,
     )
-    found.require_varying(0)
-    return SobolIndices(
-        sources=names,
-        first=found.first[0],
-        total=found.total[0],
-        first_resamples=found.first_resamples[0],
-        total_resamples=found.total_resamples[0],
-        blocks=found.blocks,
-        dropped=found.dropped,
-        samples=x.shape[0],
+    return SobolAnalysis(
+        outputs=response.outputs,
+        ranked=counted,
+        sources=design.names,
+        indices=steps[-1],
+        growth=growth,
+        samples=answers.blocks * design.samples_per_block,
     )
+
+
+def _players(errors: ErrorModel, player: Player) -> tuple[str, ...]:
+    """Return the name of the player of each column."""
+    correlated = [" + ".join(block) for block in errors.blocks if len(block) > 1]
+    if player is Player.SOURCE and correlated:
+        raise InputError(
+            f"Sobol indices: {'; '.join(correlated)} are correlated; a Sobol index per source would share their "
+            "variance arbitrarily; rank blocks or ask for Shapley effects."
+        )
+    block_of = {name: " + ".join(block) for block in errors.blocks for name in block}
+    return tuple(block_of[name] for name in errors.source_of_column)

@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
-from tolalloc.allocation.pareto import FrontEffort
-from tolalloc.allocation.search import SearchEffort
 from tolalloc.allocation.verification import Requirement
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.kinematics import HARMONICS
@@ -21,10 +19,14 @@ from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.kernel import KernelResponse
 from tolalloc.response.stiffness import stiffness_source
+from tolalloc.sensitivity.capability import Limits
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
+from tolalloc.study.effort import Effort
 from tolalloc.uncertainty.correlated import CorrelatedSource
+from tolalloc.uncertainty.correlation import Correlation
+from tolalloc.uncertainty.correlation_file import load_correlations
 from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.sources import neglected_columns
+from tolalloc.uncertainty.sources import Source, neglected_columns
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
 from tolalloc.units import MICROMETRE
@@ -44,40 +46,6 @@ NEGLECTED = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much a study may compute.
-
-    Parameters
-    ----------
-    verification_units
-        Fresh units per verified design [-].
-    sobol_blocks
-        Blocks of the Sobol analysis, a power of two [-].
-    shared_units
-        Common random units of the quantile surrogate [-].
-    search
-        Effort of the search.
-    """
-
-    verification_units: int = 6144
-    sobol_blocks: int = 512
-    shared_units: int = 256
-    search: SearchEffort = field(default_factory=SearchEffort)
-
-
-QUICK = Effort(
-    verification_units=1152,
-    sobol_blocks=32,
-    shared_units=48,
-    search=SearchEffort(
-        steps=2,
-        front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
-    ),
-)
-"""Effort of a quick run: every stage is real, every interval wide."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Study:
     """A study.
 
@@ -87,6 +55,10 @@ class Study:
         Name of the study and of its run folder.
     reducer, tolerances
         Shipped names or paths of the user's files.
+    processes
+        Process capability library that rows of the table may name, by shipped name or path.
+    correlations
+        Correlations between sources, by path; none if empty.
     neglected
         Sources of the model that the tolerance table leaves out, taken as zero; ``*`` stands for anything.
     unit
@@ -95,14 +67,18 @@ class Study:
         Identified stiffnesses that replace the reducer's, by shipped name or path; none if empty.
     limit_arcsec
         Largest peak-to-peak allowed, output side, one turn [arcsec].
+    other_limits
+        Output with its unit, such as ``"lost motion [arcmin]"`` → its limits; for the ranking alone.
     yield_target
-        Share of units that must keep it [-].
+        Share of units that must keep a limit [-].
     torque_nm
         Torque on the carrier, negative against the rotation; the reducer's test torque unless given [N·m].
     flank_clearance_um, radial_clearance_um
         Smallest and largest nominal clearance that the modification may leave [µm].
     seed
         Seed of every random number [-].
+    largest_failed_share
+        Share of units without an equilibrium above which the study stops [-].
     effort
         How much may be computed.
     """
@@ -110,15 +86,19 @@ class Study:
     name: str
     reducer: str | Path = "rv20e"
     tolerances: str | Path = "rv20e_baseline"
+    processes: str | Path = "generic"
+    correlations: str | Path = ""
     neglected: tuple[str, ...] = NEGLECTED
     unit: str | Path = ""
     stiffness: str | Path = ""
     limit_arcsec: float = 60.0
+    other_limits: Mapping[str, Limits] = field(default_factory=dict)
     yield_target: float = 0.9973
     torque_nm: float | None = None
     flank_clearance_um: tuple[float, float] = (1.0, 5.0)
     radial_clearance_um: tuple[float, float] = (5.0, 20.0)
     seed: int = 1
+    largest_failed_share: float = 0.01
     effort: Effort = field(default_factory=Effort)
 
     def __post_init__(self) -> None:
@@ -128,6 +108,7 @@ class Study:
             ("limit_arcsec", self.limit_arcsec, 0 < self.limit_arcsec <= 3600, "above 0 up to 3600"),
             ("yield_target", self.yield_target, 0.5 <= self.yield_target < 1, "0.5 up to but not 1"),
             ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
+            ("largest_failed_share", self.largest_failed_share, 0 <= self.largest_failed_share < 0.5, "0 to 0.5"),
         ):
             if not good:
                 raise InputError.at(place, name, value, allowed)
@@ -195,7 +176,9 @@ class Prepared:
     def hash(self) -> str:
         """Digest of the study and of what its files hold, wherever they stand."""
         known = self.identified.content if self.identified else None  # the reducer holds the values alone
-        content = (asdict(self.study), self.reducer, known, self.space.errors.sources, self.unit, self.kernel.torque)
+        errors = self.space.errors
+        sources, correlation = errors.sources, errors.correlation
+        content = (asdict(self.study), self.reducer, known, sources, correlation, self.unit, self.kernel.torque)
         return hashlib.sha256(repr(content).encode()).hexdigest()
 
 
@@ -220,6 +203,11 @@ def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> li
     return absent
 
 
+def _correlation(study: Study, sources: tuple[Source, ...]) -> Correlation:
+    """Return the correlations of the study's sources, none unless it names a file."""
+    return load_correlations(study.correlations, sources) if study.correlations else Correlation()
+
+
 def prepare(study: Study) -> Prepared:
     """Read and check everything a study needs; nothing is solved and nothing is written.
 
@@ -232,7 +220,8 @@ def prepare(study: Study) -> Prepared:
     identified = load_identified_stiffness(study.stiffness) if study.stiffness else None
     if identified:
         reducer = with_stiffness(reducer, identified)
-    errors = ErrorModel(load_tolerance_table(study.tolerances))
+    sources = load_tolerance_table(study.tolerances, study.processes)
+    errors = ErrorModel(sources, correlation=_correlation(study, sources))
     unit = load_unit(study.unit) if study.unit else None
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
     model = EquivalentModel(reducer, orders=orders or HARMONICS)

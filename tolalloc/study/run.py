@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from tolalloc.report.results import StudyResults
-from tolalloc.study.definition import QUICK, Study, prepare
+from tolalloc.study.definition import Study, prepare
+from tolalloc.study.effort import QUICK
 from tolalloc.study.run_folder import claimed, require_usable, write_run
 from tolalloc.study.stages import Progress, Record, run_stages
 

@@ -26,7 +26,8 @@ from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
 from tolalloc.sensitivity.classical import classical_estimate
 from tolalloc.sensitivity.monte_carlo import MonteCarlo
-from tolalloc.sensitivity.sobol import SobolIndices, sobol_indices
+from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared
 from tolalloc.surrogate.regression import Surrogate, fit_surrogate, quadratic_regression
 from tolalloc.uncertainty.seeds import SeedTree
@@ -127,6 +128,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             requirement=requirement,
             seeds=seeds.child("verification"),
             units=study.effort.verification_units,
+            largest_failed_share=study.largest_failed_share,
         )
         allocation = allocate(
             quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
@@ -168,18 +170,21 @@ def _ranking(
     prepared: Prepared, kernel: KernelResponse, surrogate: Surrogate, sample: MonteCarlo, seeds: SeedTree
 ) -> tuple[SobolIndices, StiffnessEffect | None]:
     """Return the ranking at the zones of the tolerance table, and what not knowing the stiffness does, if it is one."""
-    errors, blocks, own = prepared.space.errors, prepared.study.effort.sobol_blocks, seeds.child("sobol")
+    errors, own, blocks = prepared.space.errors, seeds.child("sobol"), prepared.study.effort.sobol_blocks
+    effort = SobolEffort(start=blocks, limit=blocks, largest_failed_share=prepared.study.largest_failed_share)
+    # Correlated sources share their variance, so their block has the index.
+    player = Player.BLOCK if errors.is_correlated else Player.SOURCE
     if prepared.identified is None or prepared.stiffness is None:
         # A stand-in for single units saves the ranking's kernel runs; it must have earned that.
         ranked = surrogate if surrogate.earns_its_place else kernel
-        return sobol_indices(ranked, errors, errors.zones, own, blocks), None
+        return sobol_indices(ranked, errors, errors.zones, own, effort, player).of(PEAK_TO_PEAK), None
     # The stand-in knows no stiffness.
     response = StiffnessResponse(kernel=kernel, stiffnesses=tuple(prepared.identified.values))
     joint = replace(errors, joint=(prepared.stiffness,))
     units = sample.x[sample.evaluation.good][:_EFFECT_UNITS]
     directions = seeds.child("stiffness").generator().standard_normal((_DIRECTIONS, len(response.stiffnesses)))
     effect = stiffness_effect(response, prepared.stiffness, units, directions, _UNITS_PER_DIRECTION)
-    return sobol_indices(response, joint, joint.zones, own, blocks), effect
+    return sobol_indices(response, joint, joint.zones, own, effort, player).of(PEAK_TO_PEAK), effect
 
 
 def _torsional_stiffness(prepared: Prepared) -> float:

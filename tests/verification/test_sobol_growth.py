@@ -1,0 +1,267 @@
+"""The design is SALib's in any chunks; blocks are added until the order is stable; dependent sources rank as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from SALib.sample import sobol as salib
+
+from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.saltelli import saltelli_indices
+from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
+from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
+from tolalloc.uncertainty.correlation import Correlation, Pair
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.zones import Feature
+
+PLAYERS = ("a", "b", "b", "c", "a", "d")
+CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))
+
+
+def sizes(names: str, correlation: Correlation | None = None) -> ErrorModel:
+    """Return normal sources of standard deviation 1."""
+    common = {"part": "part", "feature": Feature.SIZE, "minimum": 1.0, "maximum": 10.0, "cost": 1.0}
+    sources = tuple(Source(name=name, zone=6.0, **common) for name in names)
+    return ErrorModel(sources, correlation=correlation or Correlation())
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Weighted sums of the columns, one per output, which remember how often they were asked."""
+
+    weights: np.ndarray
+    columns: tuple[str, ...]
+    broken: tuple[int, ...] = ()
+    asked: list[int] = field(default_factory=list)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return tuple(f"y{at} [-]" for at in range(len(self.weights)))
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        # No matrix product: an output must not depend on the others to the last bit.
+        values = np.stack([(x * weight).sum(axis=1) for weight in self.weights], axis=1)
+        start = sum(self.asked)
+        for row in self.broken:
+            if start <= row < start + len(x):
+                values[row - start, 0] = np.nan
+        self.asked.append(len(x))
+        return Evaluation(values=values, status=np.zeros(len(x), np.uint8))
+
+
+def analysis(weights: list[list[float]], effort: SobolEffort, seed: int = 1, **options: object) -> SobolAnalysis:
+    errors = sizes("abcde"[: len(weights[0])])
+    response = Linear(np.array(weights), errors.columns, **options)
+    return sobol_indices(response, errors, errors.zones, SeedTree(seed), effort)
+
+
+def fixed(blocks: int, **options: object) -> SobolEffort:
+    return SobolEffort(start=blocks, limit=blocks, **options)
+
+
+def same_indices(one: SobolAnalysis, two: SobolAnalysis) -> None:
+    for name in ("first", "total", "first_resamples", "total_resamples", "variance", "variance_resamples"):
+        np.testing.assert_array_equal(getattr(one.indices, name), getattr(two.indices, name))
+
+
+@pytest.mark.parametrize("second_order", [False, True])
+@pytest.mark.parametrize("players", [PLAYERS, ("a",), tuple("abcd")])
+@pytest.mark.parametrize("blocks", [1, 64, 2048])
+def test_the_samples_are_those_of_salib_bit_for_bit(players, second_order, blocks):
+    columns = len(players)
+    names = [f"x{at}" for at in range(columns)]
+    problem = {"num_vars": columns, "names": names, "groups": list(players), "bounds": [[0.0, 1.0]] * columns}
+    design = SaltelliDesign(players=players, seed=7, second_order=second_order)
+    theirs = salib.sample(problem, blocks, calc_second_order=second_order, seed=7)
+    ours = list(design.chunks(0, blocks))
+    np.testing.assert_array_equal(np.concatenate(ours), theirs)
+    assert all(len(chunk) % design.samples_per_block == 0 and len(chunk) <= SAMPLES_AT_ONCE for chunk in ours)
+    assert design.names == tuple(dict.fromkeys(players))
+
+
+def test_a_larger_design_begins_with_the_smaller_one_wherever_it_is_resumed():
+    design = SaltelliDesign(players=PLAYERS, seed=3)
+    whole = np.concatenate(list(design.chunks(0, 4096)))
+    for stops in ((64, 128, 4096), (2048, 4096), (1, 2, 4, 3000, 4096)):
+        parts = [chunk for start, stop in zip((0, *stops), stops, strict=False) for chunk in design.chunks(start, stop)]
+        np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_seed_zero_is_refused_by_the_design_and_fine_for_the_analysis():
+    with pytest.raises(InputError, match="seed is 0"):
+        SaltelliDesign(players=("a",), seed=0)
+    one, two, other = (analysis([[1.0, 2.0]], fixed(64), seed) for seed in (0, 0, 1))
+    same_indices(one, two)
+    assert (one.indices.total != other.indices.total).any()
+
+
+def test_a_block_larger_than_a_chunk_is_a_chunk():
+    design = SaltelliDesign(players=tuple(f"x{at}" for at in range(SAMPLES_AT_ONCE)), seed=1)
+    chunk = next(design.chunks(0, 4))
+    assert chunk.shape == (SAMPLES_AT_ONCE + 2, SAMPLES_AT_ONCE)
+
+
+def test_blocks_are_added_until_the_order_is_stable_and_none_is_evaluated_twice():
+    errors = sizes("abcd")
+    response = Linear(np.array([[1.0, 1.05, 0.3, 0.1]]), errors.columns)
+    effort = SobolEffort(start=16, limit=4096, places=4, probability=0.95)
+    found = sobol_indices(response, errors, errors.zones, SeedTree(2), effort)
+    steps = found.growth.history
+    assert found.growth.stable
+    assert len(steps) > 1
+    assert all(step.probability < 0.95 for step in steps[:-1])
+    assert steps[-1].probability >= 0.95
+    assert steps[-1].first == (1, 0, 2, 3)
+    assert sum(response.asked) == found.samples == steps[-1].blocks * 6
+    same_indices(found, analysis([[1.0, 1.05, 0.3, 0.1]], fixed(steps[-1].blocks), seed=2))
+
+
+def test_equal_sources_reach_the_limit_and_the_analysis_says_so():
+    found = analysis([[1.0, 1.0, 1.0, 1.0]], SobolEffort(start=16, limit=100, places=4, probability=0.99))
+    assert not found.growth.stable
+    assert "not stable" in found.growth.status
+    assert (found.blocks, len(found.growth.history)) == (64, 3)
+
+
+def test_a_fixed_number_of_blocks_is_one_step_and_there_are_never_more_places_than_sources():
+    found = analysis([[1.0, 3.0]], fixed(64, places=3))
+    assert [(step.blocks, step.first) for step in found.growth.history] == [(64, (1, 0))]
+
+
+def test_one_pass_gives_every_output_and_one_ranking_over_all():
+    weights = [[3.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 2.0]]
+    found = analysis(weights, fixed(512))
+    assert found.outputs == ("y0 [-]", "y1 [-]", "y2 [-]")
+    assert found.constant == ("y1 [-]",)
+    with pytest.raises(SolveError, match=r"y1 \[-\] is the same for all samples"):
+        found.of("y1 [-]")
+    with pytest.raises(UnknownNameError, match="y3"):
+        found.of("y3")
+    with pytest.raises(InputError, match="0 to 2"):
+        found.of(3)
+    for at in (0, 2):
+        own, truth = found.of(at), np.square(weights[at]) / np.square(weights[at]).sum()
+        # Four standard errors.
+        assert (np.abs(own.total - truth) <= 4 * own.total_resamples.std(axis=0) + 1e-12).all()
+        assert (np.abs(own.first - truth) <= 4 * own.first_resamples.std(axis=0) + 1e-12).all()
+        alone = analysis([weights[at]], fixed(512)).of(0)
+        np.testing.assert_array_equal(alone.total_resamples, own.total_resamples)
+        assert own.samples == 512 * 5
+    overall = found.overall
+    assert overall.drives == ("y0 [-]", "y2 [-]", "y2 [-]")
+    assert overall.order == [0, 2, 1]
+    np.testing.assert_array_equal(overall.total, [found.of(0).total[0], *found.of(2).total[1:]])
+    with pytest.raises(SolveError, match="every output is the same"):
+        analysis([[0.0, 0.0]], fixed(64))
+
+
+@dataclass(frozen=True)
+class Product:
+    """x·y and x·y + z of three normal inputs."""
+
+    columns: tuple[str, ...] = ("a", "b", "c")
+    outputs: tuple[str, ...] = ("product [-]", "sum [-]")
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        product = x[:, 0] * x[:, 1]
+        return Evaluation(values=np.stack([product, product + x[:, 2]], axis=1), status=np.zeros(len(x), np.uint8))
+
+
+def test_pairs_have_an_index_if_asked_for():
+    errors = sizes("abc")
+    found = sobol_indices(Product(), errors, errors.zones, SeedTree(5), fixed(4096, second_order=True)).of("sum [-]")
+    assert found.pairs == ((0, 1), (0, 2), (1, 2))
+    assert (np.abs(found.second - [0.5, 0.0, 0.0]) <= 4 * found.second_resamples.std(axis=0)).all()
+    assert found.second_interval[0, 0] > 0.3
+    assert found.first_is_zero.tolist() == [True, True, False]
+    without = sobol_indices(Product(), errors, errors.zones, SeedTree(5), fixed(64)).of("sum [-]")
+    assert (without.pairs, without.second.shape, without.second_interval.shape) == ((), (0,), (2, 0))
+
+
+def test_an_index_per_correlated_source_is_refused_with_the_reason():
+    errors = sizes("abcd", CORRELATED)
+    response = Linear(np.ones((1, 4)), errors.columns)
+    with pytest.raises(InputError, match=r"a \+ c are correlated; .* share .* arbitrarily; rank blocks or ask for Sha"):
+        sobol_indices(response, errors, errors.zones, SeedTree(1), fixed(64))
+    assert not response.asked
+
+
+@pytest.mark.parametrize("second_order", [False, True])
+def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_order):
+    """A linear model: the variance of the block is w'Cw, and no block takes part in what another does."""
+    weights, errors = np.array([1.0, 0.8, 1.5, 0.4]), sizes("abcd", CORRELATED)
+    pair = weights[0] ** 2 + weights[2] ** 2 - 2 * 0.6 * weights[0] * weights[2]
+    parts = np.array([pair, weights[1] ** 2, weights[3] ** 2])
+    truth = parts / parts.sum()
+    effort = fixed(2048, second_order=second_order)
+    found = sobol_indices(
+        Linear(weights[np.newaxis], errors.columns), errors, errors.zones, SeedTree(8), effort, Player.BLOCK
+    )
+    own = found.of(0)
+    assert found.sources == ("a + c", "b", "d")
+    # Four standard errors.
+    assert (np.abs(own.first - truth) <= 4 * own.first_resamples.std(axis=0)).all()
+    assert (np.abs(own.total - truth) <= 4 * own.total_resamples.std(axis=0)).all()
+    assert (np.abs(own.second) <= 4 * own.second_resamples.std(axis=0)).all()
+    assert np.sqrt(found.indices.variance[0]) == pytest.approx(np.sqrt(parts.sum()), rel=0.02)
+
+
+def test_exchanging_a_block_exchanges_its_columns_and_no_others():
+    errors = sizes("abcd", CORRELATED)
+    design = SaltelliDesign(players=("a + c", "b", "a + c", "d"), seed=5)
+    x = errors.standard_values(np.concatenate(list(design.chunks(0, 64)))).reshape(64, -1, 4)
+    a, exchanged, b = x[:, 0], x[:, 1], x[:, -1]
+    np.testing.assert_allclose(exchanged[:, [0, 2]], b[:, [0, 2]], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(exchanged[:, [1, 3]], a[:, [1, 3]], rtol=0, atol=1e-12)
+
+
+def test_independent_sources_are_their_own_blocks():
+    errors = sizes("abc")
+    response = Linear(np.array([[1.0, 2.0, 3.0]]), errors.columns)
+    one, two = (sobol_indices(response, errors, errors.zones, SeedTree(1), fixed(64), player) for player in Player)
+    assert one.sources == two.sources
+    same_indices(one, two)
+
+
+@pytest.mark.parametrize("sample", [0, 1, 4, 5 * 77 + 2])
+def test_one_failed_sample_drops_its_block_and_nothing_else(sample):
+    weights, errors = np.array([[1.0, 2.0, 0.5], [0.5, 0.1, 2.0]]), sizes("abc")
+    effort = fixed(128)
+    broken = analysis(weights.tolist(), effort, broken=(sample,))
+    assert (broken.blocks, broken.dropped, broken.samples) == (127, 1, 128 * 5)
+    assert np.isfinite(broken.indices.total_resamples).all()
+    design = SaltelliDesign(players=("a", "b", "c"), seed=SeedTree(1).child("sample").integer())
+    x = errors.standard_values(np.concatenate(list(design.chunks(0, 128)))) * 6.0
+    without = np.delete(x.reshape(128, 5, 3), sample // 5, axis=0).reshape(-1, 3)
+    whole = saltelli_indices(Linear(weights, errors.columns)(without), 3, SeedTree(1).child("resamples"))
+    for name in ("first", "total", "first_resamples", "total_resamples"):
+        np.testing.assert_allclose(getattr(broken.indices, name), getattr(whole, name), rtol=0, atol=1e-12)
+
+
+def test_more_than_one_block_in_a_hundred_stops_the_analysis_unless_the_caller_allows_it():
+    broken, weights = (0, 40), [[1.0, 2.0, 0.5]]
+    with pytest.raises(SolveError, match=r"2 of 128 blocks hold a failed sample; allowed is 0\.01"):
+        analysis(weights, fixed(128), broken=broken)
+    assert analysis(weights, fixed(128, largest_failed_share=0.02), broken=broken).dropped == 2
+
+
+def test_a_second_seed_reproduces_what_the_first_promises():
+    weights = [[1.0, 0.95, 0.5, 0.45, 0.4]]
+    first, second = (analysis(weights, fixed(256), seed).overall for seed in (1, 2))
+    found = first.reproduced_by(second)
+    assert 6 <= found.promised <= 10
+    assert found.share >= found.confidence
+
+
+@pytest.mark.parametrize("start", [0, 1, 48])
+def test_a_first_number_of_blocks_that_is_no_power_of_two_is_refused(start):
+    with pytest.raises(InputError, match="power of two"):
+        SobolEffort(start=start)
+    with pytest.raises(InputError, match="1 or more"):
+        replace(SobolEffort(), places=0)

@@ -1,0 +1,97 @@
+"""How much a study may compute."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.search import SearchEffort
+from tolalloc.sensitivity.sobol import SobolEffort
+from tolalloc.uncertainty.sampling import SamplingDesign
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankingEffort:
+    """How much ``tolalloc rank`` may compute.
+
+    Parameters
+    ----------
+    units
+        Random units behind yields, capabilities and what the units out of the limit share [-].
+    design
+        How these units are spread; yields have an interval for the Monte Carlo design alone.
+    sobol
+        Blocks of the Sobol analysis, and what stops their growth.
+    trajectories
+        Trajectories of Morris' elementary effects [-].
+    moment_units, derivative_units, inverse_units, surrogate_units
+        Units behind PAWN and delta, behind derivatives, behind every trial zone, and behind the surrogates [-].
+    level_units, level_runs, widened_units
+        Units of a level and runs of the subset simulation, and units of the widened distribution that checks it, all
+        for limits that are rarely exceeded [-].
+    permutations
+        Permutations behind Shapley effects, where sources are correlated [-].
+    """
+
+    units: int = 16_384
+    design: SamplingDesign = SamplingDesign.MONTE_CARLO
+    sobol: SobolEffort = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
+    trajectories: int = 32
+    moment_units: int = 4096
+    derivative_units: int = 1024
+    inverse_units: int = 2048
+    surrogate_units: int = 2048
+    level_units: int = 2000
+    level_runs: int = 10
+    widened_units: int = 10_000
+    permutations: int = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much a study may compute.
+
+    Parameters
+    ----------
+    verification_units
+        Fresh units per verified design [-].
+    sobol_blocks
+        Blocks of the Sobol analysis, a power of two [-].
+    shared_units
+        Common random units of the quantile surrogate [-].
+    search
+        Effort of the search.
+    ranking
+        Effort of ``tolalloc rank``.
+    """
+
+    verification_units: int = 6144
+    sobol_blocks: int = 512
+    shared_units: int = 256
+    search: SearchEffort = field(default_factory=SearchEffort)
+    ranking: RankingEffort = field(default_factory=RankingEffort)
+
+
+QUICK = Effort(
+    verification_units=1152,
+    sobol_blocks=32,
+    shared_units=48,
+    search=SearchEffort(
+        steps=2,
+        front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
+    ),
+    ranking=RankingEffort(
+        units=2048,
+        sobol=SobolEffort(start=32, limit=64),
+        trajectories=8,
+        moment_units=512,
+        derivative_units=128,
+        inverse_units=400,
+        surrogate_units=512,
+        level_units=200,
+        level_runs=2,
+        widened_units=500,
+        permutations=100,
+    ),
+)
+"""Effort of a quick run: every stage is real, every interval wide."""
