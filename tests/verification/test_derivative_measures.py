@@ -1,0 +1,173 @@
+"""Derivatives by source and the bounds that they put on total indices, on functions with known derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from tolalloc.exceptions import SolveError
+from tolalloc.response.interface import Evaluation
+from tolalloc.response.kernel import KernelResponse
+from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
+from tolalloc.uncertainty.correlation import Correlation, Pair
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.uncertainty.zones import Distribution, Feature
+
+
+def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **more) -> Source:
+    return Source(name=name, part="part", feature=feature, zone=zone, minimum=0.1, maximum=10.0, cost=1.0, **more)
+
+
+@dataclass(frozen=True)
+class Answer:
+    evaluation: Evaluation
+    by_column: np.ndarray
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function with its derivatives; the first ``fail`` samples fail."""
+
+    columns: tuple[str, ...]
+    value: Callable[[np.ndarray], np.ndarray]
+    slope: Callable[[np.ndarray], np.ndarray]
+    fail: int = 0
+    outputs: tuple[str, ...] = ("y [-]",)
+
+    def with_derivatives(self, x: np.ndarray) -> Answer:
+        return Answer(evaluation=self(x), by_column=self.slope(x))
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        status = np.zeros(x.shape[0], np.uint8)
+        status[: self.fail] = 1
+        return Evaluation(values=self.value(x)[:, np.newaxis], status=status)
+
+
+def linear(errors: ErrorModel, weights: list[float], fail: int = 0) -> Function:
+    return Function(
+        errors.columns, lambda x: x @ np.array(weights), lambda x: np.tile(np.array(weights), (x.shape[0], 1)), fail
+    )
+
+
+def test_the_bound_of_a_linear_output_is_its_total_index():
+    """The measures are exact; the variance has a standard error of √(2/n), of which 4 are allowed."""
+    errors = ErrorModel((source("a"), source("b", Feature.POSITION), source("c", over=2.0, shift=0.3, middle=1.0)))
+    weights = [1.0, 0.5, -2.0, 3.0]
+    found = derivative_measures(linear(errors, weights), errors, errors.zones, SeedTree(0), 4096)
+    middle, one_deviation = errors.deviations(
+        errors.standard_values(ndtr(np.array([[0.0] * 4, [1.0] * 4]))), errors.zones
+    )
+    parts = ((one_deviation - middle) * np.array(weights)) ** 2
+    truth = np.array([parts[0], parts[1] + parts[2], parts[3]])
+    np.testing.assert_allclose(found.measure, truth, rtol=1e-6)
+    np.testing.assert_allclose(found.bound, truth / truth.sum(), rtol=4 * np.sqrt(2 / 4096))
+    assert found.sources == ("a", "b", "c")
+
+
+def test_the_bound_is_above_the_total_index_of_the_ishigami_function():
+    errors = ErrorModel(
+        tuple(source(name, zone=2 * np.pi, distribution=Distribution.UNIFORM) for name in ("x1", "x2", "x3"))
+    )
+    ishigami = Function(
+        errors.columns,
+        lambda x: np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0]),
+        lambda x: np.column_stack(
+            [
+                np.cos(x[:, 0]) * (1 + 0.1 * x[:, 2] ** 4),
+                7 * np.sin(2 * x[:, 1]),
+                0.4 * x[:, 2] ** 3 * np.sin(x[:, 0]),
+            ]
+        ),
+    )
+    found = derivative_measures(ishigami, errors, errors.zones, SeedTree(1), 4096)
+    assert (found.bound_interval[0] > [0.55758886, 0.44241114, 0.24368366]).all()
+
+
+def test_the_bound_holds_for_a_vector_of_uniform_magnitude():
+    errors = ErrorModel((source("a", Feature.POSITION, distribution=Distribution.UNIFORM), source("b", zone=1.0)))
+    squares = Function(
+        errors.columns,
+        lambda x: x[:, 0] ** 2 + x[:, 0] + x[:, 1] ** 2 + np.abs(x[:, 2]),
+        lambda x: np.column_stack([2 * x[:, 0] + 1, 2 * x[:, 1], np.sign(x[:, 2])]),
+    )
+    found = derivative_measures(squares, errors, errors.zones, SeedTree(2), 4096)
+    # Magnitude m uniform up to 3, any phase: Var m² + E[m²]/2; and the variance of |b| with σ = 1/6.
+    parts = np.array([81 * (1 / 5 - 1 / 9) + 9 / 6, (1 - 2 / np.pi) / 36])
+    assert (found.bound_interval[0] > parts / parts.sum()).all()
+
+
+def test_correlated_sources_have_one_measure_together():
+    pair = Pair(one="a", other="c", correlation=0.6)
+    errors = ErrorModel(
+        (source("a"), source("b", Feature.POSITION, distribution=Distribution.UNIFORM), source("c")),
+        correlation=Correlation(pairs=(pair,)),
+    )
+    weights = [1.0, 2.0, -1.0, 0.5]
+    found = derivative_measures(linear(errors, weights), errors, errors.zones, SeedTree(3), 4096)
+    assert found.sources == ("a + c", "b")
+    # a + c/2 is normal, and a linear measure is the variance.
+    np.testing.assert_allclose(found.measure[0], 1.0 + 0.25 + 2 * 0.6 * 0.5, rtol=1e-6)
+
+
+def test_bounds_of_the_resamples_cover():
+    """90 % intervals of the bound of a linear output over 200 samples; less 3 standard errors."""
+    errors = ErrorModel((source("a"), source("b")))
+    inside = []
+    for seed in range(200):
+        low, high = derivative_measures(
+            linear(errors, [1.0, 2.0]), errors, errors.zones, SeedTree(seed), 512, resamples=200
+        ).bound_interval[:, 0]
+        inside.append(low <= 0.2 <= high)
+    assert np.mean(inside) > 0.9 - 3 * np.sqrt(0.09 / 200)
+
+
+def test_local_derivatives_have_sign_length_and_direction():
+    errors = ErrorModel((source("a", middle=2.0), source("b", Feature.POSITION), source("c", over=0.5)))
+    found = local_derivatives(linear(errors, [-3.0, 3.0, 4.0, 1.0]), errors, errors.zones, SeedTree(4), 64)
+    np.testing.assert_allclose(found.at_nominal, np.array([-3.0, 5.0, 2.0]) * 1e-6)
+    np.testing.assert_allclose(found.direction, [np.nan, np.arctan2(4.0, 3.0), np.nan])
+    np.testing.assert_allclose(found.root_mean_square, np.array([3.0, 5.0, 2.0]) * 1e-6)
+    assert found.nominal == -6.0
+
+
+def test_root_mean_square_is_over_random_units():
+    """Mean of (2x)² with σ = 1 is 4; its standard error is 4·√(2/n), of which 4 are allowed."""
+    errors = ErrorModel((source("a"),))
+    square = Function(errors.columns, lambda x: x[:, 0] ** 2, lambda x: 2 * x)
+    found = local_derivatives(square, errors, errors.zones, SeedTree(5), 4096)
+    assert found.at_nominal[0] == 0.0
+    np.testing.assert_allclose((found.root_mean_square[0] * 1e6) ** 2, 4.0, rtol=4 * np.sqrt(2 / 4096))
+
+
+def test_failed_units_are_counted_and_too_many_stop():
+    errors = ErrorModel((source("a"), source("b")))
+    few = derivative_measures(linear(errors, [1.0, 1.0], fail=5), errors, errors.zones, SeedTree(6), 1000)
+    assert (few.units, few.failed) == (995, 5)
+    with pytest.raises(SolveError, match="no usable answer"):
+        derivative_measures(linear(errors, [1.0, 1.0], fail=50), errors, errors.zones, SeedTree(6), 1000)
+    with pytest.raises(SolveError, match="nominal"):
+        local_derivatives(linear(errors, [1.0, 1.0], fail=1), errors, errors.zones, SeedTree(6), 1000)
+    with pytest.raises(SolveError, match="same for all units"):
+        derivative_measures(linear(errors, [0.0, 0.0]), errors, errors.zones, SeedTree(6), 1000)
+
+
+def test_the_kernel_knows_its_derivatives(rv20e):
+    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    fixed = dict.fromkeys((name for name in rv20e.columns if name not in errors.columns), 0.0)
+    kernel = KernelResponse(
+        model=rv20e,
+        torque=rv20e.reducer.load.test_torque,
+        columns=errors.columns,
+        fixed=fixed | rv20e.reducer.modification.deviations,
+    )
+    assert isinstance(kernel, ResponseWithDerivatives)
+    found = derivative_measures(kernel, errors, errors.zones, SeedTree(7), 64, resamples=10)
+    assert np.isfinite(found.bound).all()
+    assert found.bound.sum() > 0.5

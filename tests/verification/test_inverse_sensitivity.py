@@ -1,0 +1,146 @@
+"""How far a zone may open alone, against the closed form of a normal sum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.inverse import inverse_sensitivity
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.zones import Feature
+
+NAMES = ("a", "b", "c", "d")
+DEVIATIONS = np.array([1.0, 0.7, 0.5, 0.01])
+"""What each source gives to the output's standard deviation."""
+TARGET = 0.99
+
+
+def errors_with(group: str = "") -> ErrorModel:
+    return ErrorModel(
+        tuple(
+            Source(
+                name=name,
+                part="part",
+                feature=Feature.SIZE,
+                zone=6.0 * deviation,
+                minimum=0.001,
+                maximum=9.0,
+                cost=1.0,
+                group=group,
+            )
+            for name, deviation in zip(NAMES, DEVIATIONS, strict=True)
+        )
+    )
+
+
+ERRORS = errors_with()
+
+
+@dataclass(frozen=True)
+class Sum:
+    """10 and the sum of all columns; it fails where one column is beyond ``breaks``."""
+
+    breaks: float = np.inf
+    at_once: int = 10**9
+    columns: tuple[str, ...] = NAMES
+    outputs: tuple[str, ...] = ("y [-]",)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        values = np.empty((x.shape[0], 1))
+        for start in range(0, x.shape[0], self.at_once):
+            rows = x[start : start + self.at_once]
+            values[start : start + self.at_once, 0] = 10.0 + (((rows[:, 0] + rows[:, 1]) + rows[:, 2]) + rows[:, 3])
+        return Evaluation(values=values, status=(np.abs(x).max(axis=1) > self.breaks).astype(np.uint8))
+
+
+def true_factor(limit: float) -> np.ndarray:
+    """Return the factor that makes the quantile of the normal sum equal to the limit, NaN if none does."""
+    variance = ((limit - 10.0) / norm.ppf(TARGET)) ** 2
+    square = 1 + (variance - (DEVIATIONS**2).sum()) / DEVIATIONS**2
+    return np.sqrt(np.where(square >= 0, square, np.nan))
+
+
+def found(limit: float, seed: int = 0, response: Sum | None = None, errors: ErrorModel = ERRORS, **more):
+    return inverse_sensitivity(
+        response or Sum(), errors, errors.zones, SeedTree(seed), limit=limit, target=TARGET, **more
+    )
+
+
+def test_a_zone_may_open_as_far_as_the_closed_form_says():
+    """Within the 90 % interval widened to 4 standard errors, 4/1.645 of its halves."""
+    truth, result = true_factor(14.0), found(14.0)
+    assert result.meets
+    np.testing.assert_array_equal(result.factor[3], np.inf)
+    for at in range(3):
+        below, above = result.factor[at] - result.low[at], result.high[at] - result.factor[at]
+        assert result.factor[at] - below * 4 / 1.645 < truth[at] < result.factor[at] + above * 4 / 1.645
+    np.testing.assert_allclose(result.zone[:3], result.factor[:3] * ERRORS.zones[:3])
+    assert result.calls <= 10
+
+
+def test_a_zone_that_repairs_the_design_alone_must_close_and_others_cannot():
+    truth, result = true_factor(12.6), found(12.6, units=20000)
+    assert not result.meets
+    assert np.isnan(result.factor[3])
+    assert np.isnan(truth[3])
+    assert result.low[0] < truth[0] < result.high[0] < 1.0
+    np.testing.assert_array_equal(np.isnan(result.low), np.isnan(result.factor))
+
+
+def test_the_factor_puts_the_quantile_on_the_limit():
+    result = found(14.0)
+    uniform = np.concatenate(list(SeedTree(0).uniform_chunks(2048, 4)))
+    for at in range(3):
+        zones = ERRORS.zones.copy()
+        zones[at] = result.zone[at]
+        values = Sum()(ERRORS.deviations(ERRORS.standard_values(uniform), zones)).values[:, 0]
+        assert abs(np.quantile(values, TARGET) - 14.0) <= 1e-3 * 14.0
+
+
+def test_intervals_cover():
+    """90 % intervals of 150 samples cover 0.9 less 3 standard errors and 0.03 for the slope taken as constant."""
+    truth, inside = true_factor(14.0)[:2], []
+    for seed in range(150):
+        result = found(14.0, seed)
+        inside.append((result.low[:2] <= truth) & (truth <= result.high[:2]))
+    assert np.mean(inside, axis=0).min() > 0.9 - 0.03 - 3 * np.sqrt(0.09 / 150)
+
+
+def test_sources_of_a_group_open_one_at_a_time():
+    np.testing.assert_array_equal(found(14.0, errors=errors_with("g")).factor, found(14.0).factor)
+
+
+def test_same_bits_for_any_chunks():
+    np.testing.assert_array_equal(found(14.0, response=Sum(at_once=37)).factor, found(14.0).factor)
+
+
+def test_few_failed_samples_are_counted_and_many_stop():
+    assert found(13.5, response=Sum(breaks=6.5)).failed > 0
+    with pytest.raises(SolveError, match="a at"):
+        found(14.0, response=Sum(breaks=3.0))
+
+
+def test_a_jump_over_the_limit_is_refused():
+    @dataclass(frozen=True)
+    class Jump(Sum):
+        def __call__(self, x: np.ndarray) -> Evaluation:
+            spread = np.full((x.shape[0], 1), float(x[:, 0].std() > 1.7))
+            return Evaluation(values=spread, status=np.zeros(x.shape[0], np.uint8))
+
+    errors = ErrorModel(ERRORS.sources[:1])
+    with pytest.raises(SolveError, match="jumps over the limit"):
+        found(0.5, response=Jump(columns=("a",)), errors=errors, largest_factor=2.0)
+
+
+def test_too_few_units_and_a_factor_that_does_not_open_are_refused():
+    with pytest.raises(InputError, match="500 or more"):
+        found(14.0, units=400)
+    with pytest.raises(InputError, match="above 1"):
+        found(14.0, largest_factor=1.0)

@@ -1,0 +1,276 @@
+"""Exact derivatives by source: at the nominal, over random units, and the bounds on total indices that they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtr, ndtri
+
+from tolalloc.exceptions import SolveError
+from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.sensitivity.ranking import percentile_interval
+from tolalloc.sensitivity.saltelli import resample_counts
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.units import MICROMETRE
+
+_STEP = 1e-4
+"""Step of the differences in standard normal space; rounding and curvature then both cost about 1e-8 [-]."""
+
+
+@runtime_checkable
+class Derived(Protocol):
+    """Answers with the derivative of the first output by every column."""
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """Outputs and status of every sample."""
+        ...
+
+    @property
+    def by_column(self) -> Float[np.ndarray, "sample column"]:
+        """Derivatives [output per unit of the column]."""
+        ...
+
+
+@runtime_checkable
+class ResponseWithDerivatives(Protocol):
+    """A response that knows its derivatives."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of X."""
+        ...
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
+        """Return the outputs of every sample and their derivatives."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalDerivatives:
+    """What a micrometre of each source does to the output.
+
+    Parameters
+    ----------
+    sources
+        Names of the sources that a drawing limits, in the order of all arrays.
+    nominal
+        Output in the middle of all zones [output].
+    at_nominal
+        Derivative there: with its sign for a source of one column, the length of the gradient for any other
+        [output/µm].
+    direction
+        Direction of the gradient of a source of two columns, x or the cosine at 0; NaN for any other [rad].
+    root_mean_square
+        Root mean square of the gradient's length over random units [output/µm].
+    units, failed
+        Good random units, and those without a usable answer [-].
+    """
+
+    sources: tuple[str, ...]
+    nominal: float
+    at_nominal: Float[np.ndarray, " source"]
+    direction: Float[np.ndarray, " source"]
+    root_mean_square: Float[np.ndarray, " source"]
+    units: int
+    failed: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class DerivativeMeasures:
+    """Derivative-based global measures and the bounds that they put on the total indices.
+
+    Parameters
+    ----------
+    sources
+        Names, in the order of all arrays; correlated sources stand together, joined by " + ".
+    measure
+        Mean square of the gradient by the source's standard normal numbers [output²].
+    variance
+        Variance of the output [output²].
+    bound
+        Measure over variance, not less than the total Sobol index [-].
+    bound_resamples
+        The same from bootstrap resamples of the units [-].
+    units, failed
+        Good units, and those without a usable answer [-].
+    """
+
+    sources: tuple[str, ...]
+    measure: Float[np.ndarray, " source"]
+    variance: float
+    bound: Float[np.ndarray, " source"]
+    bound_resamples: Float[np.ndarray, "resample source"]
+    units: int
+    failed: int
+
+    @property
+    def bound_interval(self) -> Float[np.ndarray, "2 source"]:
+        """90 % percentile interval of the bounds [-]."""
+        return percentile_interval(self.bound_resamples)
+
+
+def local_derivatives(
+    response: ResponseWithDerivatives,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    units: int = 1024,
+) -> LocalDerivatives:
+    """Return the derivatives by each source at the nominal and over random units.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources; joint ones are left out, because they are not lengths.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+    units
+        Random units [-].
+
+    Raises
+    ------
+    SolveError
+        The nominal or more than 1 % of the random units failed.
+
+    Notes
+    -----
+    A peak-to-peak has a kink wherever two angles share its maximum or minimum, and symmetry makes the nominal such a
+    place: the derivative there is one of several one-sided ones. The root mean square does not depend on it.
+    """
+    middle = response.with_derivatives(errors.deviations(np.zeros((1, len(errors.columns))), zones))
+    if not middle.evaluation.good.all():
+        raise SolveError("Local derivatives: the nominal has no usable answer.")
+    sample, by_column, _ = _sampled(response, errors, zones, seeds, units)
+    where, length, direction, random = np.array(errors.source_of_column), [], [], []
+    for source in errors.active:
+        own, per_length = where == source.name, MICROMETRE / source.lever
+        gradient = middle.by_column[0, own] * per_length
+        length.append(float(gradient[0]) if gradient.size == 1 else float(np.linalg.norm(gradient)))
+        direction.append(float(np.arctan2(gradient[1], gradient[0])) if gradient.size == 2 else np.nan)
+        random.append(float(np.sqrt(((by_column[:, own] * per_length) ** 2).sum(axis=1).mean())))
+    return LocalDerivatives(
+        sources=tuple(source.name for source in errors.active),
+        nominal=float(middle.evaluation.values[0, 0]),
+        at_nominal=np.array(length),
+        direction=np.array(direction),
+        root_mean_square=np.array(random),
+        units=by_column.shape[0],
+        failed=sample.failed,
+    )
+
+
+def derivative_measures(
+    response: ResponseWithDerivatives,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    units: int = 1024,
+    resamples: int = 400,
+) -> DerivativeMeasures:
+    """Return the derivative-based measure of every source and its bound on the total index.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+    units, resamples
+        Random units, and bootstrap resamples of them [-].
+
+    Raises
+    ------
+    SolveError
+        More than 1 % of the units failed, or the output does not vary.
+
+    Notes
+    -----
+    Every distribution is a function x(u) of independent standard normal numbers, for which Poincaré's inequality has
+    the constant 1: total index ≤ E[|∂Y/∂u|²] / V with all numbers of a source in |·|. A linear output of normal columns
+    attains it. A kink does no harm, a jump would: the inequality needs an output that is continuous.
+
+    References
+    ----------
+    Sobol' & Kucherenko 2009; Lamboni, Iooss, Popelin & Gamboa 2013, Theorem 3.1, Poincaré constants.
+    """
+    sample, by_column, uniform = _sampled(response, errors, zones, seeds.child("sample"), units)
+    blocks = source_blocks(errors)
+    squares = _squared_gradients(by_column * _zone_per_column(errors, zones), errors, uniform, blocks)
+    centred = sample.values - sample.values.mean()
+    counts = resample_counts(centred.size, resamples, seeds.child("resamples"))
+    means = counts @ np.column_stack([centred, centred**2, squares]) / centred.size
+    variance = means[:, 1] - means[:, 0] ** 2
+    if not variance.min() > 0.0:
+        raise SolveError("Derivative measures: the output is the same for all units, so no source can be ranked.")
+    bounds = means[:, 2:] / variance[:, np.newaxis]
+    return DerivativeMeasures(
+        sources=tuple(dict.fromkeys(blocks)),
+        measure=means[0, 2:],
+        variance=float(variance[0]),
+        bound=bounds[0],
+        bound_resamples=bounds[1:],
+        units=centred.size,
+        failed=sample.failed,
+    )
+
+
+def source_blocks(errors: ErrorModel) -> tuple[str, ...]:
+    """Return for every column its source, correlated ones joined: their independent numbers belong to all of them."""
+    block_of = {name: " + ".join(block) for block in errors.blocks for name in block}
+    return tuple(block_of[name] for name in errors.source_of_column)
+
+
+def _sampled(
+    response: ResponseWithDerivatives,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    units: int,
+) -> tuple[MonteCarlo, Float[np.ndarray, "good column"], Float[np.ndarray, "good column"]]:
+    """Return random units, and of the good ones the derivatives and the uniform numbers."""
+    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
+    x = errors.deviations(errors.standard_values(uniform), zones)
+    answer = response.with_derivatives(x)
+    sample = MonteCarlo(x=x, evaluation=answer.evaluation)
+    require_few_failures(sample, "derivatives")
+    return sample, answer.by_column[answer.evaluation.good], uniform[answer.evaluation.good]
+
+
+def _squared_gradients(
+    by_standard: Float[np.ndarray, "unit column"],
+    errors: ErrorModel,
+    uniform: Float[np.ndarray, "unit column"],
+    blocks: tuple[str, ...],
+) -> Float[np.ndarray, "unit block"]:
+    """Return the squared length of the gradient by each block's standard normal numbers [output²].
+
+    Blocks do not mix, so one number of every block is moved at a time.
+    """
+    members = np.array(blocks)[:, np.newaxis] == list(dict.fromkeys(blocks))
+    number_in_block = (members.cumsum(axis=0) * members).sum(axis=1)
+    normal, squares = ndtri(uniform), np.zeros((uniform.shape[0], members.shape[1]))
+    for number in range(1, int(number_in_block.max()) + 1):
+        move = _STEP * (number_in_block == number)
+        ahead, behind = (errors.standard_values(ndtr(normal + way * move)) for way in (1, -1))
+        squares += ((by_standard * (ahead - behind) / (2.0 * _STEP)) @ members) ** 2
+    return squares
+
+
+def _zone_per_column(errors: ErrorModel, zones: Float[np.ndarray, " source"]) -> Float[np.ndarray, " column"]:
+    """Return the zone of every column's source [m]."""
+    ones = np.ones((1, len(errors.columns)))
+    return np.asarray((errors.deviations(ones, zones) - errors.deviations(0.0 * ones, zones))[0])

@@ -1,0 +1,265 @@
+"""Inverse sensitivity: how far each zone may open alone before the requirement fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Response
+from tolalloc.sensitivity.capability import quantile_interval
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+
+_LEAST_OUTSIDE = 5.0
+"""Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""
+_MOST_STEPS = 30
+"""Steps between two factors after which the quantile cannot be continuous; about four are usual [-]."""
+_SLOPE_STEP = 0.1
+"""Change of a factor that its slope is taken over, wide enough to move many units past each other [-]."""
+_CONFIDENCE = 0.9
+"""Confidence of the two-sided interval of every factor [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InverseSensitivity:
+    """The factor of each zone at which the requirement is just kept, all other zones as they are.
+
+    Parameters
+    ----------
+    sources
+        Names of the sources that a drawing limits, in the order of all arrays.
+    quantile
+        Quantile of the output at the target yield with the zones as they are [output].
+    meets
+        Whether that keeps the limit; if so the factors are above 1, if not below.
+    factor
+        Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
+        without the source [-].
+    low, high
+        Ends of the 90 % interval of the factor, NaN where it is not finite [-].
+    zone
+        Factor times the zone [m].
+    units, failed, calls
+        Units of every trial, samples without a usable answer over all trials, and calls of the response [-].
+    """
+
+    sources: tuple[str, ...]
+    quantile: float
+    meets: bool
+    factor: Float[np.ndarray, " source"]
+    low: Float[np.ndarray, " source"]
+    high: Float[np.ndarray, " source"]
+    zone: Float[np.ndarray, " source"]
+    units: int
+    failed: int
+    calls: int
+
+
+def inverse_sensitivity(
+    response: Response,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    *,
+    limit: float,
+    target: float,
+    units: int = 2048,
+    largest_factor: float = 10.0,
+    tolerance: float = 1e-3,
+    largest_failed_share: float = 0.01,
+) -> InverseSensitivity:
+    """Return how far each zone may open, or must close, alone.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model and its first output is limited.
+    errors
+        The sources; a joint one stays as it is.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+    limit
+        Largest output allowed [output].
+    target
+        Share of the units that must keep it [-].
+    units
+        Units of every trial [-].
+    largest_factor
+        Factor up to which a zone is opened [-].
+    tolerance
+        Distance from the limit, over the limit, at which the quantile counts as equal to it [-].
+    largest_failed_share
+        Share of the units of a trial that may fail [-].
+
+    Raises
+    ------
+    InputError
+        Too few units for the target.
+    SolveError
+        Too many units of a trial failed, or the quantile jumps over the limit.
+
+    Notes
+    -----
+    All trials use the same uniform numbers, so the quantile is a continuous function of each factor. Opening goes in
+    doublings, so the first crossing is found unless the quantile returns within one. Sources of a group that share a
+    zone on the drawing open one at a time here. The interval is that of the quantile by order statistics, over its
+    slope; the middle of a size does not move. What counts is the empirical quantile, without the margin that shows a
+    yield with confidence.
+
+    References
+    ----------
+    Regula falsi with halving of the stale end (Illinois): Dowell & Jarratt 1971.
+    """
+    needed = int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
+    if units < needed:
+        raise InputError.at("inverse sensitivity", "units", units, f"{needed} or more for a yield of {target:.4%}")
+    if largest_factor <= 1.0:
+        raise InputError.at("inverse sensitivity", "largest factor", largest_factor, "a number above 1")
+    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
+    openings = _Openings(response, errors, zones, errors.standard_values(uniform), target, largest_failed_share)
+    now = float(openings.quantiles(np.zeros(1, int), np.ones(1))[0, 0])
+    meets, count = now <= limit, len(errors.active)
+    factor = np.full(count, np.inf if meets else np.nan)
+    low, high = np.full((2, count), np.nan)
+    bracket = _bracket(openings, now, limit, largest_factor)
+    if bracket.sources.size:
+        own = bracket.sources
+        factor[own], quantiles = _crossings(openings, bracket, limit, tolerance)
+        low[own], high[own] = _interval(openings, own, factor[own], quantiles, limit)
+    return InverseSensitivity(
+        sources=tuple(source.name for source in errors.active),
+        quantile=now,
+        meets=meets,
+        factor=factor,
+        low=low,
+        high=high,
+        zone=factor * zones[:count],
+        units=units,
+        failed=openings.failed,
+        calls=openings.calls,
+    )
+
+
+class _Openings:
+    """The same units with one zone multiplied by a factor, for several sources in one call of the response."""
+
+    def __init__(
+        self,
+        response: Response,
+        errors: ErrorModel,
+        zones: Float[np.ndarray, " source"],
+        standard: Float[np.ndarray, "unit column"],
+        target: float,
+        largest_failed_share: float,
+    ) -> None:
+        self.response, self.errors, self.zones, self.standard = response, errors, zones, standard
+        self.target, self.largest_failed_share = target, largest_failed_share
+        self.calls = self.failed = 0
+
+    def quantiles(
+        self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
+    ) -> Float[np.ndarray, "trial 3"]:
+        """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
+        zones = np.repeat(self.zones[np.newaxis], sources.size, axis=0)
+        zones[np.arange(sources.size), sources] *= factors
+        evaluation = self.response(np.concatenate([self.errors.deviations(self.standard, own) for own in zones]))
+        good, values = (part.reshape(sources.size, -1) for part in (evaluation.good, evaluation.values[:, 0]))
+        self.calls += 1
+        self.failed += int(np.count_nonzero(~good))
+        self._require_few_failures(good, sources, factors)
+        found = [
+            quantile_interval(own[usable], self.target, _CONFIDENCE) for own, usable in zip(values, good, strict=True)
+        ]
+        return np.array([(own.estimate, own.low, own.high) for own in found])
+
+    def _require_few_failures(
+        self,
+        good: Bool[np.ndarray, "trial unit"],
+        sources: Int[np.ndarray, " trial"],
+        factors: Float[np.ndarray, " trial"],
+    ) -> None:
+        """Raise if more units of a trial failed than allowed."""
+        failed = np.count_nonzero(~good, axis=1)
+        worst = int(failed.argmax())
+        if failed[worst] > self.largest_failed_share * good.shape[1]:
+            raise SolveError(
+                f"Inverse sensitivity: {failed[worst]} of {good.shape[1]} units have no usable answer with "
+                f"{self.errors.active[sources[worst]].name} at {factors[worst]:.4g} times its zone; allowed is "
+                f"{self.largest_failed_share:.4g} of them, because more would bias the quantile."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Bracket:
+    """Two factors per source with the limit between their quantiles, and quantile less limit at both."""
+
+    sources: Int[np.ndarray, " found"]
+    near: Float[np.ndarray, " found"]
+    far: Float[np.ndarray, " found"]
+    near_excess: Float[np.ndarray, " found"]
+    far_excess: Float[np.ndarray, " found"]
+
+
+def _bracket(openings: _Openings, now: float, limit: float, largest_factor: float) -> _Bracket:
+    """Return the sources whose quantile crosses the limit between factor 1 and the last trial."""
+    doublings = 2.0 ** np.arange(1, int(np.ceil(np.log2(largest_factor))))
+    trials = [*doublings.tolist(), largest_factor] if now <= limit else [0.0]
+    left = np.arange(len(openings.errors.active))
+    near, near_excess, found = 1.0, np.full(left.size, now - limit), []
+    for far in trials:
+        if not left.size:
+            break
+        excess = openings.quantiles(left, np.full(left.size, far))[:, 0] - limit
+        crossed = (excess > 0.0) != (now > limit)
+        ends = np.full((2, left.size), [[near], [far]])
+        found.append(np.stack([left, *ends, near_excess, excess])[:, crossed])
+        left, near, near_excess = left[~crossed], far, excess[~crossed]
+    sources, *numbers = np.concatenate(found, axis=1)
+    names = ("near", "far", "near_excess", "far_excess")
+    return _Bracket(sources=sources.astype(int), **dict(zip(names, numbers, strict=True)))
+
+
+def _crossings(
+    openings: _Openings, bracket: _Bracket, limit: float, tolerance: float
+) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
+    """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
+    stale, fresh = bracket.near.copy(), bracket.far.copy()
+    stale_excess, fresh_excess = bracket.near_excess.copy(), bracket.far_excess.copy()
+    left, quantiles = np.arange(stale.size), np.empty((stale.size, 3))
+    for _ in range(_MOST_STEPS):
+        a, b, at_a, at_b = stale[left], fresh[left], stale_excess[left], fresh_excess[left]
+        trial = b - at_b * (b - a) / (at_b - at_a)
+        quantiles[left] = openings.quantiles(bracket.sources[left], trial)
+        excess = quantiles[left, 0] - limit
+        # The new end replaces the one on its own side; an end that stays twice loses half its weight.
+        other_side = (excess > 0.0) != (at_b > 0.0)
+        stale[left], stale_excess[left] = np.where(other_side, b, a), np.where(other_side, at_b, at_a / 2.0)
+        fresh[left], fresh_excess[left] = trial, excess
+        left = left[np.abs(excess) > tolerance * abs(limit)]
+        if not left.size:
+            return fresh, quantiles
+    name = openings.errors.active[bracket.sources[left[0]]].name
+    raise SolveError(f"Inverse sensitivity: the quantile jumps over the limit at {fresh[left[0]]:.6g} of {name}.")
+
+
+def _interval(
+    openings: _Openings,
+    sources: Int[np.ndarray, " found"],
+    factor: Float[np.ndarray, " found"],
+    quantiles: Float[np.ndarray, "found 3"],
+    limit: float,
+) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, " found"]]:
+    """Return the ends of the factors' intervals: those of the quantile, over its slope [-]."""
+    estimate, low, high = quantiles.T
+    step = _SLOPE_STEP * np.maximum(factor, 1.0)
+    slope = (openings.quantiles(sources, factor + step)[:, 0] - estimate) / step
+    # Where the quantile does not rise, it does not bound the factor.
+    down, up = (
+        np.where(slope > 0.0, way / np.where(slope > 0.0, slope, 1.0), np.inf) for way in (high - limit, limit - low)
+    )
+    return np.maximum(factor - down, 0.0), factor + up

@@ -1,0 +1,296 @@
+"""Measures of importance beside Sobol's: elementary effects on SALib's design, PAWN and delta from a given sample.
+
+SALib's traps and the guards against them: one NaN makes every figure NaN, so only good samples are passed; its own
+seeding and delta's resampling set numpy's global state, so resamples are drawn here; ``conf`` is a multiple of a
+standard deviation, so intervals here are percentiles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from SALib.analyze import pawn
+from SALib.analyze.delta import calc_delta
+from SALib.sample import morris
+
+from tolalloc.blas import one_blas_thread
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Response
+from tolalloc.sensitivity.derivatives import source_blocks
+from tolalloc.sensitivity.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.sensitivity.ranking import percentile_interval
+from tolalloc.sensitivity.saltelli import resample_counts
+from tolalloc.sensitivity.target import limited_measures
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+
+_CURVE_POINTS = 100
+"""Points at which delta compares two densities, SALib's number."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElementaryEffects:
+    """What a large step of one source alone does, from many places.
+
+    Parameters
+    ----------
+    sources
+        Names, in the order of all arrays; correlated sources stand together, joined by " + ".
+    effects
+        Change of the output per step over the length of the step in uniform numbers; its sign is that of the change
+        for a rising number, and for a source of several columns, which step in random directions, has no meaning
+        [output].
+    mu_star
+        Mean of the effects' magnitudes [output].
+    mu_star_resamples
+        The same from bootstrap resamples of the trajectories [output].
+    sigma
+        Standard deviation of the effects, NaN for a source of several columns [output].
+    trajectories, dropped
+        Trajectories used, and those dropped because one of their samples failed [-].
+    """
+
+    sources: tuple[str, ...]
+    effects: Float[np.ndarray, "output trajectory source"]
+    mu_star: Float[np.ndarray, "output source"]
+    mu_star_resamples: Float[np.ndarray, "output resample source"]
+    sigma: Float[np.ndarray, "output source"]
+    trajectories: int
+    dropped: int
+
+    def mu_star_interval(self, output: int) -> Float[np.ndarray, "2 source"]:
+        """Return the 90 % percentile interval of the mean magnitudes of one output [output]."""
+        return percentile_interval(self.mu_star_resamples[output])
+
+
+@dataclass(frozen=True, kw_only=True)
+class MomentIndependent:
+    """How much knowing a source changes the whole distribution of the first output.
+
+    Parameters
+    ----------
+    sources
+        Names, in the order of all arrays.
+    pawn
+        Median over classes of the Kolmogorov–Smirnov distance to the whole sample [-].
+    delta
+        Half the mean distance between the densities, less its bias [-].
+    delta_resamples
+        The same from bootstrap resamples of the units [-].
+    pawn_dummy, delta_dummy
+        Largest index among the dummies, columns that the output does not depend on: a level that means nothing [-].
+    units, failed
+        Good units, and those without a usable answer [-].
+    """
+
+    sources: tuple[str, ...]
+    pawn: Float[np.ndarray, " source"]
+    delta: Float[np.ndarray, " source"]
+    delta_resamples: Float[np.ndarray, "resample source"]
+    pawn_dummy: float
+    delta_dummy: float
+    units: int
+    failed: int
+
+    @property
+    def delta_interval(self) -> Float[np.ndarray, "2 source"]:
+        """90 % percentile interval of delta [-]."""
+        return percentile_interval(self.delta_resamples)
+
+
+def elementary_effects(
+    response: Response,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    trajectories: int,
+    *,
+    levels: int = 4,
+    trim: float = 0.001,
+    resamples: int = 400,
+    largest_dropped_share: float = 0.05,
+) -> ElementaryEffects:
+    """Return the elementary effects of all sources on all outputs.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+    trajectories
+        Trajectories; the response is called (sources + 1) times as often [-].
+    levels
+        Levels of every uniform number, an even number; a step goes over half of them [-].
+    trim
+        Share of the distribution left out at either end, where a normal number would be infinite [-].
+    resamples
+        Bootstrap resamples of the trajectories [-].
+    largest_dropped_share
+        Share of the trajectories that may be dropped [-].
+
+    Raises
+    ------
+    InputError
+        An odd number of levels, or a trim outside 0 to 0.5.
+    SolveError
+        More trajectories hold a failed sample than allowed, or fewer than two are left.
+
+    References
+    ----------
+    Morris 1991; Campolongo, Cariboni & Saltelli 2007, mu* and groups; SALib draws the trajectories.
+    """
+    if levels < 2 or levels % 2:
+        raise InputError.at("elementary effects", "levels", levels, "an even number, 2 or more")
+    if not 0.0 < trim < 0.5:
+        raise InputError.at("elementary effects", "trim", trim, "a number between 0 and 0.5")
+    groups = source_blocks(errors)
+    names = tuple(dict.fromkeys(groups))
+    problem = {
+        "num_vars": len(errors.columns),
+        "names": list(errors.columns),
+        "groups": list(groups),
+        "bounds": [[trim, 1.0 - trim]] * len(errors.columns),
+    }
+    uniform = morris.sample(problem, trajectories, num_levels=levels, seed=seeds.child("sample").integer())
+    evaluation = response(errors.deviations(errors.standard_values(uniform), zones))
+    whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
+    used = int(np.count_nonzero(whole))
+    if trajectories - used > largest_dropped_share * trajectories or used < 2:
+        raise SolveError(
+            f"Elementary effects: {trajectories - used} of {trajectories} trajectories hold a failed sample; allowed "
+            f"is {largest_dropped_share:.4g} of them, and two must be left."
+        )
+    members = np.array(groups)[:, np.newaxis] == names
+    effects = _effects(
+        uniform.reshape(trajectories, len(names) + 1, -1)[whole],
+        evaluation.values.reshape(trajectories, len(names) + 1, -1)[whole],
+        members,
+        levels / (2.0 * (levels - 1)),
+    )
+    counts = resample_counts(used, resamples, seeds.child("resamples"))
+    magnitudes = counts @ np.abs(effects) / used
+    return ElementaryEffects(
+        sources=names,
+        effects=effects,
+        mu_star=magnitudes[:, 0],
+        mu_star_resamples=magnitudes[:, 1:],
+        sigma=np.where(members.sum(axis=0) == 1, effects.std(axis=1, ddof=1), np.nan),
+        trajectories=used,
+        dropped=trajectories - used,
+    )
+
+
+def moment_independent(
+    sample: MonteCarlo,
+    errors: ErrorModel,
+    seeds: SeedTree,
+    *,
+    classes: int = 10,
+    resamples: int = 50,
+    dummies: int = 20,
+) -> MomentIndependent:
+    """Return PAWN and delta from a sample that exists already.
+
+    Parameters
+    ----------
+    sample
+        Random units and their answers; the first output is analysed.
+    errors
+        The sources that the units were drawn from, at any zones.
+    seeds
+        Node of the seed tree.
+    classes
+        Classes of equal size that PAWN divides each measure into [-].
+    resamples
+        Bootstrap resamples of the units for delta [-].
+    dummies
+        Columns that the output does not depend on; one more without an effect passes them all with probability
+        1/(dummies + 1) [-].
+
+    Raises
+    ------
+    SolveError
+        More than 1 % of the units failed.
+
+    Notes
+    -----
+    Each source is known through the measure that its drawing limits and, if that measure is of several columns and of
+    one feature, also through each column alone, because a vector can act by its length or along a direction; the
+    largest index counts. What only length and direction together tell is left out.
+
+    References
+    ----------
+    Pianosi & Wagener 2018 (PAWN from given data); Plischke, Borgonovo & Smith 2013, eq. (26) and (30) (delta).
+    """
+    require_few_failures(sample, "moment-independent indices")
+    y, known = sample.values, _known(errors, sample.x[sample.evaluation.good])
+    known += list(seeds.child("dummies").generator().random((dummies, y.size, 1)))
+    pawns = np.array([_pawn(columns, y, classes).max() for columns in known])
+    generator = seeds.child("resamples").generator()
+    with one_blas_thread():
+        chosen = [columns[:, np.argmax([_delta(column, y) for column in columns.T])] for columns in known]
+        deltas = np.column_stack([_reduced_deltas(column, y, resamples, generator) for column in chosen])
+    count = len(known) - dummies
+    return MomentIndependent(
+        sources=tuple(dict.fromkeys(errors.source_of_column)),
+        pawn=pawns[:count],
+        delta=deltas[:, :count].mean(axis=0),
+        delta_resamples=deltas[:, :count],
+        pawn_dummy=float(pawns[count:].max()),
+        delta_dummy=float(deltas[:, count:].mean(axis=0).max()),
+        units=y.size,
+        failed=sample.failed,
+    )
+
+
+def _effects(
+    uniform: Float[np.ndarray, "trajectory sample column"],
+    values: Float[np.ndarray, "trajectory sample output"],
+    members: Bool[np.ndarray, "column source"],
+    step: float,
+) -> Float[np.ndarray, "output trajectory source"]:
+    """Return the change of the outputs over the step, with the direction of the first column of what moved [output]."""
+    moves = np.sign(np.diff(uniform, axis=1)) @ (members & (members.cumsum(axis=0) == 1))
+    # Every trajectory moves every source once, each in an order of its own.
+    return np.asarray(np.einsum("tso,tsg->otg", np.diff(values, axis=1), moves) / step)
+
+
+def _known(errors: ErrorModel, x: Float[np.ndarray, "unit column"]) -> list[Float[np.ndarray, "unit measure"]]:
+    """Return for every source the measures through which it may be known."""
+    where, found = np.array(errors.source_of_column), []
+    alone = {source.name for source in errors.active if source.each == 1}
+    for name, measure in zip(dict.fromkeys(errors.source_of_column), limited_measures(errors, x).T, strict=True):
+        own = x[:, where == name]
+        several = own.shape[1] > 1 and (name in alone)
+        found.append(np.column_stack([measure, own]) if several else measure[:, np.newaxis])
+    return found
+
+
+def _pawn(
+    columns: Float[np.ndarray, "unit measure"], y: Float[np.ndarray, " unit"], classes: int
+) -> Float[np.ndarray, " measure"]:
+    """Return SALib's PAWN index of every measure [-]."""
+    problem = {"num_vars": columns.shape[1], "names": [str(at) for at in range(columns.shape[1])]}
+    return np.asarray(pawn.analyze(problem, columns, y, S=classes)["median"])
+
+
+def _delta(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]) -> float:
+    """Return SALib's delta of one measure, with its bias [-]."""
+    exponent = 2.0 / (7.0 + np.tanh((1500.0 - y.size) / 500.0))
+    edges = np.linspace(0, y.size, min(int(np.ceil(y.size**exponent)), 48) + 1)
+    return float(calc_delta(y, np.linspace(y.min(), y.max(), _CURVE_POINTS), column, edges))
+
+
+def _reduced_deltas(
+    column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"], resamples: int, generator: np.random.Generator
+) -> Float[np.ndarray, " resample"]:
+    """Return twice the estimate less that of each resample; their mean is the estimate without its bias [-]."""
+    drawn = (generator.integers(y.size, size=y.size) for _ in range(resamples))
+    return 2.0 * _delta(column, y) - np.array([_delta(column[own], y[own]) for own in drawn])
