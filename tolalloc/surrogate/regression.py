@@ -13,7 +13,7 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-from sklearn.linear_model import RidgeCV
+from sklearn.linear_model import LassoCV, RidgeCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
@@ -32,8 +32,8 @@ def _no_baseline(x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " s
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surrogate:
-    """A fitted stand-in for a response with one output.
+class Regression:
+    """A fitted regression in place of a response with one output.
 
     Parameters
     ----------
@@ -43,6 +43,27 @@ class Surrogate:
         The fitted scikit-learn estimator of the output over the baseline.
     baseline
         A rough answer that the estimator corrects.
+    """
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    estimator: Any
+    baseline: Baseline = _no_baseline
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the predictions."""
+        values = np.asarray(self.estimator.predict(x) * self.baseline(x), dtype=float)
+        return Evaluation(values=values.reshape(-1, 1), status=np.zeros(x.shape[0], np.uint8))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surrogate(Regression):
+    """A regression with its error on answers that it has not seen.
+
+    Parameters
+    ----------
+    columns, outputs, estimator, baseline
+        As in `Regression`.
     q2
         Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) on held-out answers [-].
     rms_error
@@ -51,10 +72,6 @@ class Surrogate:
         Numbers of answers [-].
     """
 
-    columns: tuple[str, ...]
-    outputs: tuple[str, ...]
-    estimator: Any
-    baseline: Baseline
     q2: float
     rms_error: float
     trained: int
@@ -65,20 +82,58 @@ class Surrogate:
         """Whether Q² is high enough for the surrogate to be used."""
         return self.q2 >= NEEDED_Q2
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
-        """Return the predictions."""
-        values = np.asarray(self.estimator.predict(x) * self.baseline(x), dtype=float)
-        return Evaluation(values=values.reshape(-1, 1), status=np.zeros(x.shape[0], np.uint8))
+
+@dataclass(frozen=True, kw_only=True)
+class RegressionCandidate:
+    """A regression that may stand in for a response with one output.
+
+    Parameters
+    ----------
+    name
+        What a table calls it.
+    columns, outputs
+        As in `tolalloc.response.interface.Response`.
+    estimator
+        Makes the unfitted scikit-learn regressor.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    estimator: Callable[[], Any]
+
+    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
+        """Return the regression through answers."""
+        return Regression(columns=self.columns, outputs=self.outputs, estimator=fitted(self.estimator(), x, y))
+
+
+def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
+    """Return the fitted estimator."""
+    with warnings.catch_warnings():
+        # A length or the noise at its bound only says that a column, or noise, does not matter; a path of weights that
+        # ends early is judged by its error like every other.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return estimator.fit(x, y)
+
+
+def on_products_of_two(regressor: Any) -> Any:
+    """Return a linear regressor on the columns and all products of two of them."""
+    return make_pipeline(StandardScaler(), PolynomialFeatures(2, include_bias=False), StandardScaler(), regressor)
 
 
 def quadratic_regression() -> Any:
     """Return a ridge regression on all products of two columns."""
-    return make_pipeline(
-        StandardScaler(),
-        PolynomialFeatures(2, include_bias=False),
-        StandardScaler(),
-        RidgeCV(np.logspace(0, 5, 11)),
-    )
+    return on_products_of_two(RidgeCV(np.logspace(0, 5, 11)))
+
+
+def sparse_quadratic_regression() -> Any:
+    """Return a regression on those products of two columns that the LASSO keeps."""
+    return on_products_of_two(lasso())
+
+
+def lasso() -> Any:
+    """Return a linear regressor that keeps few columns, how few found by cross-validation."""
+    return TransformedTargetRegressor(LassoCV(alphas=np.logspace(-2.5, 0, 14), cv=3), transformer=StandardScaler())
 
 
 def gaussian_process(columns: int) -> Any:
@@ -114,10 +169,7 @@ def fit_surrogate(
     """
     seen = slice(0, y.size - held_out)
     unseen = slice(y.size - held_out, y.size)
-    with warnings.catch_warnings():
-        # A length or the noise at its bound only says that a column, or noise, does not matter.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        estimator.fit(x[seen], y[seen] / baseline(x[seen]))
+    fitted(estimator, x[seen], y[seen] / baseline(x[seen]))
     error = np.asarray(estimator.predict(x[unseen]) * baseline(x[unseen])) - y[unseen]
     return Surrogate(
         columns=columns,

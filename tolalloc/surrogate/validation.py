@@ -1,0 +1,212 @@
+"""The error and the speed of candidates for a surrogate, on answers that none of them has seen.
+
+Folds outside: every unit is predicted by a fit that has not seen it. Whatever a candidate tunes (a weight, the length
+of a Gaussian process), it tunes inside the fold that it is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Response
+from tolalloc.uncertainty.seeds import SeedTree
+
+_CLOCKED = 256
+"""Samples of each fold on which the candidate and the response are clocked, the shortest time of all folds counts [-].
+"""
+
+
+@runtime_checkable
+class Candidate(Protocol):
+    """What becomes a surrogate when it is fitted."""
+
+    @property
+    def name(self) -> str:
+        """What a table calls it."""
+        ...
+
+    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Response:
+        """Return the surrogate through the answers."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answers:
+    """Good answers of a response, dealt out to folds.
+
+    Parameters
+    ----------
+    x
+        Columns of every sample [m, angles rad].
+    y
+        The answers [output].
+    fold
+        Fold of every sample [-].
+    response
+        What gave the answers.
+    failed
+        Failed samples, which are left out [-].
+    """
+
+    x: Float[np.ndarray, "sample column"]
+    y: Float[np.ndarray, " sample"]
+    fold: Int[np.ndarray, " sample"]
+    response: Response
+    failed: int
+
+    @property
+    def splits(self) -> list[tuple[Bool[np.ndarray, " sample"], Bool[np.ndarray, " sample"]]]:
+        """Samples to fit and samples to predict, fold by fold."""
+        return [(self.fold != own, self.fold == own) for own in range(int(self.fold.max()) + 1)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """What a candidate is worth on held-out answers.
+
+    Parameters
+    ----------
+    name
+        The candidate.
+    q2
+        Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) [-].
+    rms_error
+        Root-mean-square error [output].
+    quantile_error
+        Quantile of the predictions less that of the answers [output].
+    quantile
+        Quantile of the answers [output].
+    speed
+        Predictions in the time of one answer [-].
+    per_second
+        Predictions per second [1/s].
+    trained, held_out
+        Answers that each fit saw, at least; answers that were predicted [-].
+    failed
+        Failed predictions, which the errors leave out [-].
+    """
+
+    name: str
+    q2: float
+    rms_error: float
+    quantile_error: float
+    quantile: float
+    speed: float
+    per_second: float
+    trained: int
+    held_out: int
+    failed: int
+
+    @property
+    def quantile_share(self) -> float:
+        """Error of the quantile over the quantile [-]."""
+        return self.quantile_error / self.quantile
+
+
+def answers_of(
+    response: Response,
+    x: Float[np.ndarray, "sample column"],
+    seeds: SeedTree,
+    folds: int = 5,
+    largest_failed_share: float = 0.01,
+) -> Answers:
+    """Return the answers of a response in random folds.
+
+    Parameters
+    ----------
+    response
+        What is stood in for; its first output counts.
+    x
+        Columns of every sample [m, angles rad].
+    seeds
+        Node of the seed tree.
+    folds
+        Number of folds [-].
+    largest_failed_share
+        Share of samples that may fail [-].
+
+    Raises
+    ------
+    InputError
+        Fewer than two folds, or fewer than two samples for each.
+    SolveError
+        More samples failed.
+    """
+    if not 2 <= folds <= x.shape[0] // 2:
+        raise InputError.at("surrogate", "folds", folds, f"2 to half of the {x.shape[0]} samples")
+    fold = np.empty(x.shape[0], int)
+    fold[seeds.generator().permutation(fold.size)] = np.arange(fold.size) % folds
+    evaluation = response(x)
+    good, y = evaluation.good, evaluation.values[:, 0]
+    failed = int((~good).sum())
+    if failed > largest_failed_share * fold.size:
+        raise SolveError(
+            f"Surrogate: {failed} of {fold.size} samples to learn from failed; allowed is {largest_failed_share:.4g} "
+            "of them."
+        )
+    return Answers(x=x[good], y=y[good], fold=fold[good], response=response, failed=failed)
+
+
+def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9973) -> Score:
+    """Return what a candidate is worth where every answer is predicted by a fit to the other folds.
+
+    Parameters
+    ----------
+    candidate
+        What may become the surrogate.
+    answers
+        Answers of what it would stand in for.
+    quantile
+        Share of the units below the quantile that is compared [-].
+
+    Raises
+    ------
+    SolveError
+        Not one prediction is good.
+
+    Notes
+    -----
+    The clocked speed alone differs from run to run.
+    """
+    predicted, mean = np.full(answers.y.size, np.nan), np.empty(answers.y.size)
+    seconds, own_seconds, trained = [], [], []
+    for seen, unseen in answers.splits:
+        fitted = candidate.fit(answers.x[seen], answers.y[seen])
+        evaluation = fitted(answers.x[unseen])
+        predicted[unseen] = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+        mean[unseen] = answers.y[seen].mean()
+        few = answers.x[unseen][:_CLOCKED]
+        # In turns, so that another program slows both down alike.
+        seconds.append(_seconds(answers.response, few))
+        own_seconds.append(_seconds(fitted, few))
+        trained.append(int(seen.sum()))
+    good = np.isfinite(predicted)
+    if not good.any():
+        raise SolveError(f"Surrogate: every prediction of {candidate.name} failed.")
+    y, error = answers.y[good], predicted[good] - answers.y[good]
+    limit = float(np.quantile(y, quantile))
+    return Score(
+        name=candidate.name,
+        q2=float(1 - (error**2).sum() / ((y - mean[good]) ** 2).sum()),
+        rms_error=float(np.sqrt((error**2).mean())),
+        quantile_error=float(np.quantile(predicted[good], quantile)) - limit,
+        quantile=limit,
+        speed=min(seconds) / min(own_seconds),
+        per_second=1 / min(own_seconds),
+        trained=min(trained),
+        held_out=answers.y.size,
+        failed=int((~good).sum()),
+    )
+
+
+def _seconds(response: Response, x: Float[np.ndarray, "sample column"]) -> float:
+    """Return the time that a response takes for one sample [s]."""
+    start = perf_counter()
+    response(x)
+    return float((perf_counter() - start) / x.shape[0])
