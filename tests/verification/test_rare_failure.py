@@ -259,7 +259,7 @@ def test_arguments_out_of_range():
         lambda: subset_simulation(limit, SeedTree(0), samples=90),
         lambda: subset_simulation(limit, SeedTree(0), runs=0),
         lambda: importance_sampling(limit, point, SeedTree(0), samples=10),
-        lambda: importance_sampling(limit, DesignPoints(points=(), calls=0), SeedTree(0)),
+        lambda: importance_sampling(limit, DesignPoints(points=(), calls=0, failed=0), SeedTree(0)),
         lambda: design_points(limit, SeedTree(0), starts=0),
         lambda: Normal(mean=0.0, deviation=0.0),
         lambda: Uniform(low=1.0, high=1.0),

@@ -32,8 +32,9 @@ class DesignPoint:
         Reliability index, negative if the origin itself fails [-].
     converged
         Whether the point lies on the limit and its gradient points back to the origin.
-    calls, steps
-        Calls of the limit state, and steps of the search [-].
+    calls, failed, steps
+        Calls of the limit state, those of its gradient included, how many of them gave no usable answer, and steps
+        of the search [-].
     status
         One sentence for a person.
     """
@@ -42,6 +43,7 @@ class DesignPoint:
     beta: float
     converged: bool
     calls: int
+    failed: int
     steps: int
     status: str
 
@@ -59,21 +61,26 @@ class DesignPoints:
     ----------
     points
         Distinct converged points, the nearest first; if no search converged, where the first one ended.
-    calls
-        Calls of the limit state by all searches, those that found nothing new included [-].
+    calls, failed
+        Calls of the limit state by all searches, those that found nothing new included, and how many of them gave
+        no usable answer [-].
     """
 
     points: tuple[DesignPoint, ...]
     calls: int
+    failed: int
 
     @classmethod
     def only(cls, point: DesignPoint) -> DesignPoints:
         """Return the outcome of a single search."""
-        return cls(points=(point,), calls=point.calls)
+        return cls(points=(point,), calls=point.calls, failed=point.failed)
 
 
 def design_point(
-    limit_state: LimitState, start: Float[np.ndarray, " variable"] | None = None, largest_steps: int = 100
+    limit_state: LimitState,
+    start: Float[np.ndarray, " variable"] | None = None,
+    largest_steps: int = 100,
+    largest_failed_share: float = 0.01,
 ) -> DesignPoint:
     """Return the design point that the improved Hasofer–Lind–Rackwitz–Fiessler search reaches from a start.
 
@@ -85,6 +92,8 @@ def design_point(
         First point, the origin if none is given [-].
     largest_steps
         Steps before the search gives up [-].
+    largest_failed_share
+        Share of calls that may fail [-].
 
     Notes
     -----
@@ -94,13 +103,13 @@ def design_point(
     Raises
     ------
     SolveError
-        After 100 calls, more than 1 % of them failed.
+        After 100 calls, more of them failed than allowed.
 
     References
     ----------
     Zhang & Der Kiureghian 1995, merit m(u) = ½‖u‖² + c·|g(u)| with c > ‖u‖ / ‖∇g(u)‖.
     """
-    counted = CountedLimitState(limit_state)
+    counted = CountedLimitState(limit_state, largest_failed_share)
     u = np.zeros(counted.variables) if start is None else np.asarray(start, float)
     at_origin, value = counted.values(np.stack([np.zeros_like(u), u]))
     scale = abs(float(at_origin)) if np.isfinite(at_origin) and at_origin else 1.0
@@ -131,12 +140,15 @@ def design_point(
         beta=beta,
         converged=converged,
         calls=counted.calls,
+        failed=counted.failed,
         steps=steps,
         status=f"Design point: β = {beta:.4g}, {reason}.",
     )
 
 
-def design_points(limit_state: LimitState, seeds: SeedTree, starts: int = 12) -> DesignPoints:
+def design_points(
+    limit_state: LimitState, seeds: SeedTree, starts: int = 12, largest_failed_share: float = 0.01
+) -> DesignPoints:
     """Return the distinct converged design points of several starts, the nearest first.
 
     Parameters
@@ -147,6 +159,8 @@ def design_points(limit_state: LimitState, seeds: SeedTree, starts: int = 12) ->
         Node of the seed tree for the starts.
     starts
         Number of searches; the first begins at the origin, the others in random directions [-].
+    largest_failed_share
+        Share of the calls of a search that may fail [-].
 
     Notes
     -----
@@ -157,18 +171,22 @@ def design_points(limit_state: LimitState, seeds: SeedTree, starts: int = 12) ->
     drawn = seeds.generator().standard_normal((starts, limit_state.variables))
     directions = _START_RADIUS * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
     directions[0] = 0.0
-    ends = [design_point(limit_state, start) for start in directions]
+    ends = [design_point(limit_state, start, largest_failed_share=largest_failed_share) for start in directions]
     found: list[DesignPoint] = []
     for point in sorted(ends, key=lambda item: abs(item.beta)):
         if point.converged and all(np.linalg.norm(point.u - other.u) > _SAME_POINT for other in found):
             found.append(point)
-    return DesignPoints(points=tuple(found) or (ends[0],), calls=sum(point.calls for point in ends))
+    return DesignPoints(
+        points=tuple(found) or (ends[0],),
+        calls=sum(point.calls for point in ends),
+        failed=sum(point.failed for point in ends),
+    )
 
 
 def _gradient(counted: CountedLimitState, u: Float[np.ndarray, " variable"]) -> Float[np.ndarray, " variable"]:
     """Return the given gradient at a point, or the one by central differences."""
     if isinstance(counted.limit_state, LimitStateWithGradient):
-        return np.asarray(counted.limit_state.gradient(u[np.newaxis])[0])
+        return np.asarray(counted.gradient(u[np.newaxis])[0])
     shifts = _STEP * np.eye(u.size)
     values = counted.values(np.concatenate([u + shifts, u - shifts]))
     if not np.isfinite(values).all():

@@ -55,7 +55,11 @@ class _Mixture:
 
 
 def importance_sampling(
-    limit_state: LimitState, found: DesignPoints, seeds: SeedTree, samples: int = 5000
+    limit_state: LimitState,
+    found: DesignPoints,
+    seeds: SeedTree,
+    samples: int = 5000,
+    largest_failed_share: float = 0.01,
 ) -> RareFailure:
     """Return the probability of failure from samples around the design points.
 
@@ -64,11 +68,13 @@ def importance_sampling(
     limit_state
         The limit state.
     found
-        Design points; the calls of their search count.
+        Design points; the calls of their search count, and those that failed.
     seeds
         Node of the seed tree.
     samples
         Samples of the mixture, a fifth of them from the wide component [-].
+    largest_failed_share
+        Share of the samples that may fail [-].
 
     Notes
     -----
@@ -80,7 +86,7 @@ def importance_sampling(
     Raises
     ------
     SolveError
-        More than 1 % of the samples have no usable answer.
+        More samples than allowed have no usable answer.
 
     References
     ----------
@@ -92,7 +98,7 @@ def importance_sampling(
     points = found.points
     if not points:
         raise InputError(f"{METHOD} needs at least one design point; subset simulation needs none.")
-    counted = CountedLimitState(limit_state)
+    counted = CountedLimitState(limit_state, largest_failed_share)
     nearest = min(abs(point.beta) for point in points)
     mixture = _mixture(points, nearest, samples)
     u = mixture.draw(seeds.generator())
@@ -111,7 +117,7 @@ def importance_sampling(
         probability=probability,
         standard_error=error if probability > 0 else float("inf"),
         calls=counted.calls + found.calls,
-        failed=counted.failed,
+        failed=counted.failed + found.failed,
         method=METHOD,
         cautions=(*cautions, *_weight_cautions(effective, missed, hits), *counted.cautions),
         effective_samples=effective,

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, UInt8
 
 from tolalloc.exceptions import SolveError
 
-LARGEST_FAILED_SHARE = 0.01
 _CALLS_TO_JUDGE = 100
 """Below so many calls one failed sample would already exceed the allowed share."""
 
@@ -55,7 +54,7 @@ class LimitStateWithGradient(LimitState, Protocol):
     """A limit state that knows its own derivatives."""
 
     def gradient(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
-        """Return the derivatives of every sample's value."""
+        """Return the derivatives of every sample's value, not finite where there is no usable answer."""
         ...
 
 
@@ -63,10 +62,18 @@ class CountedLimitState:
     """A limit state that counts its calls and stops when too many of them fail.
 
     A failed sample reads as infinitely safe: it can neither count as a failure of the product nor start a chain.
+
+    Parameters
+    ----------
+    limit_state
+        The limit state.
+    largest_failed_share
+        Share of calls that may fail [-].
     """
 
-    def __init__(self, limit_state: LimitState) -> None:
+    def __init__(self, limit_state: LimitState, largest_failed_share: float = 0.01) -> None:
         self.limit_state = limit_state
+        self.largest_failed_share = largest_failed_share
         self.calls = 0
         self.failed = 0
 
@@ -81,18 +88,34 @@ class CountedLimitState:
         Raises
         ------
         SolveError
-            More than 1 % of all calls so far failed.
+            Of all calls so far, a hundred at least, more than allowed failed.
         """
         answer = self.limit_state(u)
-        good = answer.good
+        self._count(answer.good)
+        return np.where(answer.good, answer.values, np.inf)
+
+    def gradient(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
+        """Return the derivatives of a limit state that knows them, not finite where the sample failed.
+
+        Raises
+        ------
+        SolveError
+            As for the values.
+        """
+        assert isinstance(self.limit_state, LimitStateWithGradient)
+        slopes = self.limit_state.gradient(u)
+        self._count(np.asarray(np.isfinite(slopes).all(axis=1)))
+        return slopes
+
+    def _count(self, good: Bool[np.ndarray, " sample"]) -> None:
+        """Add up calls and failures, and stop at too many of them."""
         self.calls += good.size
         self.failed += int(np.count_nonzero(~good))
-        if self.calls >= _CALLS_TO_JUDGE and self.failed > LARGEST_FAILED_SHARE * self.calls:
+        if self.calls >= _CALLS_TO_JUDGE and self.failed > self.largest_failed_share * self.calls:
             raise SolveError(
                 f"Rare failure: {self.failed} of {self.calls} samples have no usable answer; allowed is "
-                f"{LARGEST_FAILED_SHARE:.0%}, because more would bias the probability."
+                f"{self.largest_failed_share:.4g} of them, because more would bias the probability."
             )
-        return np.where(good, answer.values, np.inf)
 
     @property
     def cautions(self) -> tuple[str, ...]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,8 @@ class RareFailure:
         Share of the probability that lies where no design point explains it; 0 for subset simulation [-].
     levels
         Levels of a subset simulation, run by run; empty for other methods.
+    failing
+        Failing states of every run of a subset simulation, not independent of each other; empty for other methods [-].
     """
 
     probability: float
@@ -68,6 +71,7 @@ class RareFailure:
     effective_samples: float
     missed_share: float = 0.0
     levels: tuple[Level, ...] = ()
+    failing: tuple[Float[np.ndarray, "_state variable"], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def coefficient_of_variation(self) -> float:

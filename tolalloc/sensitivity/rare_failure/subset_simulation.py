@@ -39,9 +39,10 @@ class _Chains:
 
 @dataclass(frozen=True, kw_only=True)
 class _Run:
-    """One run: its levels, the variance that its lineages show, and why it stopped if not at the limit."""
+    """One run: its levels, its failing states, the variance of its lineages, why it stopped if not at the limit."""
 
     levels: tuple[Level, ...]
+    failing: Float[np.ndarray, "state variable"]
     lineage_variance: float
     caution: str
 
@@ -57,7 +58,9 @@ class _Run:
         return self.probability * float(np.sqrt(max(squares, self.lineage_variance)))
 
 
-def subset_simulation(limit_state: LimitState, seeds: SeedTree, samples: int = 2000, runs: int = 1) -> RareFailure:
+def subset_simulation(
+    limit_state: LimitState, seeds: SeedTree, samples: int = 2000, runs: int = 1, largest_failed_share: float = 0.01
+) -> RareFailure:
     """Return the probability of failure from one or several independent subset simulations.
 
     Parameters
@@ -70,6 +73,8 @@ def subset_simulation(limit_state: LimitState, seeds: SeedTree, samples: int = 2
         Samples of each level, a multiple of 10 [-].
     runs
         Independent runs, whose mean is the estimate [-].
+    largest_failed_share
+        Share of the samples that may fail [-].
 
     Notes
     -----
@@ -80,7 +85,7 @@ def subset_simulation(limit_state: LimitState, seeds: SeedTree, samples: int = 2
     Raises
     ------
     SolveError
-        More than 1 % of the samples have no usable answer.
+        More samples than allowed have no usable answer.
 
     References
     ----------
@@ -92,13 +97,13 @@ def subset_simulation(limit_state: LimitState, seeds: SeedTree, samples: int = 2
         raise InputError.at(METHOD, "samples", samples, f"a multiple of {_LENGTH} from {_FEWEST_SAMPLES}")
     if runs < 1:
         raise InputError.at(METHOD, "runs", runs, "a whole number of at least 1")
-    counted = CountedLimitState(limit_state)
+    counted = CountedLimitState(limit_state, largest_failed_share)
     all_runs = [_one_run(counted, seeds.child(f"run {run}").generator(), samples, run) for run in range(runs)]
     probabilities = np.array([run.probability for run in all_runs])
     probability = float(probabilities.mean())
     error = float(np.sqrt(sum(run.standard_error**2 for run in all_runs if run.probability > 0))) / runs
     if runs > 1:
-        error = max(error, float(probabilities.std(ddof=1)) / np.sqrt(runs))
+        error = max(error, float(probabilities.std(ddof=1) / np.sqrt(runs)))
     stopped = tuple(dict.fromkeys(run.caution for run in all_runs if run.caution))
     return RareFailure(
         probability=probability,
@@ -109,6 +114,7 @@ def subset_simulation(limit_state: LimitState, seeds: SeedTree, samples: int = 2
         cautions=stopped + counted.cautions,
         effective_samples=(probability / error) ** 2 if probability > 0 else 0.0,
         levels=tuple(level for run in all_runs for level in run.levels),
+        failing=tuple(run.failing for run in all_runs),
     )
 
 
@@ -148,7 +154,12 @@ def _one_run(counted: CountedLimitState, generator: np.random.Generator, samples
         )
         chains = _next_chains(counted, generator, starts, threshold)
     levels.append(_level(chains, 0.0, chains.values < 0, run))
-    return _Run(levels=tuple(levels), lineage_variance=_lineage_variance(chains, samples, len(levels)), caution=caution)
+    return _Run(
+        levels=tuple(levels),
+        failing=chains.u[chains.values < 0],
+        lineage_variance=_lineage_variance(chains, samples, len(levels)),
+        caution=caution,
+    )
 
 
 def _next_chains(

@@ -1,0 +1,187 @@
+"""One failed sample, planted anywhere: it is dropped whole and counted, or it stops the estimate.
+
+A sample fails in two ways: its output is NaN, or its status is not 0 and its output looks like any other. Whatever
+reads both in the same way, to the last bit, has not used the output.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import Evaluation
+from tolalloc.sensitivity.capability import Limits, capability, quantile_interval
+from tolalloc.sensitivity.classical import classical_estimate
+from tolalloc.sensitivity.monte_carlo import monte_carlo
+from tolalloc.sensitivity.rare_failure.form import DesignPoints, design_point, design_points
+from tolalloc.sensitivity.rare_failure.importance import importance_sampling
+from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
+from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
+from tolalloc.sensitivity.rare_failure.widened import widened_sampling
+from tolalloc.sensitivity.saltelli import saltelli_indices
+from tolalloc.sensitivity.yield_at_limit import yield_at_limit
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.zones import Feature
+
+KINDS = ("NaN", "status")
+NAMES = ("a", "b", "c")
+ERRORS = ErrorModel(
+    tuple(
+        Source(name=name, part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0)
+        for name in NAMES
+    )
+)
+SEEDS = SeedTree(0, ("planted",))
+
+
+@dataclass
+class Planted:
+    """Sum of the columns; the samples with these numbers, counted over all calls, fail."""
+
+    at: tuple[int, ...] = ()
+    kind: str = "NaN"
+    columns: tuple[str, ...] = NAMES
+    outputs: tuple[str, ...] = ("y [-]",)
+    seen: int = field(default=0)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        values, status = x.sum(axis=1, keepdims=True), np.zeros(x.shape[0], np.uint8)
+        for row in (number - self.seen for number in self.at if self.seen <= number < self.seen + x.shape[0]):
+            values[row] = np.nan if self.kind == "NaN" else 0.5
+            status[row] = 0 if self.kind == "NaN" else 7
+        self.seen += x.shape[0]
+        return Evaluation(values=values, status=status)
+
+
+def limit_state(at: tuple[int, ...], kind: str, limit: float = 5.0) -> ResponseLimit:
+    return ResponseLimit(response=Planted(at, kind), errors=ERRORS, zones=ERRORS.zones, limit=limit)
+
+
+def random_units(at: tuple[int, ...], kind: str, **allowed: float):
+    return monte_carlo(Planted(at, kind), ERRORS, ERRORS.zones, SEEDS, 400, **allowed)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("at", [0, 137, 399])
+def test_random_units_drop_it_and_count_it_as_rejected(at, kind):
+    clean, found = random_units((), kind), random_units((at,), kind)
+    assert found.failed == 1
+    np.testing.assert_array_equal(found.values, np.delete(clean.evaluation.values[:, 0], at))
+    for limit in (-10.0, 0.0, 10.0):
+        accepted = np.count_nonzero(found.values <= limit)
+        assert found.within(limit).rejected == 400 - accepted
+        assert found.within(limit).units == 400
+    assert found.quantile(0.9) == np.quantile(found.values, 0.9)
+    assert np.isfinite(found.quantile_bound(0.9))
+    assert not (found.unit_at(0.5) == found.x[at]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_random_units_stop_above_one_per_cent_unless_told_otherwise(kind):
+    assert random_units(tuple(range(4)), kind).failed == 4
+    with pytest.raises(SolveError, match="5 of 400"):
+        random_units(tuple(range(5)), kind)
+    assert random_units(tuple(range(5)), kind, largest_failed_share=0.02).failed == 5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("at", [0, 3, 617, 999])
+def test_indices_drop_the_block_whole(at, kind, generator):
+    x = generator.standard_normal((200 * 5, 3))
+    clean, planted = Planted()(x), Planted((at,), kind)(x)
+    left = np.delete(np.arange(1000).reshape(200, 5), at // 5, axis=0).ravel()
+    rest = Evaluation(values=clean.values[left], status=clean.status[left])
+    found, expected = saltelli_indices(planted, 3, SEEDS), saltelli_indices(rest, 3, SEEDS)
+    assert (found.dropped, found.blocks) == (1, 199)
+    for name in ("first", "total", "first_resamples", "total_resamples"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_indices_stop_above_one_per_cent(kind, generator):
+    x = generator.standard_normal((200 * 5, 3))
+    with pytest.raises(SolveError, match="3 of 200 blocks"):
+        saltelli_indices(Planted((0, 500, 999), kind)(x), 3, SEEDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("at", [0, 1, 20, 48])
+def test_hand_estimate_stops_at_any(at, kind):
+    """The nominal unit and 16 units for each of the three sources."""
+    with pytest.raises(SolveError):
+        classical_estimate(Planted((at,), kind), ERRORS, ERRORS.zones, SEEDS)
+
+
+@pytest.mark.parametrize("at", [0, 31, 99])
+def test_capability_refuses_it(at, generator):
+    sample = generator.standard_normal(100)
+    sample[at] = np.nan
+    for call in (lambda: capability(sample, Limits(upper=3.0)), lambda: quantile_interval(sample, 0.9)):
+        with pytest.raises(InputError, match="all finite"):
+            call()
+
+
+@pytest.mark.parametrize("at", [0, 150, 500, 1200])
+def test_subset_simulation_counts_it_as_safe_and_cautions(at):
+    found = [subset_simulation(limit_state((at,), kind), SEEDS, samples=500, runs=2) for kind in KINDS]
+    assert found[0] == found[1]
+    assert found[0].failed == 1
+    assert not found[0].trustworthy
+
+
+@pytest.mark.parametrize("at", [0, 150, 999])
+def test_weighted_samples_count_it_as_safe_and_caution(at):
+    failing = subset_simulation(limit_state((), "NaN"), SEEDS, samples=500, runs=2).failing
+    points = DesignPoints.only(design_point(limit_state((), "NaN")))
+    for estimate in (
+        lambda state: widened_sampling(state, failing, SEEDS, samples=1000),
+        lambda state: importance_sampling(state, points, SEEDS, samples=1000),
+    ):
+        found = [estimate(limit_state((at,), kind)) for kind in KINDS]
+        assert found[0] == found[1]
+        assert found[0].failed == 1
+        assert "1 of 1000 samples have no usable answer" in found[0].status
+
+
+def test_searches_for_design_points_count_it():
+    found = [design_points(limit_state((5,), kind), SEEDS, starts=3) for kind in KINDS]
+    assert [item.failed for item in found] == [1, 1]
+    np.testing.assert_array_equal(found[0].points[0].u, found[1].points[0].u)
+    samples = importance_sampling(limit_state((), "NaN"), found[0], SEEDS, samples=500)
+    assert samples.failed == 1
+
+
+@pytest.mark.parametrize("at", [0, 1999])
+def test_yield_at_a_limit_counts_it_as_rejected(at):
+    found = [yield_at_limit(limit_state((at,), kind), SEEDS, units=2000, samples=200, runs=2) for kind in KINDS]
+    assert found[0] == found[1]
+    assert found[0].failed == 1
+    plain = found[0].estimates[0]
+    assert plain.probability >= 1 / 2000
+    assert "count as rejected" in plain.status
+    assert found[0].capability.units == 1999
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rare_failures_stop_above_one_per_cent_unless_told_otherwise(kind):
+    failing = (np.full((5, 3), 3.0),) * 2
+    for estimate in (
+        lambda state, **allowed: subset_simulation(state, SEEDS, samples=500, **allowed),
+        lambda state, **allowed: widened_sampling(state, failing, SEEDS, samples=500, **allowed),
+        lambda state, **allowed: yield_at_limit(state, SEEDS, units=500, samples=200, runs=2, **allowed),
+    ):
+        with pytest.raises(SolveError, match="no usable answer"):
+            estimate(limit_state(tuple(range(6)), kind))
+        assert any(
+            "no usable answer" in text
+            for text in _cautions(estimate(limit_state(tuple(range(6)), kind), largest_failed_share=0.02))
+        )
+
+
+def _cautions(found) -> tuple[str, ...]:
+    return found.estimate.cautions if hasattr(found, "estimate") else found.cautions

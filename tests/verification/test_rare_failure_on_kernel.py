@@ -1,0 +1,236 @@
+"""Yields at a limit: on responses whose share beyond the limit is known, and on the real kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+from scipy.stats import chi2, norm
+
+from tolalloc.exceptions import InputError
+from tolalloc.response.interface import Evaluation
+from tolalloc.response.kernel import WithDerivatives
+from tolalloc.sensitivity.monte_carlo import monte_carlo
+from tolalloc.sensitivity.rare_failure.form import design_point
+from tolalloc.sensitivity.rare_failure.limit_state import LimitState, LimitStateWithGradient
+from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit, ResponseLimitWithGradient
+from tolalloc.sensitivity.rare_failure.result import RareFailure
+from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
+from tolalloc.sensitivity.rare_failure.widened import widened_sampling
+from tolalloc.sensitivity.yield_at_limit import log_normal_interval, yield_at_limit
+from tolalloc.study.definition import Study, prepare
+from tolalloc.uncertainty.correlation import Correlation, Pair
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.zones import Distribution, Feature
+
+
+def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:
+    return Source(
+        name=name,
+        part="part",
+        feature=feature,
+        zone=6.0,
+        minimum=1.0,
+        maximum=10.0,
+        cost=1.0,
+        distribution=distribution,
+    )
+
+
+def normals(count: int) -> ErrorModel:
+    """Independent columns that are standard normal."""
+    return ErrorModel(tuple(source(f"s{number}") for number in range(count)))
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Sum of the columns over √n."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...] = ("y [arcsec]",)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        values = x.sum(axis=1, keepdims=True) / np.sqrt(x.shape[1])
+        return Evaluation(values=values, status=np.zeros(x.shape[0], np.uint8))
+
+
+@dataclass(frozen=True)
+class Radius(Sum):
+    """Distance from zero of the first two columns: nothing prefers a direction in their plane."""
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        values = np.linalg.norm(x[:, :2], axis=1, keepdims=True)
+        return Evaluation(values=values, status=np.zeros(x.shape[0], np.uint8))
+
+
+@dataclass(frozen=True)
+class Bent(Sum):
+    """A smooth mixture of all columns, with its derivatives."""
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        return self.with_derivatives(x).evaluation
+
+    def with_derivatives(self, x: np.ndarray) -> WithDerivatives:
+        weights = np.arange(1.0, x.shape[1] + 1)
+        along = x @ weights
+        return WithDerivatives(
+            evaluation=Evaluation(
+                values=(np.sin(along) + x[:, 0] ** 2)[:, np.newaxis], status=(x[:, 0] > 4).astype(np.uint8)
+            ),
+            by_column=np.cos(along)[:, np.newaxis] * weights + 2 * x[:, :1] * np.eye(x.shape[1])[0],
+            by_modification=np.zeros((x.shape[0], 2)),
+            by_stiffness={},
+        )
+
+
+def limited(kind: type[Sum], errors: ErrorModel, limit: float) -> ResponseLimit:
+    return ResponseLimit(response=kind(errors.columns), errors=errors, zones=errors.zones, limit=limit)
+
+
+MIXED = ErrorModel(
+    (
+        source("one"),
+        source("other", distribution=Distribution.UNIFORM),
+        source("bore", Feature.POSITION, Distribution.UNIFORM),
+        source("journal", Feature.POSITION),
+        replace(source("ring", Feature.RUNOUT, Distribution.UNIFORM), spectrum=((1, 1.0), (2, 0.5))),
+    ),
+    correlation=Correlation(pairs=(Pair(one="one", other="other", correlation=0.7),)),
+)
+
+
+def test_deviations_have_the_distributions_of_the_error_model(generator):
+    limit = ResponseLimit(response=Bent(MIXED.columns), errors=MIXED, zones=MIXED.zones, limit=1.0)
+    u = generator.standard_normal((50, limit.variables))
+    expected = MIXED.deviations(MIXED.standard_values(ndtr(u)), MIXED.zones)
+    np.testing.assert_array_equal(limit.deviations(u), expected)
+    assert np.isfinite(limit.deviations(np.full((1, limit.variables), 40.0))).all()
+    assert np.isfinite(limit.deviations(np.full((1, limit.variables), -35.0))).all()
+
+
+def test_gradient_agrees_with_differences_where_columns_mix(generator):
+    limit = ResponseLimitWithGradient(response=Bent(MIXED.columns), errors=MIXED, zones=MIXED.zones, limit=1.0)
+    assert isinstance(limit, LimitStateWithGradient)
+    assert not isinstance(limited(Sum, MIXED, 1.0), LimitStateWithGradient)
+    assert isinstance(limited(Sum, MIXED, 1.0), LimitState)
+    u = 0.5 * generator.standard_normal((20, limit.variables))
+    found, step = limit.gradient(u), 1e-5
+    for variable, shift in enumerate(step * np.eye(limit.variables)):
+        differences = (limit(u + shift).values - limit(u - shift).values) / (2 * step)
+        np.testing.assert_allclose(found[:, variable], differences, atol=2e-4 * np.abs(found).max())
+    lost = np.zeros((1, limit.variables))
+    lost[0, 0] = 5.0
+    assert np.isnan(limit.gradient(lost)).all()
+
+
+def test_share_that_is_not_rare_is_left_to_random_units():
+    errors = normals(4)
+    found = yield_at_limit(limited(Sum, errors, 2.0), SeedTree(0), units=20_000)
+    low, high = found.interval.low, found.interval.high
+    assert low < norm.cdf(2.0) < high
+    assert [item.method for item in found.estimates] == ["Monte Carlo"]
+    assert "is not rare" in found.verdict
+    assert found.calls == 20_000
+    assert found.defects_per_million == pytest.approx(found.parts_per_million.estimate)
+    assert found.capability.ppk == pytest.approx(2.0 / 3, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(
+    ("kind", "limit", "exact"),
+    [(Sum, 4.75, norm.sf(4.75)), (Radius, 5.25, chi2.sf(5.25**2, 2))],
+    ids=["one direction", "all directions of a plane"],
+)
+def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
+    """Φ(−4.75) and exp(−5.25²/2) are about 1e-6; each estimate within 3.5 of its standard errors, 8 in all."""
+    found = yield_at_limit(limited(kind, normals(6), limit), SeedTree(seed), units=5000, samples=2000, runs=4)
+    for item in found.estimates[1:]:
+        assert abs(item.probability - exact) <= 3.5 * item.standard_error
+        assert item.coefficient_of_variation < 0.25
+    assert found.verdict.startswith("Rely on subset simulation: widened sampling differs")
+    assert found.estimate is found.estimates[1]
+    assert found.parts_per_million.low < found.parts_per_million.estimate < found.parts_per_million.high
+    assert found.interval.high < 1.0
+    assert found.calls == sum(item.calls for item in found.estimates)
+
+
+def test_widened_sampling_states_its_own_spread():
+    """Over 60 seeds on a known share, with directions from one pair of small runs."""
+    limit, exact = limited(Radius, normals(6), 4.5), chi2.sf(4.5**2, 2)
+    failing = subset_simulation(limit, SeedTree(3), samples=1000, runs=2).failing
+    results = [widened_sampling(limit, failing, SeedTree(seed), samples=2000) for seed in range(60)]
+    error = np.array([(item.probability - exact) / item.standard_error for item in results])
+    assert abs(error.mean()) < 4 / np.sqrt(60)
+    assert 0.7 < error.std() < 1.4
+
+
+def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
+    errors = ErrorModel((source("s", distribution=Distribution.UNIFORM),))
+    found = yield_at_limit(limited(Sum, errors, 3.5), SeedTree(0), units=5000, samples=200, runs=2)
+    assert "fewer than two runs" in found.verdict
+    assert found.estimate.method == "Monte Carlo"
+    assert found.interval.high == 1.0
+    assert 0 < found.parts_per_million.high < 1000
+
+
+def test_methods_that_contradict_each_other_are_not_relied_on(monkeypatch):
+    def too_small(*arguments: object) -> RareFailure:
+        found = widened_sampling(*arguments)
+        return replace(found, probability=found.probability / 100, standard_error=found.standard_error / 100)
+
+    monkeypatch.setattr("tolalloc.sensitivity.yield_at_limit.widened_sampling", too_small)
+    found = yield_at_limit(limited(Radius, normals(2), 4.5), SeedTree(0), units=2000, samples=1000, runs=4)
+    assert found.verdict.startswith("Do not rely on subset simulation")
+
+
+def test_log_normal_interval_covers_as_stated(generator):
+    """Coverage over 4000 log-normal estimates, within 4 standard errors of 95 %."""
+    variation, exact = 0.4, 2e-6
+    spread = np.sqrt(np.log1p(variation**2))
+    estimates = exact * np.exp(spread * generator.standard_normal(4000))
+    covered = 0
+    for value in estimates:
+        failure = RareFailure(
+            probability=float(value),
+            standard_error=float(variation * value),
+            calls=1,
+            failed=0,
+            method="",
+            cautions=(),
+            effective_samples=1.0,
+        )
+        interval = log_normal_interval(failure)
+        covered += interval.low <= 1 - exact <= interval.high
+    assert covered / 4000 == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 4000))
+
+
+def test_arguments_out_of_range():
+    limit = limited(Sum, normals(2), 4.5)
+    states = np.full((5, 2), 3.0)
+    for call in (
+        lambda: yield_at_limit(limit, SeedTree(0), runs=1),
+        lambda: widened_sampling(limit, (states,), SeedTree(0)),
+        lambda: widened_sampling(limit, (states, states[:0]), SeedTree(0)),
+        lambda: widened_sampling(limit, (states, states), SeedTree(0), samples=10),
+    ):
+        with pytest.raises(InputError):
+            call()
+
+
+def test_kernel_agrees_with_random_units():
+    """A share near 1 % by small subset simulations, within 3.5 standard errors of random units of another seed."""
+    prepared = prepare(Study(name="kernel"))
+    errors = prepared.space.errors
+    limit = ResponseLimitWithGradient(response=prepared.kernel, errors=errors, zones=errors.zones, limit=80.0)
+    units = monte_carlo(prepared.kernel, errors, errors.zones, SeedTree(1, ("units",)), 3000)
+    share = 1 - units.within(80.0).estimate
+    found = subset_simulation(limit, SeedTree(0), samples=1000, runs=2)
+    error = np.hypot(found.standard_error, np.sqrt(share / 3000))
+    assert abs(found.probability - share) <= 3.5 * error
+    assert found.trustworthy
+    assert limit.gradient(np.zeros((1, limit.variables))).shape == (1, 60)
+    assert design_point(limit, largest_steps=2).failed == 0

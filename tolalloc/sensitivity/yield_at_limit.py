@@ -1,0 +1,224 @@
+"""The yield at a limit down to a few parts per million: random units, and rare-failure methods where they see none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from tolalloc.exceptions import InputError
+from tolalloc.sensitivity.capability import (
+    MILLION,
+    Capability,
+    Limits,
+    ShareInterval,
+    capability,
+    defects_per_million_opportunities,
+    wilson_interval,
+)
+from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState
+from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
+from tolalloc.sensitivity.rare_failure.result import RareFailure
+from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
+from tolalloc.sensitivity.rare_failure.widened import widened_sampling
+from tolalloc.uncertainty.seeds import SeedTree
+
+METHOD = "Monte Carlo"
+RARE = 1e-3
+"""Share of random units beyond the limit below which a failure is rare [-]."""
+LARGEST_DIFFERENCE = 3.0
+"""Difference of two estimates in standard errors beyond which they contradict each other [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class YieldAtLimit:
+    """Yield at a limit, by the method that can be relied on.
+
+    Parameters
+    ----------
+    limit
+        Largest output allowed [output].
+    interval
+        Yield with its two-sided interval: Wilson's from random units, or where few of them exceed the limit that of a
+        log-normally distributed estimate [-].
+    estimate
+        Probability of a unit beyond the limit by the method relied on, with its calls, failed samples and cautions.
+    estimates
+        The same by every method that ran, random units first.
+    verdict
+        One sentence that says which estimate to rely on, and why.
+    capability
+        Indices of the random units.
+    defects_per_million
+        Random units rejected per million opportunities, one for each unit [-].
+    """
+
+    limit: float
+    interval: ShareInterval
+    estimate: RareFailure
+    estimates: tuple[RareFailure, ...]
+    verdict: str
+    capability: Capability
+    defects_per_million: float
+
+    @property
+    def parts_per_million(self) -> ShareInterval:
+        """Units beyond the limit per million, with the interval [-]."""
+        return ShareInterval(
+            estimate=MILLION * self.estimate.probability,
+            low=MILLION * (1 - self.interval.high),
+            high=MILLION * (1 - self.interval.low),
+            confidence=self.interval.confidence,
+        )
+
+    @property
+    def calls(self) -> int:
+        """Calls of the response by all methods [-]."""
+        return sum(item.calls for item in self.estimates)
+
+    @property
+    def failed(self) -> int:
+        """Calls by all methods that gave no usable answer [-]."""
+        return sum(item.failed for item in self.estimates)
+
+
+def yield_at_limit(
+    limit_state: ResponseLimit,
+    seeds: SeedTree,
+    *,
+    units: int = 20_000,
+    samples: int = 4000,
+    runs: int = 5,
+    weighted: int = 20_000,
+    confidence: float = 0.95,
+    largest_failed_share: float = 0.01,
+) -> YieldAtLimit:
+    """Return the yield at a limit.
+
+    Parameters
+    ----------
+    limit_state
+        The limit on the response.
+    seeds
+        Node of the seed tree.
+    units
+        Random units, which decide alone if a thousandth of them or more exceed the limit [-].
+    samples, runs
+        Samples of each level, and independent runs of the subset simulation, two or more [-].
+    weighted
+        Samples of the widened distribution [-].
+    confidence
+        Confidence of the interval [-].
+    largest_failed_share
+        Share of each method's samples that may fail [-].
+
+    Raises
+    ------
+    InputError
+        Fewer than two runs.
+    SolveError
+        More samples than allowed have no usable answer.
+
+    Notes
+    -----
+    Subset simulation is relied on, and widened sampling tells whether it may be. Widened sampling takes its directions
+    from failures that subset simulation has found, so both are blind to a region that every run has missed.
+    """
+    if runs < 2:
+        raise InputError.at("yield at a limit", "runs", runs, "2 or more")
+    plain, indices = _random_units(limit_state, seeds.child("units"), units, largest_failed_share)
+    rejected = round(plain.effective_samples)
+    rare: tuple[RareFailure, ...] = ()
+    if plain.probability < RARE:
+        rare = _rare_estimates(limit_state, seeds, samples, runs, weighted, largest_failed_share)
+    reached = len(rare) == 2
+    return YieldAtLimit(
+        limit=limit_state.limit,
+        interval=log_normal_interval(rare[0], confidence)
+        if reached
+        else wilson_interval(units, units - rejected, confidence),
+        estimate=rare[0] if reached else plain,
+        estimates=(plain, *rare),
+        verdict=_verdict(plain, *rare),
+        capability=indices,
+        defects_per_million=defects_per_million_opportunities(rejected, units),
+    )
+
+
+def log_normal_interval(failure: RareFailure, confidence: float = 0.95) -> ShareInterval:
+    """Return the yield with the interval of a log-normally distributed estimate of the share beyond the limit.
+
+    Parameters
+    ----------
+    failure
+        Estimate above zero with its standard error.
+    confidence
+        Confidence of the interval [-].
+
+    References
+    ----------
+    p·exp(±z·√(ln(1 + δ²))) with δ the coefficient of variation; unlike p ± z·s it cannot fall below zero.
+    """
+    spread = np.sqrt(np.log1p(failure.coefficient_of_variation**2))
+    factor = float(np.exp(norm.isf((1 - confidence) / 2) * spread))
+    return ShareInterval(
+        estimate=1 - failure.probability,
+        low=max(0.0, 1 - failure.probability * factor),
+        high=1 - failure.probability / factor,
+        confidence=confidence,
+    )
+
+
+def _random_units(
+    limit_state: ResponseLimit, seeds: SeedTree, units: int, largest_failed_share: float
+) -> tuple[RareFailure, Capability]:
+    """Return the share of random units rejected, those without an answer included, and the capability of the others."""
+    counted = CountedLimitState(limit_state, largest_failed_share)
+    values = counted.values(seeds.generator().standard_normal((units, limit_state.variables)))
+    rejected = int(np.count_nonzero(values < 0)) + counted.failed
+    share = rejected / units
+    lost = f"{counted.failed} of {units} units have no usable answer and count as rejected"
+    plain = RareFailure(
+        probability=share,
+        standard_error=float(np.sqrt(share * (1 - share) / units)) if rejected else float("inf"),
+        calls=counted.calls,
+        failed=counted.failed,
+        method=METHOD,
+        cautions=(lost,) * bool(counted.failed),
+        effective_samples=float(rejected),
+    )
+    outputs = limit_state.limit - values[np.isfinite(values)]
+    return plain, capability(outputs, Limits(upper=limit_state.limit))
+
+
+def _rare_estimates(
+    limit_state: ResponseLimit,
+    seeds: SeedTree,
+    samples: int,
+    runs: int,
+    weighted: int,
+    largest_failed_share: float,
+) -> tuple[RareFailure, ...]:
+    """Return the estimate of subset simulation and, if two runs reached the limit, that of widened sampling."""
+    levels = subset_simulation(limit_state, seeds.child("levels"), samples, runs, largest_failed_share)
+    if sum(states.size > 0 for states in levels.failing) < 2:
+        return (levels,)
+    widened = seeds.child("widened")
+    return levels, widened_sampling(limit_state, levels.failing, widened, weighted, largest_failed_share)
+
+
+def _verdict(plain: RareFailure, levels: RareFailure | None = None, widened: RareFailure | None = None) -> str:
+    """Return which estimate to rely on, and why."""
+    if levels is None:
+        return f"Rely on the random units: a share of {plain.probability:.3g} beyond the limit is not rare."
+    if widened is None:
+        return "Rely on the random units alone: fewer than two runs of the subset simulation reached the limit."
+    apart = abs(levels.difference_from(widened))
+    found = f"widened sampling differs from it by {apart:.1f} standard errors"
+    if apart > LARGEST_DIFFERENCE:
+        return f"Do not rely on subset simulation: {found}."
+    cautions = (*levels.cautions, *widened.cautions)
+    if cautions:
+        return f"Rely on subset simulation with caution: {found}, but {'; '.join(cautions)}."
+    return f"Rely on subset simulation: {found}."
