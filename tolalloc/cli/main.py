@@ -1,4 +1,4 @@
-"""The command line: ``tolalloc run``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``compare``."""
+"""The command line: ``run``, ``rank``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``compare``."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from tolalloc.cli.console import (
 )
 from tolalloc.cli.contact import asked_reducer, contact_answer
 from tolalloc.cli.identify import identify
+from tolalloc.cli.rank import rank
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
 from tolalloc.exceptions import TolallocError
@@ -227,6 +228,7 @@ def modify(
     say(document)
 
 
+app.command()(rank)
 app.command()(identify)
 
 

@@ -16,7 +16,6 @@ from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.stiffness import StiffnessEffect
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
-from tolalloc.surrogate.regression import NEEDED_Q2, Surrogate
 from tolalloc.uncertainty.unit_file import BuiltUnit
 
 _COMMON = (
@@ -65,8 +64,6 @@ class StudyResults:
         Design variables and the requirement.
     sobol, classical
         Ranking at the zones of the tolerance table, and the hand estimate beside it.
-    unit_surrogate
-        Stand-in for single units, with its Q²; the ranking may run on it where it earned its place.
     stiffness
         What not knowing the identified stiffnesses does to the peak-to-peak, if there are any.
     allocation
@@ -94,7 +91,6 @@ class StudyResults:
     requirement: Requirement
     sobol: SobolIndices
     classical: ClassicalEstimate
-    unit_surrogate: Surrogate
     stiffness: StiffnessEffect | None
     allocation: Allocation
     unit: BuiltUnit | None
@@ -102,11 +98,6 @@ class StudyResults:
     contacts: tuple[Assessment | None, Assessment | None]
     examples: tuple[ExampleUnit, ...]
     statuses: dict[str, int]
-
-    @property
-    def ranked_on_surrogate(self) -> bool:
-        """Whether the ranking ran on the stand-in for single units, which knows no stiffness."""
-        return self.unit_surrogate.earns_its_place and self.stiffness is None
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -156,11 +147,6 @@ class StudyResults:
             )
         if not self.allocation.by_hand.met:
             found.append("Uniform scaling was not verified to meet the limit, so the saving is against a miss.")
-        if not self.unit_surrogate.earns_its_place:
-            found.append(
-                f"The surrogate for single units reached Q² = {self.unit_surrogate.q2:.2f} on held-out kernel runs, "
-                f"below {NEEDED_Q2}: it was not used; the ranking ran on the real model."
-            )
         if self.stiffness and self.stiffness.first_order.fails:
             error = self.stiffness.first_order
             found.append(

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.uncertainty.error_model import ErrorModel
@@ -121,6 +121,7 @@ def local_derivatives(
     zones: Float[np.ndarray, " source"],
     seeds: SeedTree,
     units: int = 1024,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> LocalDerivatives:
     """Return the derivatives by each source at the nominal and over random units.
 
@@ -136,11 +137,13 @@ def local_derivatives(
         Node of the seed tree.
     units
         Random units [-].
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     SolveError
-        The nominal or more than 1 % of the random units failed.
+        The nominal failed, or more of the random units.
 
     Notes
     -----
@@ -150,7 +153,7 @@ def local_derivatives(
     middle = response.with_derivatives(errors.deviations(np.zeros((1, len(errors.columns))), zones))
     if not middle.evaluation.good.all():
         raise SolveError("Local derivatives: the nominal has no usable answer.")
-    sample, by_column, _ = _sampled(response, errors, zones, seeds, units)
+    sample, by_column, _ = _sampled(response, errors, zones, seeds, units, largest_failed_share)
     where, length, direction, random = np.array(errors.source_of_column), [], [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
@@ -176,6 +179,7 @@ def derivative_measures(
     seeds: SeedTree,
     units: int = 1024,
     resamples: int = 400,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> DerivativeMeasures:
     """Return the derivative-based measure of every source and its bound on the total index.
 
@@ -191,11 +195,13 @@ def derivative_measures(
         Node of the seed tree.
     units, resamples
         Random units, and bootstrap resamples of them [-].
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     SolveError
-        More than 1 % of the units failed, or the output does not vary.
+        More units failed, or the output does not vary.
 
     Notes
     -----
@@ -207,8 +213,8 @@ def derivative_measures(
     ----------
     Sobol' & Kucherenko 2009; Lamboni, Iooss, Popelin & Gamboa 2013, Theorem 3.1, Poincaré constants.
     """
-    sample, by_column, uniform = _sampled(response, errors, zones, seeds.child("sample"), units)
-    blocks = source_blocks(errors)
+    sample, by_column, uniform = _sampled(response, errors, zones, seeds.child("sample"), units, largest_failed_share)
+    blocks = errors.block_of_column
     squares = _squared_gradients(by_column * _zone_per_column(errors, zones), errors, uniform, blocks)
     centred = sample.values - sample.values.mean()
     counts = resample_counts(centred.size, resamples, seeds.child("resamples"))
@@ -228,25 +234,20 @@ def derivative_measures(
     )
 
 
-def source_blocks(errors: ErrorModel) -> tuple[str, ...]:
-    """Return for every column its source, correlated ones joined: their independent numbers belong to all of them."""
-    block_of = {name: " + ".join(block) for block in errors.blocks for name in block}
-    return tuple(block_of[name] for name in errors.source_of_column)
-
-
 def _sampled(
     response: ResponseWithDerivatives,
     errors: ErrorModel,
     zones: Float[np.ndarray, " source"],
     seeds: SeedTree,
     units: int,
+    largest_failed_share: float,
 ) -> tuple[MonteCarlo, Float[np.ndarray, "good column"], Float[np.ndarray, "good column"]]:
     """Return random units, and of the good ones the derivatives and the uniform numbers."""
     uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
     x = errors.deviations(errors.standard_values(uniform), zones)
     answer = response.with_derivatives(x)
     sample = MonteCarlo(x=x, evaluation=answer.evaluation)
-    require_few_failures(sample, "derivatives")
+    require_few_failures(sample, "derivatives", largest_failed_share)
     return sample, answer.by_column[answer.evaluation.good], uniform[answer.evaluation.good]
 
 

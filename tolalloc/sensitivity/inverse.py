@@ -115,7 +115,7 @@ def inverse_sensitivity(
     ----------
     Regula falsi with halving of the stale end (Illinois): Dowell & Jarratt 1971.
     """
-    needed = int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
+    needed = fewest_units(target)
     if units < needed:
         raise InputError.at("inverse sensitivity", "units", units, f"{needed} or more for a yield of {target:.4%}")
     if largest_factor <= 1.0:
@@ -143,6 +143,11 @@ def inverse_sensitivity(
         failed=openings.failed,
         calls=openings.calls,
     )
+
+
+def fewest_units(target: float) -> int:
+    """Return the fewest units that show a quantile at the target yield [-]."""
+    return int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
 
 
 class _Openings:

@@ -18,8 +18,7 @@ from SALib.sample import morris
 from tolalloc.blas import one_blas_thread
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Response
-from tolalloc.sensitivity.derivatives import source_blocks
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
@@ -110,7 +109,7 @@ def elementary_effects(
     levels: int = 4,
     trim: float = 0.001,
     resamples: int = 400,
-    largest_dropped_share: float = 0.05,
+    largest_failed_share: float = 0.01,
 ) -> ElementaryEffects:
     """Return the elementary effects of all sources on all outputs.
 
@@ -132,7 +131,7 @@ def elementary_effects(
         Share of the distribution left out at either end, where a normal number would be infinite [-].
     resamples
         Bootstrap resamples of the trajectories [-].
-    largest_dropped_share
+    largest_failed_share
         Share of the trajectories that may be dropped [-].
 
     Raises
@@ -150,7 +149,7 @@ def elementary_effects(
         raise InputError.at("elementary effects", "levels", levels, "an even number, 2 or more")
     if not 0.0 < trim < 0.5:
         raise InputError.at("elementary effects", "trim", trim, "a number between 0 and 0.5")
-    groups = source_blocks(errors)
+    groups = errors.block_of_column
     names = tuple(dict.fromkeys(groups))
     problem = {
         "num_vars": len(errors.columns),
@@ -162,10 +161,10 @@ def elementary_effects(
     evaluation = response(errors.deviations(errors.standard_values(uniform), zones))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
     used = int(np.count_nonzero(whole))
-    if trajectories - used > largest_dropped_share * trajectories or used < 2:
+    if trajectories - used > largest_failed_share * trajectories or used < 2:
         raise SolveError(
             f"Elementary effects: {trajectories - used} of {trajectories} trajectories hold a failed sample; allowed "
-            f"is {largest_dropped_share:.4g} of them, and two must be left."
+            f"is {largest_failed_share:.4g} of them, and two must be left."
         )
     members = np.array(groups)[:, np.newaxis] == names
     effects = _effects(
@@ -195,6 +194,7 @@ def moment_independent(
     classes: int = 10,
     resamples: int = 50,
     dummies: int = 20,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> MomentIndependent:
     """Return PAWN and delta from a sample that exists already.
 
@@ -213,11 +213,13 @@ def moment_independent(
     dummies
         Columns that the output does not depend on; one more without an effect passes them all with probability
         1/(dummies + 1) [-].
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     SolveError
-        More than 1 % of the units failed.
+        More units failed.
 
     Notes
     -----
@@ -229,7 +231,7 @@ def moment_independent(
     ----------
     Pianosi & Wagener 2018 (PAWN from given data); Plischke, Borgonovo & Smith 2013, eq. (26) and (30) (delta).
     """
-    require_few_failures(sample, "moment-independent indices")
+    require_few_failures(sample, "moment-independent indices", largest_failed_share)
     y, known = sample.values, _known(errors, sample.x[sample.evaluation.good])
     known += list(seeds.child("dummies").generator().random((dummies, y.size, 1)))
     pawns = np.array([_pawn(columns, y, classes).max() for columns in known])

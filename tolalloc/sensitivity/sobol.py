@@ -184,5 +184,4 @@ def _players(errors: ErrorModel, player: Player) -> tuple[str, ...]:
             f"Sobol indices: {'; '.join(correlated)} are correlated; a Sobol index per source would share their "
             "variance arbitrarily; rank blocks or ask for Shapley effects."
         )
-    block_of = {name: " + ".join(block) for block in errors.blocks for name in block}
-    return tuple(block_of[name] for name in errors.source_of_column)
+    return errors.block_of_column

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
@@ -85,6 +85,7 @@ def target_sensitivity(
     fewest: int = 50,
     resamples: int = 400,
     permutations: int = 1999,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> TargetSensitivity:
     """Return what the units beyond the limit have in common.
 
@@ -102,13 +103,15 @@ def target_sensitivity(
         Units needed on either side of the limit; otherwise the worst 5 % are taken and the result says so [-].
     resamples, permutations
         Bootstrap resamples, and random choices of units for the test of no effect [-].
+    largest_failed_share
+        Share of the units that may fail [-].
 
     Raises
     ------
     InputError
         The worst 5 % are fewer units than needed.
     SolveError
-        More than 1 % of the units failed.
+        More units failed.
 
     Notes
     -----
@@ -122,7 +125,7 @@ def target_sensitivity(
     Target sensitivity, indices of the indicator of a critical domain: Marrel & Chabridon 2021. Given-data estimate by
     classes of equal size: Plischke, Borgonovo & Smith 2013, with ω² of the analysis of variance against its bias.
     """
-    require_few_failures(sample, "target sensitivity")
+    require_few_failures(sample, "target sensitivity", largest_failed_share)
     good = sample.evaluation.good
     x, values = sample.x[good], sample.values
     threshold, is_limit = _threshold(values, limit, fewest)

@@ -41,9 +41,9 @@ class RankingEffort:
     derivative_units: int = 1024
     inverse_units: int = 2048
     surrogate_units: int = 2048
-    level_units: int = 2000
-    level_runs: int = 10
-    widened_units: int = 10_000
+    level_units: int = 4000
+    level_runs: int = 5
+    widened_units: int = 20_000
     permutations: int = 1000
 
 

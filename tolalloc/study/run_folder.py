@@ -124,8 +124,6 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "first sources": list(ranked["source"].head(5)),
         "design surrogate Q2 [-]": surrogate.q2,
         "design surrogate used": surrogate.earns_its_place,
-        "unit surrogate Q2 [-]": results.unit_surrogate.q2,
-        "unit surrogate used": results.ranked_on_surrogate,
         "identified stiffness": _stiffness(results),
         "torsional stiffness of the perfect reducer [N·m/arcmin]": results.torsional_stiffness,
         "warnings": list(results.warnings),

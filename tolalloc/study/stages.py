@@ -29,7 +29,6 @@ from tolalloc.sensitivity.monte_carlo import MonteCarlo
 from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared
-from tolalloc.surrogate.regression import Surrogate, fit_surrogate, quadratic_regression
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCMINUTE
 
@@ -134,8 +133,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
         )
     with record.stage("ranking"):
-        surrogate = _unit_surrogate(kernel, allocation.baseline.sample, space.errors.zones.size)
-        sobol, stiffness = _ranking(prepared, kernel, surrogate, allocation.baseline.sample, seeds)
+        sobol, stiffness = _ranking(prepared, kernel, allocation.baseline.sample, seeds)
         classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
     with record.stage("report"):
         return StudyResults(
@@ -150,7 +148,6 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             requirement=requirement,
             sobol=sobol,
             classical=classical,
-            unit_surrogate=surrogate,
             stiffness=stiffness,
             allocation=allocation,
             unit=prepared.unit,
@@ -167,7 +164,7 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
 
 
 def _ranking(
-    prepared: Prepared, kernel: KernelResponse, surrogate: Surrogate, sample: MonteCarlo, seeds: SeedTree
+    prepared: Prepared, kernel: KernelResponse, sample: MonteCarlo, seeds: SeedTree
 ) -> tuple[SobolIndices, StiffnessEffect | None]:
     """Return the ranking at the zones of the tolerance table, and what not knowing the stiffness does, if it is one."""
     errors, own, blocks = prepared.space.errors, seeds.child("sobol"), prepared.study.effort.sobol_blocks
@@ -175,10 +172,7 @@ def _ranking(
     # Correlated sources share their variance, so their block has the index.
     player = Player.BLOCK if errors.is_correlated else Player.SOURCE
     if prepared.identified is None or prepared.stiffness is None:
-        # A stand-in for single units saves the ranking's kernel runs; it must have earned that.
-        ranked = surrogate if surrogate.earns_its_place else kernel
-        return sobol_indices(ranked, errors, errors.zones, own, effort, player).of(PEAK_TO_PEAK), None
-    # The stand-in knows no stiffness.
+        return sobol_indices(kernel, errors, errors.zones, own, effort, player).of(PEAK_TO_PEAK), None
     response = StiffnessResponse(kernel=kernel, stiffnesses=tuple(prepared.identified.values))
     joint = replace(errors, joint=(prepared.stiffness,))
     units = sample.x[sample.evaluation.good][:_EFFECT_UNITS]
@@ -200,13 +194,6 @@ def _contact(reducer: Reducer, modification: Modification) -> Assessment | None:
         return assess(replace(reducer, modification=modification), reducer.load.rated_torque)
     except InputError:
         return None
-
-
-def _unit_surrogate(kernel: KernelResponse, sample: MonteCarlo, sources: int) -> Surrogate:
-    """Return the quadratic stand-in for single units, judged on a fifth of the baseline's units."""
-    good = sample.evaluation.good
-    x, y = sample.x[good][: 200 * sources], sample.evaluation.values[good, 0][: 200 * sources]
-    return fit_surrogate(quadratic_regression(), kernel.columns, PEAK_TO_PEAK, x, y, held_out=y.size // 5)
 
 
 def _examples(

@@ -84,6 +84,12 @@ class ErrorModel:
         return (*self.correlation.blocks(self.sources), *((source.name,) for source in self.joint))
 
     @property
+    def block_of_column(self) -> tuple[str, ...]:
+        """Name of the block of each column: its source, or correlated sources joined by " + "."""
+        block_of = {name: " + ".join(block) for block in self.blocks for name in block}
+        return tuple(block_of[name] for name in self.source_of_column)
+
+    @property
     def is_correlated(self) -> bool:
         """Whether some sources of the table depend on each other."""
         return any(len(block) > 1 for block in self.blocks)

@@ -1,0 +1,1 @@
+"""The report on what drives a reducer's outputs."""

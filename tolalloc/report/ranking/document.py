@@ -1,0 +1,185 @@
+"""What drives a reducer's outputs: answer, warnings, sections and summary of one report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tolalloc.report.document import Document
+from tolalloc.report.ranking import tables
+from tolalloc.report.ranking.results import RankingResults
+from tolalloc.report.ranking.sections import driver_sections, limit_sections, trust_sections
+from tolalloc.response.kernel import PEAK_TO_PEAK
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+_NAMED = 3
+"""Sources that the answer names [-]."""
+
+
+def answer(results: RankingResults) -> tuple[str, ...]:
+    """Return the answer in sentences."""
+    return (
+        *_drivers(results.sobol.of(PEAK_TO_PEAK)),
+        results.sobol.growth.status,
+        f"A second seed shows {results.reproduction.reproduced} of the {results.reproduction.promised} pairs whose "
+        f"order was promised with {results.reproduction.confidence:.0%} confidence "
+        f"({results.reproduction.share:.1%} of them).",
+        *_orders(results),
+        *_rejects(results),
+        *_beyond(results),
+        _opening(results),
+        results.choice.reason,
+    )
+
+
+def _drivers(sobol: SobolIndices) -> tuple[str, ...]:
+    """Return who drives the peak-to-peak, and how sure each place is."""
+    interval, among = sobol.total_interval, sobol.among_first(_NAMED)
+    following = {pair.before: pair.probability for pair in sobol.neighbours}
+    return tuple(
+        f"{place}. {sobol.sources[at]}: total index {sobol.total[at]:.3f} "
+        f"({interval[0, at]:.3f}…{interval[1, at]:.3f}), among the first {_NAMED} with {among[at]:.0%} probability, "
+        f"before the next one with {following.get(at, 1.0):.0%}."
+        for place, at in enumerate(sobol.order[:_NAMED], start=1)
+    )
+
+
+def _orders(results: RankingResults) -> tuple[str, ...]:
+    """Return who makes the strongest orders."""
+    found, sentences = results.orders, []
+    for at in np.argsort(-found.deviation, kind="stable")[:_NAMED]:
+        first = np.nan_to_num(found.first[at])
+        leading = np.argsort(-first, kind="stable")[:2]
+        names = " and ".join(f"{found.sources[source]} ({first[source]:.0%})" for source in leading)
+        sentences.append(
+            f"Order {found.orders[at]} of the output turn (standard deviation of the wave "
+            f"{found.deviation[at]:.2g}″) is mostly due to {names}."
+        )
+    return tuple(sentences)
+
+
+def _rejects(results: RankingResults) -> tuple[str, ...]:
+    """Return what drives the units out."""
+    found, at = results.reject, int(np.argmax(results.reject.lift))
+    where = f"the limit of {found.threshold:g}″" if found.is_limit else f"{found.threshold:.1f}″, the worst 5 %"
+    low, high = found.lift_interval[:, at]
+    return (
+        f"Beyond {where} ({found.outside} of {found.units} units), {found.sources[at]} stands out most: its mean "
+        f"square deviation is {found.lift[at]:.2f} ({low:.2f}…{high:.2f}) times that of all units.",
+    )
+
+
+def _beyond(results: RankingResults) -> tuple[str, ...]:
+    """Return the share of units beyond the limit, and how it is known."""
+    found = results.beyond
+    share = found.parts_per_million
+    return (
+        f"Beyond {found.limit:g}″ lie {share.estimate:.3g} units of a million (95 % interval "
+        f"{share.low:.3g}…{share.high:.3g}), target {(1 - results.target) * 1e6:.4g}. {found.verdict}",
+    )
+
+
+def _opening(results: RankingResults) -> str:
+    """Return which zone has the least and the most room."""
+    found = results.inverse
+    finite = np.flatnonzero(np.isfinite(found.factor))
+    kept = f"{results.target:.2%} of the units keep {found.quantile:.1f}″ now"
+    if not finite.size:
+        verdict = "no zone alone matters up to 10 times it" if found.meets else "no zone alone can meet the limit"
+        return f"{kept}: {verdict}."
+    at = finite[np.argmin(found.factor[finite])] if found.meets else finite[np.argmax(found.factor[finite])]
+    name, factor = found.sources[at], found.factor[at]
+    if found.meets:
+        return f"{kept}: {name} has the least room, it may open alone to {factor:.2f} times its zone."
+    return f"{kept}: {name} could repair that alone most easily, at {factor:.2f} times its zone."
+
+
+def warnings(results: RankingResults) -> tuple[str, ...]:
+    """Return what a reader must know before acting on the answer."""
+    found = []
+    if results.quick:
+        found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
+    if not results.sobol.growth.stable:
+        found.append("The order of the first places is not settled: see the blocks that would tell neighbours apart.")
+    if results.errors.is_correlated:
+        found.append(
+            "Some sources are correlated: Sobol indices stand for whole blocks of them, Shapley effects share the "
+            "variance among their members."
+        )
+    if results.reproduction.promised and results.reproduction.share < results.reproduction.confidence:
+        found.append("A second seed did not show as many of the promised orders as it should: add blocks.")
+    if not results.reject.is_limit:
+        found.append("Too few units lie outside the limit to say what they share; the worst 5 % stand in for them.")
+    found += [f"Share beyond the limit: {caution}." for caution in results.beyond.estimate.cautions]
+    found += [f"{output} is the same for all units; nothing drives it." for output in results.sobol.constant]
+    if results.sobol.dropped:
+        found.append(f"{results.sobol.dropped} Sobol blocks held a failed unit and were dropped whole.")
+    failed = sum(count for outcome, count in results.statuses.items() if outcome != "equilibrium found")
+    if failed:
+        found.append(f"{failed} units have no equilibrium; no figure uses them, and yields count them as outside.")
+    return tuple(found)
+
+
+def assumptions(results: RankingResults) -> tuple[str, ...]:
+    """Return what no source states."""
+    return (
+        *results.reducer.assumptions,
+        "zones, distributions and Cp: as the tolerance table states them; its notes say where each comes from",
+        "correlated as listed below" if results.errors.is_correlated else "all sources are independent of each other",
+        "contact errors and the tooth modification are those of the reducer; no drift, wear or temperature",
+        *(
+            (f"not in the tolerance table and taken as exact: {', '.join(results.neglected)}",)
+            if results.neglected
+            else ()
+        ),
+    )
+
+
+def summary(results: RankingResults) -> dict[str, Any]:
+    """Return the whole answer for a program, units in the names."""
+    sobol, beyond = results.sobol.of(PEAK_TO_PEAK), results.beyond
+    return {
+        "study": results.name,
+        "reducer": results.reducer.name,
+        "torque [N·m]": results.torque,
+        "seed": results.seed,
+        "quick": results.quick,
+        "ranking": [
+            {
+                "source": sobol.sources[at],
+                "total index [-]": sobol.total[at],
+                "interval 90 % [-]": sobol.total_interval[:, at].tolist(),
+                "first index [-]": sobol.first[at],
+                "P(among first 3) [-]": sobol.among_first(3)[at],
+            }
+            for at in sobol.order
+        ],
+        "Sobol blocks [-]": results.sobol.blocks,
+        "Sobol blocks dropped [-]": results.sobol.dropped,
+        "samples of the Sobol analysis [-]": results.sobol.samples,
+        "order of the first places is stable": results.sobol.growth.stable,
+        "pairs promised [-]": results.reproduction.promised,
+        "pairs a second seed shows [-]": results.reproduction.reproduced,
+        "requirements": tables.capability_table(results).replace({np.nan: None}).to_dict("records"),
+        "probability beyond the limit [-]": beyond.estimate.probability,
+        "yield [-]": beyond.interval.estimate,
+        "yield interval 95 % [-]": [beyond.interval.low, beyond.interval.high],
+        "surrogate": results.choice.reason,
+        "statuses": dict(results.statuses),
+        "warnings": list(warnings(results)),
+    }
+
+
+def ranking_document(results: RankingResults) -> Document:
+    """Return the report."""
+    return Document(
+        title=f"What drives {results.reducer.name}: {results.name}",
+        subtitle=f"{len(results.errors.active)} sources, {results.torque:g} N·m on the carrier, seed {results.seed}",
+        answer=answer(results),
+        warnings=warnings(results),
+        sections=(*driver_sections(results), *limit_sections(results), *trust_sections(results)),
+        assumptions=assumptions(results),
+        summary=summary(results),
+        seed=results.seed,
+    )

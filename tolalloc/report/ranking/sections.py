@@ -1,0 +1,101 @@
+"""The sections of a ranking's report."""
+
+from __future__ import annotations
+
+from tolalloc.report.document import Section
+from tolalloc.report.ranking import figures, tables
+from tolalloc.report.ranking.results import RankingResults
+
+
+def driver_sections(results: RankingResults) -> tuple[Section, ...]:
+    """Return which error drives what: the peak-to-peak, all requirements, each order."""
+    stage = results.reducer.cycloid_stage
+    return (
+        Section(
+            heading="Which error drives the peak-to-peak",
+            paragraphs=(
+                "The total index is the share of the variance that goes when the error is exact; the first-order index "
+                "is what it gives without the others. Intervals and places come from resampled blocks.",
+            ),
+            figures=(figures.ranking_figure(results),),
+            tables=(("ranking", tables.ranking_table(results)), ("growth", tables.growth_table(results))),
+        ),
+        *_correlated(results),
+        Section(
+            heading="One ranking over all requirements",
+            figures=(figures.requirements_figure(results),),
+            tables=(("all requirements", tables.overall_table(results)),),
+        ),
+        Section(
+            heading="Which error makes which order",
+            paragraphs=(
+                f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn "
+                f"with disc or carrier at multiples of {stage.pin_count}; what a source adds only together with others "
+                "is the difference of the two shares.",
+            ),
+            figures=(figures.orders_figure(results),),
+            tables=(("orders", tables.orders_table(results)),),
+        ),
+    )
+
+
+def _correlated(results: RankingResults) -> tuple[Section, ...]:
+    """Return how correlated sources share the variance; nothing where all are independent."""
+    if results.shapley is None:
+        return ()
+    return (
+        Section(
+            heading="Correlated sources",
+            paragraphs=results.errors.correlation.mappings(results.errors.sources),
+            tables=(("Shapley effects", tables.shapley_table(results.shapley)),),
+        ),
+    )
+
+
+def limit_sections(results: RankingResults) -> tuple[Section, ...]:
+    """Return what the limits do: yield, units beyond them, and how far each zone may open."""
+    alone = figures.inverse_figure(results)
+    return (
+        Section(
+            heading="Yield and capability",
+            figures=(figures.sample_figure(results),),
+            tables=(
+                ("requirements", tables.capability_table(results)),
+                ("beyond the limit", tables.beyond_table(results)),
+                ("stack-up", tables.stack_up_table(results)),
+            ),
+        ),
+        Section(
+            heading="What drives the units out of the limit",
+            figures=(figures.reject_figure(results),),
+            tables=(("rejects", tables.reject_table(results)),),
+        ),
+        Section(
+            heading="How far each zone may open alone",
+            figures=(alone,) if alone else (),
+            tables=(("alone", tables.inverse_table(results)),),
+        ),
+    )
+
+
+def trust_sections(results: RankingResults) -> tuple[Section, ...]:
+    """Return what the answer rests on: other measures, stand-ins, distributions, work done."""
+    return (
+        Section(
+            heading="Other measures of the same",
+            paragraphs=(
+                f"An index of PAWN below {results.moments.pawn_dummy:.3f} or of delta below "
+                f"{results.moments.delta_dummy:.3f} means nothing: an input that does nothing reaches as much.",
+            ),
+            tables=(("measures", tables.measures_table(results)),),
+        ),
+        Section(
+            heading="Stand-ins for the model",
+            paragraphs=(results.choice.reason,),
+            tables=(("surrogates", tables.surrogate_table(results)),),
+        ),
+        Section(
+            heading="From zone to distribution",
+            tables=(("zones", tables.mapping_table(results)), ("work", tables.work_table(results))),
+        ),
+    )
