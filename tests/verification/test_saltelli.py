@@ -244,15 +244,24 @@ def test_promised_orders_are_counted_that_another_ranking_reproduces():
 
 
 def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
-    found = grow_until_stable(gaps, 3, start=64, limit=1 << 14)
+    found = grow_until_stable(gaps, "abcd", 3, start=64, limit=1 << 14)
     assert found.stable
     assert [step.blocks for step in found.history] == [64 << at for at in range(len(found.history))]
     assert found.history[-1].first == (1, 2, 0)
     assert found.history[-1].probability >= 0.9 > found.history[-2].probability
     assert found.status.startswith("The order of the first 3 is stable: ")
-    stopped = grow_until_stable(gaps, 3, start=64, limit=200)
+    stopped = grow_until_stable(gaps, "abcd", 3, start=64, limit=200)
     assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
     assert "not stable at the largest number of blocks allowed" in stopped.status
     assert "resamples of 128 blocks" in stopped.status
     with pytest.raises(InputError, match="first number of blocks"):
-        grow_until_stable(gaps, 3, start=64, limit=32)
+        grow_until_stable(gaps, "abcd", 3, start=64, limit=32)
+
+
+def test_twins_of_one_group_may_change_places():
+    def twins(blocks):
+        values = np.array([0.4, 0.4, 0.1])
+        return values, values + SeedTree(1).generator().normal(size=(400, 3)) * 0.02
+
+    assert not grow_until_stable(twins, "abc", 2, start=64, limit=64).stable
+    assert grow_until_stable(twins, "aac", 2, start=64, limit=64).stable

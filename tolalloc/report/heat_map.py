@@ -54,7 +54,7 @@ class HeatMap:
 def _(figure: HeatMap) -> str:
     canvas = go.Figure(
         go.Heatmap(
-            x=[str(name) for name in figure.columns],
+            x=[name.replace("\n", "<br>") for name in figure.columns],
             y=list(figure.rows),
             z=[list(row) for row in figure.values],
             text=figure.texts,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,13 +60,20 @@ class Growth:
         last = self.history[-1]
         verdict = "is stable" if self.stable else "is not stable at the largest number of blocks allowed"
         return (
-            f"The order of the first {len(last.first)} {verdict}: {last.probability:.0%} of the resamples of "
-            f"{last.blocks} blocks have it, asked for are {self.probability:.0%}."
+            f"The order of the first {len(last.first)} over all requirements, sources of one group taken alike, "
+            f"{verdict}: {last.probability:.0%} of the resamples of {last.blocks} blocks have it, asked for are "
+            f"{self.probability:.0%}."
         )
 
 
 def grow_until_stable(
-    resampled: Callable[[int], Resampled], count: int, *, start: int, limit: int, probability: float = 0.9
+    resampled: Callable[[int], Resampled],
+    groups: Sequence[str],
+    count: int,
+    *,
+    start: int,
+    limit: int,
+    probability: float = 0.9,
 ) -> Growth:
     """Double the blocks until the order of the first sources is stable.
 
@@ -74,6 +81,8 @@ def grow_until_stable(
     ----------
     resampled
         Gives the indices for a number of blocks; it may keep the answers of the blocks that it has had.
+    groups
+        Group of each source; sources of one group may change places.
     count
         How many of the first sources must keep their order [-].
     start, limit
@@ -83,19 +92,20 @@ def grow_until_stable(
 
     Notes
     -----
-    Looking several times makes a stop by chance likelier than one look does; the history shows whether the order
-    was the same before.
+    Sources of one group share a tolerance, such as the pitch of both discs: their indices are often equal, so that
+    no number of blocks would settle an order between them, and no drawing needs one. Looking several times makes a stop
+    by chance likelier than one look does; the history shows whether the order was the same before.
     """
     require_confidence(probability)
     if not 2 <= start <= limit:
         raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
-    history: list[Step] = []
+    history, names = list[Step](), np.array(groups)
     blocks = start
     while blocks <= limit:
         indices, resamples = resampled(blocks)
         require_places(count, indices.size)
         first = np.argsort(-indices, kind="stable")[:count]
-        same = (np.argsort(-resamples, axis=1, kind="stable")[:, :count] == first).all(axis=1)
+        same = (names[np.argsort(-resamples, axis=1, kind="stable")[:, :count]] == names[first]).all(axis=1)
         history.append(Step(blocks=blocks, first=tuple(first.tolist()), probability=float(same.mean())))
         if history[-1].probability >= probability:
             break

@@ -161,6 +161,7 @@ def sobol_indices(
 
     growth = grow_until_stable(
         resampled,
+        _groups(errors, design.names),
         min(effort.places, len(design.names)),
         start=effort.start,
         limit=effort.limit,
@@ -174,6 +175,12 @@ def sobol_indices(
         growth=growth,
         samples=answers.blocks * design.samples_per_block,
     )
+
+
+def _groups(errors: ErrorModel, players: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the group of each player: the tolerance that it shares with others, or itself."""
+    group_of = {source.name: source.group for source in errors.sources if source.group}
+    return tuple(group_of.get(name, name) for name in players)
 
 
 def _players(errors: ErrorModel, player: Player) -> tuple[str, ...]:

@@ -13,6 +13,10 @@ from tolalloc.report.ranking.sections import driver_sections, limit_sections, tr
 from tolalloc.response.kernel import PEAK_TO_PEAK
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
+_RARE = 1000.0
+"""Units of a million from which a share is said in percent [-]."""
+_MOSTLY = 0.5
+"""Share of a wave's variance from single sources above which they are named for it [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
 
@@ -49,12 +53,16 @@ def _orders(results: RankingResults) -> tuple[str, ...]:
     """Return who makes the strongest orders."""
     found, sentences = results.orders, []
     for at in np.argsort(-found.deviation, kind="stable")[:_NAMED]:
-        first = np.nan_to_num(found.first[at])
-        leading = np.argsort(-first, kind="stable")[:2]
-        names = " and ".join(f"{found.sources[source]} ({first[source]:.0%})" for source in leading)
+        first, total = np.nan_to_num(found.first[at]), np.nan_to_num(found.total[at])
+        alone = first.sum() > _MOSTLY
+        share = first if alone else total
+        names = " and ".join(
+            f"{found.sources[source]} ({share[source]:.0%})" for source in np.argsort(-share, kind="stable")[:2]
+        )
+        due = "is mostly due to" if alone else "needs several errors at once, most often"
         sentences.append(
             f"Order {found.orders[at]} of the output turn (standard deviation of the wave "
-            f"{found.deviation[at]:.2g}″) is mostly due to {names}."
+            f"{found.deviation[at]:.2g}″) {due} {names}."
         )
     return tuple(sentences)
 
@@ -74,9 +82,10 @@ def _beyond(results: RankingResults) -> tuple[str, ...]:
     """Return the share of units beyond the limit, and how it is known."""
     found = results.beyond
     share = found.parts_per_million
+    scale, unit = (1e4, "%") if share.estimate >= _RARE else (1.0, "units of a million")
     return (
-        f"Beyond {found.limit:g}″ lie {share.estimate:.3g} units of a million (95 % interval "
-        f"{share.low:.3g}…{share.high:.3g}), target {(1 - results.target) * 1e6:.4g}. {found.verdict}",
+        f"Beyond {found.limit:g}″: {share.estimate / scale:.3g} {unit} (95 % interval {share.low / scale:.3g}…"
+        f"{share.high / scale:.3g}), allowed {(1 - results.target) * 1e6 / scale:.3g}. {found.verdict}",
     )
 
 

@@ -96,7 +96,7 @@ def sample_figure(results: RankingResults) -> Figure:
 
 def reject_figure(results: RankingResults) -> Figure:
     """Draw how much larger the deviations of the units outside are."""
-    frame = tables.reject_table(results).head(_SHOWN)
+    frame = tables.reject_table(results).head(_SHOWN // 2)
     return Figure(
         name="rejects",
         title="What the units outside have in common",

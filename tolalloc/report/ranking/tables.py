@@ -134,7 +134,7 @@ def capability_table(results: RankingResults) -> pd.DataFrame:
                 "OK": "yes" if inside.low >= results.target else "no",
             }
         rows.append(row)
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).dropna(axis="columns", how="all")
 
 
 def reject_table(results: RankingResults) -> pd.DataFrame:
