@@ -26,7 +26,7 @@ def rank(
     from tolalloc.cli.document_script import written
     from tolalloc.report.document import Document
     from tolalloc.report.ranking.document import ranking_document
-    from tolalloc.report.ranking.tables import ranking_table
+    from tolalloc.report.ranking.driver_tables import ranking_table
     from tolalloc.study.ranking import rank as ranked
 
     announce_compilation()

@@ -147,10 +147,10 @@ def answer(comparison: Comparison) -> tuple[str, ...]:
     sentences = []
     for label, run in zip(comparison.names, comparison.runs, strict=True):
         found = run.summary
-        sentences.append(
-            f"{label}: limit {found['limit [arcsec]']:g}″ {'met' if found['met'] else 'NOT met'}, "
-            f"{found['yield [-]']:.2%} of units keep it, cost {found['cost [cost units]']:.2f} cost units."
-        )
+        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {found['limit [arcsec]']:g}″"
+        if "met" in found:  # an allocation; a ranking alone decides nothing
+            kept += f", {'met' if found['met'] else 'NOT met'}, cost {found['cost [cost units]']:.2f} cost units"
+        sentences.append(f"{kept}.")
     table = ranking_table(comparison)
     moved = list(table.loc[table["90 % intervals"] == "apart", "source"])
     sentences.append(

@@ -99,7 +99,7 @@ def grow_until_stable(
     require_confidence(probability)
     if not 2 <= start <= limit:
         raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
-    history, names = list[Step](), np.array(groups)
+    history, names = list[Step](), np.array(list(groups))
     blocks = start
     while blocks <= limit:
         indices, resamples = resampled(blocks)

@@ -134,7 +134,7 @@ class Measures:
             self._seeds(name),
             replace(effort, start=blocks, limit=blocks) if blocks else effort,
             Player.BLOCK if errors.is_correlated else Player.SOURCE,
-            ranked=self.requirements.outputs,
+            ranked=tuple(self.limits),
         )
 
     def shapley(self) -> ShapleyEffects | None:

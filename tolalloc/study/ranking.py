@@ -56,6 +56,7 @@ def rank(study: Study, progress: Progress, *, quick: bool = False) -> RankingRes
     return RankingResults(
         name=study.name,
         quick=quick,
+        digest=prepared.hash,
         seed=study.seed,
         reducer=prepared.reducer,
         torque=prepared.kernel.torque,

@@ -28,6 +28,8 @@ from tolalloc.study.stages import Record
 from tolalloc.uncertainty.tolerance_table import table_frame
 
 _NEEDED = ("limit [arcsec]", "met", "yield [-]", "cost [cost units]")
+_RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
+_ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
 _LIBRARIES = ("numpy", "scipy", "numba", "cvxpy", "clarabel", "pymoo", "SALib", "pandas", "scikit-learn")
 
 
@@ -178,15 +180,28 @@ def read_run(folder: Path) -> FinishedRun:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such run folder.")
+    if (folder / "tables" / "ranking.csv").is_file():
+        return _read_ranking(folder)
     summaries = {name: _read_json(folder / f"{name}.json") for name in ("summary", "manifest")}
     return FinishedRun(
         name=str(summaries["manifest"].get("study", folder.name)),
         summary=_with(summaries["summary"], _NEEDED, folder / "summary.json"),
         manifest=summaries["manifest"],
-        ranking=_read_table(folder / "sensitivity.csv", ("source", "rank [-]", TOTAL, LOW, HIGH)),
-        zones=_read_table(
-            folder / "allocation.csv", ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
-        ),
+        ranking=_read_table(folder / "sensitivity.csv", _RANKED),
+        zones=_read_table(folder / "allocation.csv", _ZONED),
+    )
+
+
+def _read_ranking(folder: Path) -> FinishedRun:
+    """Return what the folder of ``tolalloc rank`` says."""
+    said, manifest = _read_json(folder / "summary.json"), _read_json(folder / "manifest.json")
+    said = _with(said, ("study", "study hash", "quick", "limit [arcsec]", "yield [-]"), folder / "summary.json")
+    return FinishedRun(
+        name=str(said["study"]),
+        summary=said,
+        manifest={**manifest, "study hash": said["study hash"], "quick": said["quick"]},
+        ranking=_read_table(folder / "tables" / "ranking.csv", _RANKED),
+        zones=_read_table(folder / "tables" / "tolerances.csv", _ZONED),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tolalloc.report.document import Document
-from tolalloc.report.ranking import tables
+from tolalloc.report.ranking import limit_tables
 from tolalloc.report.ranking.results import RankingResults
 from tolalloc.report.ranking.sections import driver_sections, limit_sections, trust_sections
 from tolalloc.response.kernel import PEAK_TO_PEAK
@@ -150,8 +150,11 @@ def summary(results: RankingResults) -> dict[str, Any]:
     sobol, beyond = results.sobol.of(PEAK_TO_PEAK), results.beyond
     return {
         "study": results.name,
+        "study hash": results.digest,
         "reducer": results.reducer.name,
         "torque [N·m]": results.torque,
+        "limit [arcsec]": beyond.limit,
+        "yield target [-]": results.target,
         "seed": results.seed,
         "quick": results.quick,
         "ranking": [
@@ -170,7 +173,7 @@ def summary(results: RankingResults) -> dict[str, Any]:
         "order of the first places is stable": results.sobol.growth.stable,
         "pairs promised [-]": results.reproduction.promised,
         "pairs a second seed shows [-]": results.reproduction.reproduced,
-        "requirements": tables.capability_table(results).replace({np.nan: None}).to_dict("records"),
+        "requirements": limit_tables.capability_table(results).replace({np.nan: None}).to_dict("records"),
         "probability beyond the limit [-]": beyond.estimate.probability,
         "yield [-]": beyond.interval.estimate,
         "yield interval 95 % [-]": [beyond.interval.low, beyond.interval.high],

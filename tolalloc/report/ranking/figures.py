@@ -6,7 +6,7 @@ import numpy as np
 
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.heat_map import HeatMap
-from tolalloc.report.ranking import tables
+from tolalloc.report.ranking import driver_tables, limit_tables
 from tolalloc.report.ranking.results import RankingResults
 from tolalloc.response.kernel import PEAK_TO_PEAK
 
@@ -16,7 +16,7 @@ _SHOWN = 24
 
 def ranking_figure(results: RankingResults) -> Figure:
     """Draw total and first-order indices of the peak-to-peak with their intervals."""
-    frame = tables.ranking_table(results).head(_SHOWN)
+    frame = driver_tables.ranking_table(results).head(_SHOWN)
     return Figure(
         name="ranking",
         title="Which error drives the peak-to-peak, at the zones of the tolerance table",
@@ -96,7 +96,7 @@ def sample_figure(results: RankingResults) -> Figure:
 
 def reject_figure(results: RankingResults) -> Figure:
     """Draw how much larger the deviations of the units outside are."""
-    frame = tables.reject_table(results).head(_SHOWN // 2)
+    frame = limit_tables.reject_table(results).head(_SHOWN // 2)
     return Figure(
         name="rejects",
         title="What the units outside have in common",
@@ -118,7 +118,7 @@ def reject_figure(results: RankingResults) -> Figure:
 
 def inverse_figure(results: RankingResults) -> Figure | None:
     """Draw the zones now and what they may be alone; none if no zone has such a value."""
-    frame = tables.inverse_table(results)
+    frame = limit_tables.inverse_table(results)
     frame = frame[np.isfinite(frame["zone alone [µm]"])].head(_SHOWN)
     if frame.empty:
         return None

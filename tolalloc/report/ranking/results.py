@@ -30,6 +30,8 @@ class RankingResults:
     ----------
     name, quick
         Which study, and whether it was shortened.
+    digest
+        Of the study and of what its files hold.
     seed
         Its seed [-].
     reducer, torque
@@ -76,6 +78,7 @@ class RankingResults:
 
     name: str
     quick: bool
+    digest: str
     seed: int
     reducer: Reducer
     torque: float

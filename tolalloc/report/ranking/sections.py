@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from tolalloc.report.document import Section
-from tolalloc.report.ranking import figures, tables
+from tolalloc.report.ranking import driver_tables, figures, limit_tables, trust_tables
 from tolalloc.report.ranking.results import RankingResults
+from tolalloc.uncertainty.tolerance_table import table_frame
 
 
 def driver_sections(results: RankingResults) -> tuple[Section, ...]:
@@ -18,13 +19,13 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
                 "is what it gives without the others. Intervals and places come from resampled blocks.",
             ),
             figures=(figures.ranking_figure(results),),
-            tables=(("ranking", tables.ranking_table(results)), ("growth", tables.growth_table(results))),
+            tables=(("ranking", driver_tables.ranking_table(results)), ("growth", driver_tables.growth_table(results))),
         ),
         *_correlated(results),
         Section(
             heading="One ranking over all requirements",
             figures=(figures.requirements_figure(results),),
-            tables=(("all requirements", tables.overall_table(results)),),
+            tables=(("all requirements", driver_tables.overall_table(results)),),
         ),
         Section(
             heading="Which error makes which order",
@@ -34,7 +35,7 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
                 "is the difference of the two shares.",
             ),
             figures=(figures.orders_figure(results),),
-            tables=(("orders", tables.orders_table(results)),),
+            tables=(("orders", driver_tables.orders_table(results)),),
         ),
     )
 
@@ -47,7 +48,7 @@ def _correlated(results: RankingResults) -> tuple[Section, ...]:
         Section(
             heading="Correlated sources",
             paragraphs=results.errors.correlation.mappings(results.errors.sources),
-            tables=(("Shapley effects", tables.shapley_table(results.shapley)),),
+            tables=(("Shapley effects", driver_tables.shapley_table(results.shapley)),),
         ),
     )
 
@@ -60,20 +61,20 @@ def limit_sections(results: RankingResults) -> tuple[Section, ...]:
             heading="Yield and capability",
             figures=(figures.sample_figure(results),),
             tables=(
-                ("requirements", tables.capability_table(results)),
-                ("beyond the limit", tables.beyond_table(results)),
-                ("stack-up", tables.stack_up_table(results)),
+                ("requirements", limit_tables.capability_table(results)),
+                ("beyond the limit", limit_tables.beyond_table(results)),
+                ("stack-up", limit_tables.stack_up_table(results)),
             ),
         ),
         Section(
             heading="What drives the units out of the limit",
             figures=(figures.reject_figure(results),),
-            tables=(("rejects", tables.reject_table(results)),),
+            tables=(("rejects", limit_tables.reject_table(results)),),
         ),
         Section(
             heading="How far each zone may open alone",
             figures=(alone,) if alone else (),
-            tables=(("alone", tables.inverse_table(results)),),
+            tables=(("alone", limit_tables.inverse_table(results)),),
         ),
     )
 
@@ -87,15 +88,26 @@ def trust_sections(results: RankingResults) -> tuple[Section, ...]:
                 f"An index of PAWN below {results.moments.pawn_dummy:.3f} or of delta below "
                 f"{results.moments.delta_dummy:.3f} means nothing: an input that does nothing reaches as much.",
             ),
-            tables=(("measures", tables.measures_table(results)),),
+            tables=(("measures", trust_tables.measures_table(results)),),
         ),
         Section(
             heading="Stand-ins for the model",
             paragraphs=(results.choice.reason,),
-            tables=(("surrogates", tables.surrogate_table(results)),),
+            tables=(("surrogates", trust_tables.surrogate_table(results)),),
         ),
         Section(
             heading="From zone to distribution",
-            tables=(("zones", tables.mapping_table(results)), ("work", tables.work_table(results))),
+            tables=(
+                ("mapping", trust_tables.mapping_table(results)),
+                *trust_tables.measured_tables(results),
+                ("tolerances", table_frame(results.errors.sources)),
+            ),
+        ),
+        Section(
+            heading="Work done",
+            paragraphs=(
+                ", ".join(f"{count} units: {outcome}" for outcome, count in results.statuses.items() if count),
+            ),
+            tables=(("work", trust_tables.work_table(results)),),
         ),
     )

@@ -1,0 +1,194 @@
+"""``tolalloc rank`` as a user meets it: answer, files, order rule, correlated sources, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tolalloc.uncertainty.process_capability import load_process_capabilities
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+
+ROOT = Path(__file__).parents[2]
+PEAK_TO_PEAK = "peak-to-peak transmission error"
+EFFORT = """effort=Effort(ranking=RankingEffort(units=2048, sobol=SobolEffort(start=256, limit=256), trajectories=8,
+    moment_units=512, derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2,
+    widened_units=500, permutations=200))"""
+
+
+def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+def script_with(path: Path, **fields: object) -> Path:
+    """Write a study of few sources: the sources of the housing and the pitch of the discs."""
+    values = {"name": "ranked", "tolerances": str(few_sources(path)), "neglected": ("*",), "yield_target": 0.99}
+    text = ", ".join(f"{name}={value!r}" for name, value in {**values, **fields}.items())
+    script = path / "study.py"
+    script.write_text(
+        "from tolalloc.sensitivity.sobol import SobolEffort\n"
+        "from tolalloc.study.definition import Study\n"
+        "from tolalloc.study.effort import Effort, RankingEffort\n"
+        f"study = Study({text}, {EFFORT})\n",
+        encoding="utf-8",
+    )
+    return script
+
+
+def few_sources(path: Path) -> Path:
+    table = pd.read_csv(
+        ROOT / "tolalloc/uncertainty/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False
+    )
+    kept = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter", "housing.groove.radius")
+    table[table["id"].isin(kept)].to_csv(path / "few.csv", index=False)
+    return path / "few.csv"
+
+
+@pytest.fixture(scope="module")
+def ranked(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("rank")
+    result = tolalloc("rank", script_with(path), "--out", path / "report")
+    assert result.returncode == 0, result.stderr
+    assert "total index" in result.stdout
+    return path / "report"
+
+
+def test_the_report_is_complete(ranked):
+    names = {path.name for path in ranked.iterdir()}
+    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}
+    figures = {path.stem for path in (ranked / "figures").iterdir()}
+    assert {"ranking", "requirements", "orders", "peak_to_peak", "rejects"} <= figures
+    page = (ranked / "report.html").read_text(encoding="utf-8")
+    for heading in (
+        "Which error drives the peak-to-peak",
+        "One ranking over all requirements",
+        "Which error makes which order",
+        "Yield and capability",
+        "What drives the units out of the limit",
+        "How far each zone may open alone",
+        "Stand-ins for the model",
+        "From zone to distribution",
+    ):
+        assert heading in page
+    assert "<script src" not in page
+
+
+def test_the_answer_for_programs_is_whole(ranked):
+    answer = json.loads((ranked / "summary.json").read_text(encoding="utf-8"))
+    assert len(answer["ranking"]) == 6
+    totals = [row["total index [-]"] for row in answer["ranking"]]
+    assert totals == sorted(totals, reverse=True)
+    assert answer["Sobol blocks dropped [-]"] == 0
+    assert answer["pairs a second seed shows [-]"] >= 0.9 * answer["pairs promised [-]"]
+    assert set(answer["statuses"]) >= {"equilibrium found"}
+    (requirement,) = [row for row in answer["requirements"] if row["requirement"] == PEAK_TO_PEAK]
+    assert requirement["Yield low 95 % [%]"] < requirement["Yield [%]"] < requirement["Yield high 95 % [%]"]
+
+
+def test_errors_of_the_housing_make_multiples_of_the_teeth_and_turning_ones_of_the_pins(ranked):
+    orders = pd.read_csv(ranked / "tables" / "orders.csv")
+    order, alone = orders["order of the output turn [-]"], orders["alone low 5 % [-]"] > 0.05
+    of_housing, of_discs = (
+        orders["source"].str.startswith("housing."),
+        orders["source"].str.endswith(".pitch") & (orders["source"].str.startswith("disc")),
+    )
+    # The main orders of either: order 2 of the housing's pins, order 1 of a disc's teeth; the discs stand opposite each
+    # other, so the odd orders of the housing nearly cancel.
+    assert set(order[of_housing & alone]) == {78, 156}
+    assert {40, 160} <= set(order[of_discs & alone]) <= {40, 80, 120, 160}
+    # Order 1 comes from both together.
+    first = order == 1
+    assert not alone[first].any()
+    assert (orders["with others low 5 % [-]"][first & (of_housing | of_discs)] > 0.2).sum() >= 3
+
+
+def test_seed_zero_is_a_seed_like_every_other(tmp_path):
+    script = script_with(tmp_path)
+    answers = []
+    for number in range(2):
+        result = tolalloc("rank", script, "--quick", "--seed", 0, "--out", tmp_path / str(number), "--json")
+        assert result.returncode == 0, result.stderr
+        answers.append(json.loads(result.stdout))
+    assert answers[0] == answers[1]
+    compared = tolalloc("compare", tmp_path / "0", tmp_path / "1", "--json")
+    assert compared.returncode == 0, compared.stderr
+    found = json.loads(compared.stdout)
+    assert found["same question"] is True
+    assert {row["90 % intervals"] for row in found["rankings"]} == {"overlap"}
+    assert any("one and the same study" in warning for warning in found["warnings"])
+
+
+def test_measured_parts_and_processes_reach_the_report(tmp_path):
+    table = pd.read_csv(few_sources(tmp_path), dtype=str, keep_default_na=False)
+    parts = SeedTree(1).generator().normal(0.2, 0.4, 60)
+    (tmp_path / "pins.csv").write_text(
+        "deviation [µm]\n" + "\n".join(f"{value:.3f}" for value in parts) + "\n", encoding="utf-8"
+    )
+    of_pins = table["id"] == "pin.diameter"
+    table.loc[of_pins, "distribution"] = "empirical"
+    table["measured"], table["measured_zone"] = (
+        of_pins.map({True: "pins.csv", False: ""}),
+        of_pins.map({True: "4.0", False: ""}),
+    )
+    process = next(iter(load_process_capabilities("generic")))[0]
+    table["process"] = [process if name == "housing.groove.radius" else "" for name in table["id"]]
+    table.to_csv(tmp_path / "few.csv", index=False)
+    script = script_with(tmp_path)
+    table.to_csv(tmp_path / "few.csv", index=False)
+    result = tolalloc("rank", script, "--quick", "--out", tmp_path / "report")
+    assert result.returncode == 0, result.stderr
+    fitted = pd.read_csv(tmp_path / "report" / "tables" / "measured parts.csv")
+    assert set(fitted["source"]) == {"pin.diameter"}
+    assert fitted["parts [-]"].eq(60).all()
+    assert (fitted["best"] == "yes").sum() == 1
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert process in page
+
+
+def test_correlated_sources_are_ranked_as_a_block_and_share_by_shapley(tmp_path):
+    (tmp_path / "lot.csv").write_text(
+        "sources,correlation,note\ndisc?.pitch,0.9,both discs on one machine\n", encoding="utf-8"
+    )
+    script = script_with(tmp_path, correlations=str(tmp_path / "lot.csv"))
+    result = tolalloc("rank", script, "--quick", "--out", tmp_path / "report", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert "disc1.pitch + disc2.pitch" in [row["source"] for row in answer["ranking"]]
+    shapley = pd.read_csv(tmp_path / "report" / "tables" / "Shapley effects.csv")
+    assert set(shapley["source"]) == {source.name for source in load_tolerance_table(few_sources(tmp_path))}
+    assert shapley["Shapley effect [-]"].sum() == pytest.approx(1.0)
+    assert "correlation" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"correlations": "nowhere.csv"}, ["nowhere.csv"]),
+        ({"processes": "nowhere"}, ["nowhere"]),
+        ({"largest_failed_share": 0.7}, ["largest_failed_share", "0.7", "0 to 0.5"]),
+    ],
+)
+def test_bad_fields_are_refused_in_one_sentence(tmp_path, fields, words):
+    result = tolalloc("rank", script_with(tmp_path, **fields), "--quick", "--out", tmp_path / "report")
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    for word in words:
+        assert word in result.stderr
+    assert not (tmp_path / "report").exists()
+
+
+def test_a_limit_on_an_unknown_output_names_the_known_ones(tmp_path):
+    script = script_with(tmp_path)
+    text = script.read_text(encoding="utf-8").replace(
+        "Study(", "Study(other_limits={'lost motoin [arcmin]': Limits(upper=1.0)}, "
+    )
+    script.write_text("from tolalloc.sensitivity.capability import Limits\n" + text, encoding="utf-8")
+    result = tolalloc("rank", script, "--quick", "--out", tmp_path / "report")
+    assert result.returncode == 2
+    assert "other_limits" in result.stderr and "lost motion [arcmin]" in result.stderr
