@@ -112,6 +112,8 @@ def check(script: Script, as_json: AsJson = False) -> None:
     for source in space.errors.active:
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
         screen.print(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}", soft_wrap=True)
+    for sentence in space.errors.correlation.mappings(space.errors.sources):
+        screen.print(f"  {sentence}", soft_wrap=True, markup=False)
 
 
 @app.command()

@@ -108,7 +108,12 @@ class StudyResults:
             *(self.unit.assumptions if self.unit else ()),
             "zones, distributions, Cp, costs, smallest and largest zones: as the tolerance table states them; its "
             "notes say where each comes from (list below)",
-            "all sources are independent of each other; a cost falls as 1/zone",
+            (
+                "sources correlated as their file states, the others independent"
+                if self.space.errors.is_correlated
+                else "all sources are independent of each other"
+            ),
+            "a cost falls as 1/zone",
             "tooth modification costs nothing and is exact; nominal clearance "
             f"{clearances.flank[0] * 1e6:g}…{clearances.flank[1] * 1e6:g} µm on the flank and "
             f"{clearances.radial[0] * 1e6:g}…{clearances.radial[1] * 1e6:g} µm at tip and root",

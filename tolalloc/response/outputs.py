@@ -74,6 +74,10 @@ REQUIREMENTS = (
 """What a requirement may limit: transmission error, torque against twist, forces at rated torque."""
 
 
+OTHER_OUTPUTS = tuple(name for reading in REQUIREMENTS[1:] for name in reading.outputs)
+"""Names of the outputs besides the peak-to-peak, with their units."""
+
+
 def wave_outputs(order: int) -> tuple[str, str]:
     """Return the names of the outputs that hold the cosine and the sine of an order of the output turn."""
     return (f"order {order} cosine [arcsec]", f"order {order} sine [arcsec]")

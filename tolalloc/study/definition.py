@@ -13,11 +13,12 @@ from tolalloc.allocation.verification import Requirement
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.kernel import KernelResponse
+from tolalloc.response.outputs import OTHER_OUTPUTS
 from tolalloc.response.stiffness import stiffness_source
 from tolalloc.sensitivity.capability import Limits
 from tolalloc.sensitivity.monte_carlo import allowed_rejections
@@ -220,6 +221,9 @@ def prepare(study: Study) -> Prepared:
     identified = load_identified_stiffness(study.stiffness) if study.stiffness else None
     if identified:
         reducer = with_stiffness(reducer, identified)
+    for name in study.other_limits:
+        if name not in OTHER_OUTPUTS:
+            raise UnknownNameError.among(f"study {study.name}", "other_limits", name, OTHER_OUTPUTS)
     sources = load_tolerance_table(study.tolerances, study.processes)
     errors = ErrorModel(sources, correlation=_correlation(study, sources))
     unit = load_unit(study.unit) if study.unit else None
