@@ -11,9 +11,10 @@ from scipy.stats import norm
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
 from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.sensitivity.target import limited_measure, limited_measures, target_sensitivity
+from tolalloc.sensitivity.target import limited_measures, target_sensitivity
 from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.limited_measure import limited_measure
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.zones import Feature

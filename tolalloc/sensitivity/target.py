@@ -11,16 +11,13 @@ from tolalloc.exceptions import InputError
 from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.limited_measure import limited_measure
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
 _CLASSES_PER_ROOT = 2
 """Classes of a measure over √units: fewer would hide how steeply the chance rises, more would scatter [-]."""
-_POINTS_PER_WAVE = 32
-"""Points of the shortest wave of a spectrum; the range between them is at most 0.5 % too small."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,22 +165,6 @@ def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) 
     where = np.array(errors.source_of_column)
     zoned = [limited_measure(source, x[:, where == source.name]) for source in errors.active]
     return np.column_stack([*zoned, np.sqrt(_mean_squares(errors, x)[:, len(zoned) :])])
-
-
-def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
-    """Return the measure of one source that its drawing limits, from the columns of the source [m]."""
-    length = columns * source.lever - source.middle
-    if source.feature is Feature.SIZE:
-        return np.asarray(np.abs(length).max(axis=1) if source.each > 1 else length[:, 0])
-    if source.feature is Feature.POSITION:
-        return np.asarray(2.0 * np.hypot(length[:, 0::2], length[:, 1::2]).max(axis=1))
-    orders = np.array([order for order, _ in source.spectrum])
-    high, low = np.full(length.shape[0], -np.inf), np.full(length.shape[0], np.inf)
-    # Point by point, because all points of many units at once would fill the memory.
-    for turn in np.linspace(0.0, 2 * np.pi, _POINTS_PER_WAVE * int(orders.max()), endpoint=False):
-        wave = length @ np.column_stack([np.cos(orders * turn), np.sin(orders * turn)]).ravel()
-        high, low = np.maximum(high, wave), np.minimum(low, wave)
-    return np.asarray(high - low)
 
 
 def _mean_squares(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
