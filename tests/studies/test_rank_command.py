@@ -88,7 +88,7 @@ def test_the_answer_for_programs_is_whole(ranked):
     assert answer["pairs a second seed shows [-]"] >= 0.9 * answer["pairs promised [-]"]
     assert set(answer["statuses"]) >= {"equilibrium found"}
     (requirement,) = [row for row in answer["requirements"] if row["requirement"] == PEAK_TO_PEAK]
-    assert requirement["Yield low 95 % [%]"] < requirement["Yield [%]"] < requirement["Yield high 95 % [%]"]
+    assert requirement["Yield low 2.5 % [%]"] < requirement["Yield [%]"] < requirement["Yield high 97.5 % [%]"]
 
 
 def test_errors_of_the_housing_make_multiples_of_the_teeth_and_turning_ones_of_the_pins(ranked):

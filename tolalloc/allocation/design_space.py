@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import CycloidStage, Modification
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.sources import Source
@@ -56,10 +55,6 @@ class DesignSpace:
     errors: ErrorModel
     stage: CycloidStage
     clearances: ClearanceRange
-
-    def __post_init__(self) -> None:
-        if not self.groups:
-            raise InputError("tolerance table: every zone is locked or zero, so there is nothing to allocate.")
 
     @cached_property
     def groups(self) -> tuple[str, ...]:

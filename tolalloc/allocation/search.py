@@ -111,8 +111,10 @@ def require_reachable(response: QuantileResponse, requirement: Requirement, plac
     Raises
     ------
     InputError
-        The limit is below what the smallest zones leave.
+        The limit is below what the smallest zones leave, or no zone may change.
     """
+    if not response.space.groups:
+        raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
     lower, upper = response.space.lower, response.space.upper
     corners = [[*lower[:-2], flank, radial] for flank in (lower[-2], upper[-2]) for radial in (lower[-1], upper[-1])]
     least = float(response(np.array(corners)).values.min())

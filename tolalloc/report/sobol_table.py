@@ -20,7 +20,7 @@ def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
     """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
     share = sobol.total / sobol.total.sum() * 100
     first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
-    among, following = sobol.among_first(3), {pair.before: pair for pair in sobol.neighbours}
+    among, following = sobol.among_first(min(3, len(sobol.sources))), {pair.before: pair for pair in sobol.neighbours}
     rows = [
         {
             "rank [-]": place + 1,

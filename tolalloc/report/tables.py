@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.cycloid.assessment import Assessment
@@ -60,7 +61,7 @@ def before_after(results: StudyResults) -> pd.DataFrame:
                 "zone before [µm]": source.zone / MICROMETRE,
                 "zone after [µm]": new.zone / MICROMETRE,
                 "change [%]": (new.zone / source.zone - 1) * 100 if source.zone else 0.0,
-                "contribution before [%]": share[index[source.name]] if source.name in index else 0.0,
+                "contribution before [%]": _contribution(results, share, index, source),
                 "cost before [cost units]": source.cost,
                 "cost after [cost units]": new.cost,
                 "Sens after [arcsec/µm]": (
@@ -70,6 +71,15 @@ def before_after(results: StudyResults) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _contribution(
+    results: StudyResults, share: Float[np.ndarray, " source"], index: dict[str, int], source: Source
+) -> float:
+    """Return the contribution of a source [%], not a number for one that shares a block with correlated others."""
+    if source.name in index:
+        return float(share[index[source.name]])
+    return np.nan if source in results.space.errors.active else 0.0
 
 
 def modification(results: StudyResults) -> pd.DataFrame:
@@ -143,7 +153,7 @@ def stack_up(results: StudyResults) -> pd.DataFrame:
     target = results.requirement.target
     rows = [
         ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
-        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted"),
+        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),
         ("Monte Carlo mean", float(baseline.values.mean()), "real model, all errors together"),
         (f"Monte Carlo {target:.2%} quantile", baseline.quantile(target), "real model, all errors together"),
     ]

@@ -60,8 +60,8 @@ class Growth:
         last = self.history[-1]
         verdict = "is stable" if self.stable else "is not stable at the largest number of blocks allowed"
         return (
-            f"The order of the first {len(last.first)} over all requirements, sources of one group taken alike, "
-            f"{verdict}: {last.probability:.0%} of the resamples of {last.blocks} blocks have it, asked for are "
+            f"The order of the first {len(last.first)} over the outputs with a limit, sources of one group taken "
+            f"alike, {verdict}: {last.probability:.0%} of the resamples of {last.blocks} blocks have it, asked for are "
             f"{self.probability:.0%}."
         )
 

@@ -12,6 +12,7 @@ from tolalloc.report.ranking.results import RankingResults
 from tolalloc.report.ranking.sections import driver_sections, limit_sections, trust_sections
 from tolalloc.response.kernel import PEAK_TO_PEAK
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.uncertainty.sampling import SamplingDesign
 
 _RARE = 1000.0
 """Units of a million from which a share is said in percent [-]."""
@@ -26,9 +27,7 @@ def answer(results: RankingResults) -> tuple[str, ...]:
     return (
         *_drivers(results.sobol.of(PEAK_TO_PEAK)),
         results.sobol.growth.status,
-        f"A second seed shows {results.reproduction.reproduced} of the {results.reproduction.promised} pairs whose "
-        f"order was promised with {results.reproduction.confidence:.0%} confidence "
-        f"({results.reproduction.share:.1%} of them).",
+        *_reproduced(results),
         *_orders(results),
         *_rejects(results),
         *_beyond(results),
@@ -37,9 +36,20 @@ def answer(results: RankingResults) -> tuple[str, ...]:
     )
 
 
+def _reproduced(results: RankingResults) -> tuple[str, ...]:
+    """Return what a second seed made of the promised orders, if any was promised."""
+    found = results.reproduction
+    if not found.promised:
+        return ()
+    return (
+        f"A second seed shows {found.reproduced} of the {found.promised} pairs whose order was promised with "
+        f"{found.confidence:.0%} confidence ({found.share:.1%} of them).",
+    )
+
+
 def _drivers(sobol: SobolIndices) -> tuple[str, ...]:
     """Return who drives the peak-to-peak, and how sure each place is."""
-    interval, among = sobol.total_interval, sobol.among_first(_NAMED)
+    interval, among = sobol.total_interval, sobol.among_first(min(_NAMED, len(sobol.sources)))
     following = {pair.before: pair.probability for pair in sobol.neighbours}
     return tuple(
         f"{place}. {sobol.sources[at]}: total index {sobol.total[at]:.3f} "
@@ -56,10 +66,11 @@ def _orders(results: RankingResults) -> tuple[str, ...]:
         first, total = np.nan_to_num(found.first[at]), np.nan_to_num(found.total[at])
         alone = first.sum() > _MOSTLY
         share = first if alone else total
-        names = " and ".join(
-            f"{found.sources[source]} ({share[source]:.0%})" for source in np.argsort(-share, kind="stable")[:2]
-        )
-        due = "is mostly due to" if alone else "needs several errors at once, most often"
+        leading = np.argsort(-share, kind="stable")[:2]
+        names = " and ".join(f"{found.sources[source]} ({share[source]:.0%})" for source in leading)
+        due = "needs several errors at once, most often"
+        if alone:
+            due = "is mostly due to" if share[leading].sum() > _MOSTLY else "comes from single errors, first of all"
         sentences.append(
             f"Order {found.orders[at]} of the output turn (standard deviation of the wave "
             f"{found.deviation[at]:.2g}″) {due} {names}."
@@ -82,18 +93,19 @@ def _beyond(results: RankingResults) -> tuple[str, ...]:
     """Return the share of units beyond the limit, and how it is known."""
     found = results.beyond
     share = found.parts_per_million
-    scale, unit = (1e4, "%") if share.estimate >= _RARE else (1.0, "units of a million")
-    return (
-        f"Beyond {found.limit:g}″: {share.estimate / scale:.3g} {unit} (95 % interval {share.low / scale:.3g}…"
-        f"{share.high / scale:.3g}), allowed {(1 - results.target) * 1e6 / scale:.3g}. {found.verdict}",
-    )
+    allowed = (1 - results.target) * 1e6
+    if share.estimate >= _RARE:
+        numbers = f"{share.estimate / 1e4:.3g} % (95 % interval {share.low / 1e4:.3g}…{share.high / 1e4:.3g} %)"
+        return (f"Beyond {found.limit:g}″: {numbers}, allowed {allowed / 1e4:.3g} %. {found.verdict}",)
+    numbers = f"{share.estimate:,.3g} units of a million (95 % interval {share.low:,.2g}…{share.high:,.4g})"
+    return (f"Beyond {found.limit:g}″: {numbers}, allowed {allowed:,.0f}. {found.verdict}",)
 
 
 def _opening(results: RankingResults) -> str:
     """Return which zone has the least and the most room."""
     found = results.inverse
     finite = np.flatnonzero(np.isfinite(found.factor))
-    kept = f"{results.target:.2%} of the units keep {found.quantile:.1f}″ now"
+    kept = f"{results.target:.2%} of the random units keep {results.sample.quantile(results.target):.1f}″"
     if not finite.size:
         verdict = "no zone alone matters up to 10 times it" if found.meets else "no zone alone can meet the limit"
         return f"{kept}: {verdict}."
@@ -114,12 +126,20 @@ def warnings(results: RankingResults) -> tuple[str, ...]:
     if results.errors.is_correlated:
         found.append(
             "Some sources are correlated: Sobol indices stand for whole blocks of them, Shapley effects share the "
-            "variance among their members."
+            "variance among their members; lift, PAWN, delta and root-sum-square do not know of the correlation, so a "
+            "source that only goes along with another shows there too."
         )
     if results.reproduction.promised and results.reproduction.share < results.reproduction.confidence:
         found.append("A second seed did not show as many of the promised orders as it should: add blocks.")
+    if results.spread is not SamplingDesign.MONTE_CARLO:
+        found.append(
+            f"The random units are spread as {results.spread.value}: intervals of yields and quantiles do not hold."
+        )
     if not results.reject.is_limit:
-        found.append("Too few units lie outside the limit to say what they share; the worst 5 % stand in for them.")
+        side = "keep" if results.beyond.estimate.probability > 0.5 else "lie outside"
+        found.append(
+            f"Too few units {side} the limit to say what those outside share; the worst 5 % stand in for them."
+        )
     found += [f"Share beyond the limit: {caution}." for caution in results.beyond.estimate.cautions]
     found += [f"{output} is the same for all units; nothing drives it." for output in results.sobol.constant]
     if results.sobol.dropped:
@@ -135,8 +155,15 @@ def assumptions(results: RankingResults) -> tuple[str, ...]:
     return (
         *results.reducer.assumptions,
         "zones, distributions and Cp: as the tolerance table states them; its notes say where each comes from",
-        "correlated as listed below" if results.errors.is_correlated else "all sources are independent of each other",
-        "contact errors and the tooth modification are those of the reducer; no drift, wear or temperature",
+        "correlated as the section on correlated sources lists"
+        if results.errors.is_correlated
+        else "all sources are independent of each other",
+        "the tooth modification is that of the reducer and exact; no drift, wear or temperature",
+        *(
+            ("identified stiffnesses: their values are exact here; tolalloc run ranks what is not known of them",)
+            if results.identified
+            else ()
+        ),
         *(
             (f"not in the tolerance table and taken as exact: {', '.join(results.neglected)}",)
             if results.neglected
@@ -163,7 +190,7 @@ def summary(results: RankingResults) -> dict[str, Any]:
                 "total index [-]": sobol.total[at],
                 "interval 90 % [-]": sobol.total_interval[:, at].tolist(),
                 "first index [-]": sobol.first[at],
-                "P(among first 3) [-]": sobol.among_first(3)[at],
+                "P(among first 3) [-]": sobol.among_first(min(3, len(sobol.sources)))[at],
             }
             for at in sobol.order
         ],

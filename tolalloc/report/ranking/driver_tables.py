@@ -13,22 +13,22 @@ from tolalloc.units import MICROMETRE
 
 
 def ranking_table(results: RankingResults) -> pd.DataFrame:
-    """Return the ranking for the peak-to-peak, with the zone and the signed local derivative beside it."""
+    """Return the ranking for the peak-to-peak, with the zone and the root mean square derivative beside it."""
     frame = sobol_table(results.sobol.of(PEAK_TO_PEAK))
     zones = dict(
         zip((source.name for source in results.errors.active), results.errors.zones / MICROMETRE, strict=False)
     )
-    sens = dict(zip(results.local.sources, results.local.at_nominal, strict=True))
+    sens = dict(zip(results.local.sources, results.local.root_mean_square, strict=True))
     return frame.assign(
         **{
             "zone [µm]": [zones.get(name, np.nan) for name in frame["source"]],
-            "Sens at nominal [arcsec/µm]": [sens.get(name, np.nan) for name in frame["source"]],
+            "Sens, root mean square [arcsec/µm]": [sens.get(name, np.nan) for name in frame["source"]],
         }
     )
 
 
 def overall_table(results: RankingResults) -> pd.DataFrame:
-    """Return one ranking over all requirements: the largest total index of each source and where it has it."""
+    """Return one ranking over all outputs with a limit: the largest total index of each source and where it has it."""
     overall, sobol = results.sobol.overall, results.sobol
     interval, rank = overall.total_interval, overall.rank_interval
     rows = []
@@ -36,7 +36,7 @@ def overall_table(results: RankingResults) -> pd.DataFrame:
         row: dict[str, object] = {
             "rank [-]": place + 1,
             "source": overall.sources[at],
-            "largest ST [-]": overall.total[at],
+            "largest ST where limited [-]": overall.total[at],
             "low 5 % [-]": interval[0, at],
             "high 95 % [-]": interval[1, at],
             "rank low 5 % [-]": rank[0, at],

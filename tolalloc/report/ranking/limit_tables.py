@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 
 from tolalloc.report.ranking.results import RankingResults
-from tolalloc.sensitivity.capability import capability, quantile_interval, wilson_interval
+from tolalloc.sensitivity.capability import Limits, capability, quantile_interval
+from tolalloc.sensitivity.monte_carlo import proportion
 from tolalloc.units import MICROMETRE
 
 
@@ -29,28 +31,37 @@ def capability_table(results: RankingResults) -> pd.DataFrame:
         }
         kept = quantile_interval(values, results.target)
         row |= {
-            f"{results.target:.2%} quantile, low 95 %": kept.low,
-            f"{results.target:.2%} quantile, high 95 %": kept.high if np.isfinite(kept.high) else "sample too small",
+            f"{results.target:.2%} quantile, low 2.5 %": kept.low,
+            f"{results.target:.2%} quantile, high 97.5 %": kept.high if np.isfinite(kept.high) else "sample too small",
         }
         if limits:
-            found = capability(values, limits)
-            units = results.sample.evaluation.status.size
-            inside = wilson_interval(units, values.size - found.outside)
-            row |= {
-                "LSL": np.nan if limits.lower is None else limits.lower,
-                "USL": np.nan if limits.upper is None else limits.upper,
-                "Pp [-]": np.nan if found.pp is None else found.pp,
-                "Ppk [-]": found.ppk,
-                "Yield [%]": inside.estimate * 100,
-                "Yield low 95 % [%]": inside.low * 100,
-                "Yield high 95 % [%]": inside.high * 100,
-                "% out [%]": (1 - inside.estimate) * 100,
-                "PPM [1e-6]": (1 - inside.estimate) * 1e6,
-                "PPM if normal [1e-6]": found.normal_ppm,
-                "OK": "yes" if inside.low >= results.target else "no",
-            }
+            row |= _kept(results, values, limits)
         rows.append(row)
     return pd.DataFrame(rows).dropna(axis="columns", how="all")
+
+
+def _kept(results: RankingResults, values: Float[np.ndarray, " unit"], limits: Limits) -> dict[str, object]:
+    """Return limits, capability and yield of one output; units without an answer count as outside."""
+    units = results.sample.evaluation.status.size
+    inside = proportion(units, units - values.size + limits.outside(values))
+    row: dict[str, object] = {
+        "LSL": np.nan if limits.lower is None else limits.lower,
+        "USL": np.nan if limits.upper is None else limits.upper,
+        "Yield [%]": inside.estimate * 100,
+        "Yield low 2.5 % [%]": inside.low * 100,
+        "Yield high 97.5 % [%]": inside.high * 100,
+        "% out [%]": (1 - inside.estimate) * 100,
+        "PPM [1e-6]": (1 - inside.estimate) * 1e6,
+        "OK": "yes" if inside.bound >= results.target else "no",
+    }
+    if np.ptp(values) > 0:
+        found = capability(values, limits)
+        row |= {
+            "Pp [-]": np.nan if found.pp is None else found.pp,
+            "Ppk [-]": found.ppk,
+            "PPM if normal [1e-6]": found.normal_ppm,
+        }
+    return row
 
 
 def beyond_table(results: RankingResults) -> pd.DataFrame:
@@ -77,7 +88,7 @@ def stack_up_table(results: RankingResults) -> pd.DataFrame:
     sample = results.sample
     rows = [
         ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
-        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted"),
+        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),
         ("Monte Carlo mean", float(sample.values.mean()), "real model, all errors together"),
         (
             f"Monte Carlo {results.target:.2%} quantile",

@@ -20,6 +20,7 @@ from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.yield_at_limit import YieldAtLimit
 from tolalloc.surrogate.choice import Choice
 from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.sampling import SamplingDesign
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,8 @@ class RankingResults:
         Its seed [-].
     reducer, torque
         The reducer, and the torque on its carrier [N·m].
+    identified
+        Whether identified stiffnesses replaced the reducer's own.
     errors
         Sources, their distributions and correlations.
     limits
@@ -44,8 +47,8 @@ class RankingResults:
         Share of units that must keep a limit [-].
     outputs
         Names of the outputs that requirements may limit, in the order of the sample's columns.
-    sample
-        Random units with all these outputs.
+    sample, spread
+        Random units with all these outputs, and how they are spread.
     sobol
         Indices of these outputs and of the waves of chosen orders.
     reproduction
@@ -82,11 +85,13 @@ class RankingResults:
     seed: int
     reducer: Reducer
     torque: float
+    identified: bool
     errors: ErrorModel
     limits: Mapping[str, Limits]
     target: float
     outputs: tuple[str, ...]
     sample: MonteCarlo
+    spread: SamplingDesign
     sobol: SobolAnalysis
     reproduction: Reproduction
     orders: OrderContribution

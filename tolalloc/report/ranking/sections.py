@@ -15,8 +15,9 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
         Section(
             heading="Which error drives the peak-to-peak",
             paragraphs=(
-                "The total index is the share of the variance that goes when the error is exact; the first-order index "
-                "is what it gives without the others. Intervals and places come from resampled blocks.",
+                "The total index is the share of the variance in which the error has a part, alone or together with "
+                "others; the first-order index is its part alone. Contribution is its share of the sum of all total "
+                "indices. Intervals of 90 % and places come from resampled blocks.",
             ),
             figures=(figures.ranking_figure(results),),
             tables=(("ranking", driver_tables.ranking_table(results)), ("growth", driver_tables.growth_table(results))),
@@ -24,6 +25,10 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
         *_correlated(results),
         Section(
             heading="One ranking over all requirements",
+            paragraphs=(
+                "Sources by their largest total index over the outputs that have a limit "
+                f"({', '.join(name.split(' [')[0] for name in results.sobol.ranked)}); the others stand beside them.",
+            ),
             figures=(figures.requirements_figure(results),),
             tables=(("all requirements", driver_tables.overall_table(results)),),
         ),
