@@ -16,6 +16,8 @@ from tolalloc.uncertainty.sampling import SamplingDesign
 
 _RARE = 1000.0
 """Units of a million from which a share is said in percent [-]."""
+_SLIGHT = 0.05
+"""Share of a wave's variance below which a second source is not named for it [-]."""
 _MOSTLY = 0.5
 """Share of a wave's variance from single sources above which they are named for it [-]."""
 _NAMED = 3
@@ -53,8 +55,8 @@ def _drivers(sobol: SobolIndices) -> tuple[str, ...]:
     following = {pair.before: pair.probability for pair in sobol.neighbours}
     return tuple(
         f"{place}. {sobol.sources[at]}: total index {sobol.total[at]:.3f} "
-        f"({interval[0, at]:.3f}…{interval[1, at]:.3f}), among the first {_NAMED} with {among[at]:.0%} probability, "
-        f"before the next one with {following.get(at, 1.0):.0%}."
+        f"({interval[0, at]:.3f}…{interval[1, at]:.3f}), among the first {_NAMED} with {among[at]:.0%} probability"
+        f"{f', before the next one with {following[at]:.0%}' if at in following else ''}."
         for place, at in enumerate(sobol.order[:_NAMED], start=1)
     )
 
@@ -66,7 +68,8 @@ def _orders(results: RankingResults) -> tuple[str, ...]:
         first, total = np.nan_to_num(found.first[at]), np.nan_to_num(found.total[at])
         alone = first.sum() > _MOSTLY
         share = first if alone else total
-        leading = np.argsort(-share, kind="stable")[:2]
+        largest = np.argsort(-share, kind="stable")[:2]
+        leading = largest[share[largest] >= min(_SLIGHT, share.max())]
         names = " and ".join(f"{found.sources[source]} ({share[source]:.0%})" for source in leading)
         due = "needs several errors at once, most often"
         if alone:
