@@ -1,4 +1,4 @@
-"""The command line: ``run``, ``rank``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``compare``."""
+"""The command line: ``run``, ``rank``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``diagnose``."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from tolalloc.cli.console import (
     screen,
 )
 from tolalloc.cli.contact import asked_reducer, contact_answer
+from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
 from tolalloc.cli.rank import rank
 from tolalloc.cli.study_script import load_study
@@ -232,6 +233,7 @@ def modify(
 
 app.command()(rank)
 app.command()(identify)
+app.command()(diagnose)
 
 
 @app.command()

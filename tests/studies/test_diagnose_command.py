@@ -1,0 +1,131 @@
+"""``tolalloc diagnose`` as a user meets it: a simulated bad unit, one that nothing explains, and bad input."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tolalloc.study.definition import Study, prepare
+from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.units import ARCSECOND
+
+ROOT = Path(__file__).parents[2]
+
+
+def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A tolerance table of few sources, and the curve of a unit whose housing pitch is bad."""
+
+    tolerances: Path
+    curve: Path
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory) -> Bench:
+    path = tmp_path_factory.mktemp("bench")
+    table = pd.read_csv(
+        ROOT / "tolalloc/uncertainty/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False
+    )
+    varied = ("housing.pitch", "disc1.pitch", "disc2.pitch", "pin.diameter")
+    still = ~table["id"].isin(varied)
+    for column in ("plus [unit]", "minus [unit]"):
+        table.loc[still, column] = "0"
+    table.loc[still, "locked"] = "yes"
+    table.to_csv(path / "few.csv", index=False)
+    prepared = prepare(Study(name="bench", tolerances=path / "few.csv"))
+    errors, kernel = prepared.space.errors, prepared.kernel
+    x = 0.2 * errors.deviations(
+        errors.standard_values(next(SeedTree(3).uniform_chunks(1, len(errors.columns)))), errors.zones
+    )
+    x[0, errors.columns.index("housing.pitch.cos2")] = 5e-6
+    angle = 2 * np.pi * np.arange(720) / 720
+    curve = kernel.model.equilibria(kernel.errors(x), kernel.torque, angle).transmission_error[0] / ARCSECOND
+    read = curve + 0.5 * SeedTree(4).generator().standard_normal(angle.size)
+    frame = pd.DataFrame({"angle [deg]": np.degrees(angle), "transmission error [arcsec]": read})
+    frame.to_csv(path / "unit7.csv", index=False)
+    return Bench(path / "few.csv", path / "unit7.csv")
+
+
+def test_a_bad_housing_is_named(bench, tmp_path):
+    result = tolalloc("diagnose", bench.curve, "--tolerances", bench.tolerances, "--out", tmp_path / "report", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert answer["explained"] is True
+    assert answer["named"] == ["housing.pitch"]
+    first = answer["sources"][0]
+    assert first["source"] == "housing.pitch"
+    assert first["low 2.5 % [µm]"] < first["reading [µm]"] < first["high 97.5 % [µm]"]
+    assert 8 < first["reading [µm]"] < 14  # a wave of amplitude 5 µm and little else, over a turn
+    assert answer["curves failed [-]"] == 0
+    names = {path.name for path in (tmp_path / "report").iterdir()}
+    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}
+    assert {path.stem for path in (tmp_path / "report" / "figures").iterdir()} == {
+        "dominant",
+        "readings",
+        "curve",
+        "left",
+    }
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "a reading errs by 0.5″" in page and "unit7" in page
+
+
+def test_a_curve_that_no_such_errors_make_is_not_diagnosed(bench, tmp_path):
+    frame = pd.read_csv(bench.curve)
+    frame["transmission error [arcsec]"] = 30 * np.sin(np.radians(7 * frame["angle [deg]"]))
+    frame.to_csv(tmp_path / "strange.csv", index=False)
+    result = tolalloc("diagnose", tmp_path / "strange.csv", "--tolerances", bench.tolerances)
+    assert result.returncode == 0, result.stderr
+    said = " ".join(result.stdout.split())
+    assert "No errors inside these drawings explain it" in said
+    assert "drives it is with" not in said
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--noise", "0"], ["--noise", "0", "above 0"]),
+        (["--level", "1"], ["--level", "0.5 up to but not 1"]),
+        (["--discrepancy", "-1"], ["--discrepancy", "0 to 60"]),
+        (["--torque", "9999"], ["torque", "9999"]),
+        (["--tolerances", "nope"], ["nope", "rv20e_baseline"]),
+        (["--correlations", "nope.csv"], ["nope.csv"]),
+        (["--seed", "-1"], ["seed", "-1"]),
+    ],
+)
+def test_bad_options_are_refused_in_one_sentence(bench, tmp_path, options, words):
+    result = tolalloc("diagnose", bench.curve, "--out", tmp_path / "report", *options)
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    for word in words:
+        assert word in result.stderr
+    assert not (tmp_path / "report").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("angle [deg],te [arcsec]\n0,1\n", ["transmission error", "missing"]),
+        ("angle [deg],transmission error [µm]\n0,1\n", ["unit", "µm"]),
+        ("angle [deg],transmission error [arcsec]\n0,1\n10,2\n20,3\n", ["0.1 or more"]),
+        ("angle [deg],transmission error [arcsec]\n0,one\n", ["row 2", "one"]),
+    ],
+)
+def test_bad_curves_are_refused_in_one_sentence(tmp_path, content, words):
+    (tmp_path / "curve.csv").write_text(content, encoding="utf-8")
+    result = tolalloc("diagnose", tmp_path / "curve.csv")
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr and "curve.csv" in result.stderr
+    for word in words:
+        assert word in result.stderr

@@ -1,0 +1,1 @@
+"""Diagnosis: from the transmission error of one unit back to the errors of its parts."""
