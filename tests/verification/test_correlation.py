@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import ndtr
 from scipy.stats import kstest
 
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -16,6 +17,7 @@ from tolalloc.uncertainty.correlation import Correlation, Pair
 from tolalloc.uncertainty.correlation_file import load_correlations
 from tolalloc.uncertainty.distributions import Distribution
 from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.mixtures import Batch
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.zones import Feature
 
@@ -28,7 +30,18 @@ def source(name: str, **changes) -> Source:
 
 
 SIZES = tuple(source(name) for name in ("a", "b", "c", "d"))
+PITCHES = tuple(source(f"disc{disc}.pitch", feature=Feature.PITCH, spectrum=((1, 2.0), (5, 1.0))) for disc in (1, 2))
 BORES = tuple(source(f"disc{disc}.bore{bore}", feature=Feature.POSITION) for disc in (1, 2) for bore in (1, 2, 3))
+
+VECTORS = [
+    {"distribution": Distribution.UNIFORM},
+    {"distribution": Distribution.TRIANGULAR},
+    {"distribution": Distribution.LOGNORMAL, "shape": 0.5},
+    {"distribution": Distribution.WEIBULL, "shape": 1.5},
+    {"distribution": Distribution.MIXTURE, "batches": (Batch(weight=1.0, shift=0.0, spread=0.6),)},
+    {"sorted": True, "cp": 0.5},
+    {},
+]
 
 
 def model(*pairs: tuple[str, str, float], sources: tuple[Source, ...] = SIZES, **others) -> ErrorModel:
@@ -71,6 +84,29 @@ def test_a_uniform_source_stays_uniform_and_an_independent_one_keeps_every_bit(g
         assert kstest(column, "uniform").pvalue > 1e-4
 
 
+@pytest.mark.parametrize("correlation", [0.8, -0.8])
+@pytest.mark.parametrize("features", [BORES[:2], PITCHES])
+def test_vectors_that_are_not_normal_are_correlated_on_every_axis(features, correlation, generator):
+    sources = tuple(replace(own, distribution=Distribution.WEIBULL, shape=1.5) for own in features)
+    errors = model((sources[0].name, sources[1].name, correlation), sources=sources)
+    found = np.corrcoef(errors.standard_values(generator.random((SAMPLES, len(errors.columns)))).T)
+    half = len(sources[0].columns)
+    # Longer tails than normal ones: five standard errors of a normal sample's correlation; 0.795 is the copula's.
+    np.testing.assert_allclose(found[:half, half:], np.sign(correlation) * 0.795 * np.eye(half), atol=5 / SAMPLES**0.5)
+    np.testing.assert_allclose(found[:half, :half], np.eye(half), atol=5 / SAMPLES**0.5)
+
+
+@pytest.mark.parametrize("changes", VECTORS)
+def test_vectors_of_every_kind_turn_with_their_normal_numbers(changes, generator):
+    own = replace(BORES[0], **changes)
+    normal, angle = generator.standard_normal((1000, 2)), 0.7
+    turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    values = own.standard_values(ndtr(normal))
+    np.testing.assert_allclose(own.standard_values(ndtr(normal @ turned)), values @ turned, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(own.standard_values(ndtr(-normal)), -values, rtol=1e-6, atol=1e-9)
+    assert not own.standard_values(np.full((1, 2), 0.5)).any()
+
+
 @pytest.mark.parametrize("correlation", [1.0, -1.0])
 def test_full_correlation_makes_one_source_follow_the_other(correlation, generator):
     errors = model(("a", "b", correlation), ("b", "c", correlation), ("a", "c", 1.0))
@@ -111,6 +147,21 @@ def test_a_matrix_gives_the_same_as_its_list(tmp_path, suffix):
     assert by_matrix.mappings(SIZES) == ("a, b, c: correlation -0.25 (a with b), 0.5 (a with c)",)
 
 
+@pytest.mark.parametrize(
+    ("other", "columns"),
+    [
+        (source("b", feature=Feature.POSITION), r"a\.cos1 with b\.x"),
+        (source("b", feature=Feature.RUNOUT, spectrum=((5, 1.0),)), r"a\.cos1 with b\.cos5"),
+        (source("b", feature=Feature.RUNOUT, spectrum=((1, 1.0), (2, 1.0))), r"nothing with b\.cos2"),
+        (source("b", each=2), r"a\.cos1 with b\.1"),
+    ],
+)
+def test_sources_with_unlike_columns_are_refused(other, columns):
+    own = source("a", feature=Feature.RUNOUT, spectrum=((1, 1.0),))
+    with pytest.raises(InputError, match=f"correlations, a with b: columns is '{columns}'; allowed is like columns"):
+        model(("a", "b", 0.5), sources=(own, other))
+
+
 LIST = ["sources", "correlation"]
 BAD = [
     ([LIST, ["a b", 0.5], ["a aa", 0.1]], r"row 3: source 'aa' is not known"),
@@ -121,7 +172,7 @@ BAD = [
     ([LIST, ["a", 0.5]], r"row 2: sources is 'a'; allowed is two or more"),
     ([LIST, ["", 0.5]], r"row 2: sources is ''"),
     ([LIST, ["a b", 0.5], ["*", 0.4]], r"row 3, a with b: correlation is 0\.4; allowed is .*row 2 says 0\.5"),
-    ([LIST, ["a disc1.bore1", 0.5]], r"row 2, a with disc1\.bore1: columns is '1 and 2'"),
+    ([LIST, ["a disc1.bore1", 0.5]], r"row 2, a with disc1\.bore1: columns is 'a with disc1\.bore1\.x'"),
     ([LIST, ["a b c", -0.9]], r"least eigenvalue of the correlation matrix is -0\.8; .* -0\.9 of [abc] with [abc]"),
     ([LIST], r"no rows below its header"),
     ([["sources", "corelation"], ["a b", 0.5]], r"row 1: column 'corelation' is not known; .* correlation"),

@@ -13,9 +13,10 @@ import pytest
 from scipy import stats
 
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.uncertainty.distributions import Distribution
+from tolalloc.study.definition import Study, prepare
+from tolalloc.uncertainty.distributions import Distribution, moments
 from tolalloc.uncertainty.measured_parts import MeasuredParts
-from tolalloc.uncertainty.mixtures import Batch
+from tolalloc.uncertainty.mixtures import Batch, smoothed_magnitude
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_cells import parsed_spectrum
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
@@ -172,6 +173,12 @@ def test_samples_do_not_depend_on_what_they_are_computed_with(kind, feature, gen
     np.testing.assert_array_equal(np.concatenate(parts), own.standard_values(uniform))
 
 
+def test_a_weibull_position_of_shape_2_is_the_normal_one(generator):
+    uniform = generator.random((1000, 2))
+    weibull = source("weibull", Feature.POSITION, shape=2.0).standard_values(uniform)
+    np.testing.assert_allclose(weibull, source("normal", Feature.POSITION).standard_values(uniform), rtol=1e-9)
+
+
 def test_narrow_batches_far_apart_keep_their_shares():
     batches = (Batch(weight=0.25, shift=-1.5, spread=0.01), Batch(weight=0.75, shift=1.0, spread=2.0))
     own = replace(source("mixture", Feature.SIZE), batches=batches).zone_mapping.marginal
@@ -189,6 +196,25 @@ def test_smoothed_parts_keep_the_mean_square_and_follow_the_parts(feature, gener
     assert (values**2).mean() == pytest.approx((PARTS**2).mean(), abs=4 * square_error)
     assert stats.kstest(PARTS, np.sort(values)).statistic < 0.06
     assert values.max() > PARTS.max()
+
+
+@pytest.mark.parametrize(
+    ("radii", "tolerance"),
+    # What is mirrored at 0 moves mean and deviation a little where parts lie near it, as in the second sample.
+    [(PARTS, 1e-5), (stats.weibull_min(1.2).ppf((np.arange(60) + 0.5) / 60), 0.03)],
+)
+def test_smoothed_radii_keep_mean_and_deviation_and_stay_positive(radii, tolerance):
+    smooth = smoothed_magnitude(radii)
+    mean, deviation = moments(smooth)
+    assert mean == pytest.approx(radii.mean(), rel=tolerance)
+    assert deviation == pytest.approx(radii.std(), rel=tolerance)
+    assert mean**2 + deviation**2 == pytest.approx((radii**2).mean(), rel=1e-5)
+    assert smooth.quantile(np.array([1e-12, 0.5])).min() >= 0.0
+
+
+@pytest.mark.parametrize("more", [{"distribution": Distribution.UNIFORM}, {"sorted": True, "cp": 0.7}])
+def test_a_symmetric_size_has_its_mean_in_the_middle(more):
+    assert ", mean 0 µm off the middle, " in replace(source("normal", Feature.SIZE), **more).mapping
 
 
 def test_the_fit_finds_the_distribution_that_the_parts_came_from(generator):
@@ -320,6 +346,33 @@ def test_every_column_survives_writing_and_reading_at_other_zones_and_from_anoth
         assert other.mapping == own.mapping
     assert "3.2 µm, full width" in again[2].mapping
     assert "assumed to scale with the zone from the 4 µm" in again[2].mapping
+
+
+def test_a_written_table_names_measured_parts_from_its_own_folder(tmp_path):
+    (tmp_path / "shop").mkdir()
+    write_parts(tmp_path / "shop")
+    table = write_table(tmp_path / "shop", {"distribution": "empirical", "measured": "parts.csv"})
+    sources, runs = load_tolerance_table(table), tmp_path / "runs" / "one"
+    frame = table_frame(sources, runs)
+    assert frame["measured"].tolist() == ["../../shop/parts.csv"]
+    runs.mkdir(parents=True)
+    frame.to_csv(runs / "t.csv", index=False)
+    assert load_tolerance_table(runs / "t.csv")[0].measured == sources[0].measured
+
+
+def test_the_same_files_in_another_folder_are_the_same_study(tmp_path, monkeypatch):
+    found = {}
+    for folder in ("one", "two", "other"):
+        (tmp_path / folder).mkdir()
+        monkeypatch.chdir(tmp_path / folder)
+        frame = table_frame(load_tolerance_table("rv20e_baseline"))
+        chosen = frame["id"] == "pin.diameter"
+        frame.loc[chosen, ["distribution", "measured"]] = ["empirical", "parts.csv"]
+        frame.to_csv("t.csv", index=False)
+        write_parts(Path.cwd(), rows=[f"{(2 if folder == 'other' else 1) * value:.4f}" for value in 1e6 * PARTS])
+        Path("correlations.csv").write_text("sources,correlation\ndisc1.bore1.position disc1.bore2.position,0.5\n")
+        found[folder] = prepare(Study(name="same", tolerances="t.csv", correlations="correlations.csv")).hash
+    assert found["one"] == found["two"] != found["other"]
 
 
 def test_measured_positions_are_read_as_axes_or_as_radii(tmp_path):

@@ -121,6 +121,27 @@ def test_same_bits_for_any_chunks():
     np.testing.assert_array_equal(found(14.0, response=Sum(at_once=37)).factor, found(14.0).factor)
 
 
+def test_same_bits_however_many_trials_go_into_one_call(monkeypatch):
+    together = found(14.0)
+    monkeypatch.setattr("tolalloc.sensitivity.inverse._ROWS_AT_ONCE", 3 * 2048)
+    apart = found(14.0)
+    for name in ("factor", "low", "high"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(apart, name))
+    assert apart.calls > together.calls
+
+
+def test_no_call_takes_more_rows_than_are_held_at_once():
+    @dataclass(frozen=True)
+    class Watched(Sum):
+        def __call__(self, x: np.ndarray) -> Evaluation:
+            rows.append(x.shape[0])
+            return super().__call__(x)
+
+    rows: list[int] = []
+    found(14.0, response=Watched(), units=50_001)
+    assert max(rows) == 2 * 50_001 <= 2**17
+
+
 def test_few_failed_samples_are_counted_and_many_stop():
     assert found(13.5, response=Sum(breaks=6.5)).failed > 0
     with pytest.raises(SolveError, match="a at"):

@@ -22,7 +22,7 @@ from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
 from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
 from tolalloc.sensitivity.rare_failure.widened import widened_sampling
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.yield_at_limit import yield_at_limit
+from tolalloc.sensitivity.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import Source
@@ -156,9 +156,16 @@ def test_searches_for_design_points_count_it():
     assert samples.failed == 1
 
 
+def planted_yield(at: tuple[int, ...], kind: str, units: int, **allowed: float) -> YieldAtLimit:
+    """Return the yield from random units of which some fail, which no later sample does."""
+    state = limit_state(at, kind)
+    sample = monte_carlo(state.response, ERRORS, ERRORS.zones, SEEDS, units, largest_failed_share=0.1)
+    return yield_at_limit(state, sample, SEEDS, samples=200, runs=2, **allowed)
+
+
 @pytest.mark.parametrize("at", [0, 1999])
 def test_yield_at_a_limit_counts_it_as_rejected(at):
-    found = [yield_at_limit(limit_state((at,), kind), SEEDS, units=2000, samples=200, runs=2) for kind in KINDS]
+    found = [planted_yield((at,), kind, 2000) for kind in KINDS]
     assert found[0] == found[1]
     assert found[0].failed == 1
     plain = found[0].estimates[0]
@@ -173,15 +180,12 @@ def test_rare_failures_stop_above_one_per_cent_unless_told_otherwise(kind):
     for estimate in (
         lambda state, **allowed: subset_simulation(state, SEEDS, samples=500, **allowed),
         lambda state, **allowed: widened_sampling(state, failing, SEEDS, samples=500, **allowed),
-        lambda state, **allowed: yield_at_limit(state, SEEDS, units=500, samples=200, runs=2, **allowed),
     ):
         with pytest.raises(SolveError, match="no usable answer"):
             estimate(limit_state(tuple(range(6)), kind))
-        assert any(
-            "no usable answer" in text
-            for text in _cautions(estimate(limit_state(tuple(range(6)), kind), largest_failed_share=0.02))
-        )
-
-
-def _cautions(found) -> tuple[str, ...]:
-    return found.estimate.cautions if hasattr(found, "estimate") else found.cautions
+        cautions = estimate(limit_state(tuple(range(6)), kind), largest_failed_share=0.02).cautions
+        assert any("no usable answer" in text for text in cautions)
+    with pytest.raises(SolveError, match="no usable answer"):
+        planted_yield(tuple(range(6)), kind, 500)
+    found = planted_yield(tuple(range(6)), kind, 500, largest_failed_share=0.02)
+    assert any("no usable answer" in text for text in found.estimate.cautions)

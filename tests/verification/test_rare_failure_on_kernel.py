@@ -12,11 +12,11 @@ from scipy.stats import chi2, norm
 from tolalloc.exceptions import InputError
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import WithDerivatives
-from tolalloc.sensitivity.monte_carlo import monte_carlo
+from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo, proportion
 from tolalloc.sensitivity.rare_failure.form import design_point
 from tolalloc.sensitivity.rare_failure.limit_state import LimitState, LimitStateWithGradient
 from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit, ResponseLimitWithGradient
-from tolalloc.sensitivity.rare_failure.result import RareFailure
+from tolalloc.sensitivity.rare_failure.result import Level, RareFailure
 from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
 from tolalloc.sensitivity.rare_failure.widened import widened_sampling
 from tolalloc.sensitivity.yield_at_limit import log_normal_interval, yield_at_limit
@@ -91,6 +91,10 @@ def limited(kind: type[Sum], errors: ErrorModel, limit: float) -> ResponseLimit:
     return ResponseLimit(response=kind(errors.columns), errors=errors, zones=errors.zones, limit=limit)
 
 
+def units_of(limit: ResponseLimit, seed: int, units: int) -> MonteCarlo:
+    return monte_carlo(limit.response, limit.errors, limit.zones, SeedTree(seed, ("units",)), units)
+
+
 MIXED = ErrorModel(
     (
         source("one"),
@@ -128,10 +132,13 @@ def test_gradient_agrees_with_differences_where_columns_mix(generator):
 
 
 def test_share_that_is_not_rare_is_left_to_random_units():
-    errors = normals(4)
-    found = yield_at_limit(limited(Sum, errors, 2.0), SeedTree(0), units=20_000)
+    limit = limited(Sum, normals(4), 2.0)
+    sample = units_of(limit, 0, 20_000)
+    found = yield_at_limit(limit, sample, SeedTree(0))
     low, high = found.interval.low, found.interval.high
     assert low < norm.cdf(2.0) < high
+    within = sample.within(2.0)
+    assert (found.interval.estimate, low, high) == (within.estimate, within.low, within.high)
     assert [item.method for item in found.estimates] == ["Monte Carlo"]
     assert "is not rare" in found.verdict
     assert found.calls == 20_000
@@ -147,7 +154,8 @@ def test_share_that_is_not_rare_is_left_to_random_units():
 )
 def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
     """Φ(−4.75) and exp(−5.25²/2) are about 1e-6; each estimate within 3.5 of its standard errors, 8 in all."""
-    found = yield_at_limit(limited(kind, normals(6), limit), SeedTree(seed), units=5000, samples=2000, runs=4)
+    state = limited(kind, normals(6), limit)
+    found = yield_at_limit(state, units_of(state, seed, 5000), SeedTree(seed), samples=2000, runs=4)
     for item in found.estimates[1:]:
         assert abs(item.probability - exact) <= 3.5 * item.standard_error
         assert item.coefficient_of_variation < 0.25
@@ -169,11 +177,12 @@ def test_widened_sampling_states_its_own_spread():
 
 
 def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
-    errors = ErrorModel((source("s", distribution=Distribution.UNIFORM),))
-    found = yield_at_limit(limited(Sum, errors, 3.5), SeedTree(0), units=5000, samples=200, runs=2)
+    limit = limited(Sum, ErrorModel((source("s", distribution=Distribution.UNIFORM),)), 3.5)
+    found = yield_at_limit(limit, units_of(limit, 0, 5000), SeedTree(0), samples=200, runs=2)
     assert "fewer than two runs" in found.verdict
     assert found.estimate.method == "Monte Carlo"
     assert found.interval.high == 1.0
+    assert found.interval.low == proportion(5000, 0).low
     assert 0 < found.parts_per_million.high < 1000
 
 
@@ -183,17 +192,23 @@ def test_methods_that_contradict_each_other_are_not_relied_on(monkeypatch):
         return replace(found, probability=found.probability / 100, standard_error=found.standard_error / 100)
 
     monkeypatch.setattr("tolalloc.sensitivity.yield_at_limit.widened_sampling", too_small)
-    found = yield_at_limit(limited(Radius, normals(2), 4.5), SeedTree(0), units=2000, samples=1000, runs=4)
+    limit = limited(Radius, normals(2), 4.5)
+    found = yield_at_limit(limit, units_of(limit, 0, 2000), SeedTree(0), samples=1000, runs=4)
     assert found.verdict.startswith("Do not rely on subset simulation")
 
 
-def test_log_normal_interval_covers_as_stated(generator):
-    """Coverage over 4000 log-normal estimates, within 4 standard errors of 95 %."""
-    variation, exact = 0.4, 2e-6
-    spread = np.sqrt(np.log1p(variation**2))
-    estimates = exact * np.exp(spread * generator.standard_normal(4000))
+@pytest.mark.parametrize("runs", [2, 5])
+def test_log_normal_interval_covers_as_stated(generator, runs):
+    """Coverage over 4000 log-normal estimates whose spread comes from so many runs, within 4 standard errors."""
+    levels = tuple(
+        Level(run=run, threshold=0.0, share=0.1, correlation=0.0, accepted=1.0, coefficient_of_variation=0.1)
+        for run in range(runs)
+    )
+    spread, exact = 0.4, 2e-6
+    logarithms = np.log(exact) + spread * np.sqrt(runs) * generator.standard_normal((4000, runs))
     covered = 0
-    for value in estimates:
+    for own in logarithms:
+        value, variation = np.exp(own.mean()), np.sqrt(np.expm1(own.var(ddof=1) / runs))
         failure = RareFailure(
             probability=float(value),
             standard_error=float(variation * value),
@@ -202,17 +217,30 @@ def test_log_normal_interval_covers_as_stated(generator):
             method="",
             cautions=(),
             effective_samples=1.0,
+            levels=levels,
         )
         interval = log_normal_interval(failure)
         covered += interval.low <= 1 - exact <= interval.high
     assert covered / 4000 == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 4000))
 
 
+def test_intervals_of_subset_simulation_cover():
+    """30 intervals of 95 % at Φ(−4.265) ≈ 1e-5 from small runs cover 0.95 less 3 standard errors."""
+    runs, seeds = 3, 30
+    limit, exact = limited(Sum, normals(2), 4.265), norm.sf(4.265)
+    covered = []
+    for seed in range(seeds):
+        found = log_normal_interval(subset_simulation(limit, SeedTree(seed), samples=100, runs=runs))
+        covered.append(found.low <= 1 - exact <= found.high)
+    assert np.mean(covered) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / seeds)
+
+
 def test_arguments_out_of_range():
     limit = limited(Sum, normals(2), 4.5)
+    sample = units_of(limit, 0, 100)
     states = np.full((5, 2), 3.0)
     for call in (
-        lambda: yield_at_limit(limit, SeedTree(0), runs=1),
+        lambda: yield_at_limit(limit, sample, SeedTree(0), runs=1),
         lambda: widened_sampling(limit, (states,), SeedTree(0)),
         lambda: widened_sampling(limit, (states, states[:0]), SeedTree(0)),
         lambda: widened_sampling(limit, (states, states), SeedTree(0), samples=10),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -162,13 +162,47 @@ def test_pawn_and_delta_of_a_normal_sum():
 
 
 def test_an_index_without_effect_passes_the_dummies_as_rarely_as_stated():
-    """One of eleven columns without effect is the largest with probability 1/11; 4 standard errors of 60."""
+    """One of eleven vectors without effect is the largest with probability 1/11; 4 standard errors of 60."""
     passed = []
     for seed in range(60):
         sample, errors = normal_sum(0.5, seed, 200)
         found = moment_independent(sample, errors, SeedTree(seed).child("m"), resamples=1, dummies=10)
         passed.append(found.pawn[2] > found.pawn_dummy)
     assert abs(np.mean(passed) - 1 / 11) < 4 * np.sqrt(1 / 11 * 10 / 11 / 60)
+
+
+def test_a_vector_without_effect_passes_the_dummies_as_rarely_as_stated():
+    """A source of three measures, the most there are, passes 10 dummies with probability 1/11; 3 standard errors."""
+    errors = ErrorModel(
+        (source("a", distribution=Distribution.NORMAL), source("idle", Feature.POSITION, Distribution.NORMAL))
+    )
+    response, passed = Weighted(errors.columns, (1.0, 0.0, 0.0)), []
+    for seed in range(100):
+        sample = monte_carlo(response, errors, errors.zones, SeedTree(seed), 200)
+        found = moment_independent(sample, errors, SeedTree(seed).child("m"), resamples=1, dummies=10)
+        passed.append([found.pawn[1] > found.pawn_dummy, found.delta[1] > found.delta_dummy])
+    assert (np.abs(np.mean(passed, axis=0) - 1 / 11) < 3 * np.sqrt(1 / 11 * 10 / 11 / 100)).all()
+
+
+def test_an_output_that_does_not_vary_is_refused():
+    sample, errors = normal_sum(0.6, 0, 200)
+    same = replace(sample.evaluation, values=np.ones_like(sample.evaluation.values))
+    with pytest.raises(SolveError, match="same for all units"):
+        moment_independent(replace(sample, evaluation=same), errors, SeedTree(1))
+
+
+def test_too_few_trajectories_and_units_are_refused():
+    with pytest.raises(InputError, match="trajectories is 1"):
+        elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(1), 1)
+    sample, errors = normal_sum(0.6, 0, 99)
+    with pytest.raises(InputError, match="100 or more"):
+        moment_independent(sample, errors, SeedTree(1))
+
+
+def test_one_source_alone_has_effects():
+    errors = ErrorModel((source("a"),))
+    found = elementary_effects(Weighted(errors.columns, (2.0,)), errors, errors.zones, SeedTree(1), 4)
+    np.testing.assert_allclose(found.mu_star, [[2.0 * 0.998]])
 
 
 def test_a_vector_is_seen_by_its_length_and_by_its_direction():

@@ -33,6 +33,7 @@ GOOD = Score(
     rms_error=1.0,
     quantile_error=0.5,
     quantile=50.0,
+    target=0.9973,
     speed=5.0,
     per_second=1e4,
     trained=80,
@@ -138,6 +139,23 @@ def test_predictivity_is_the_share_of_the_variance_that_is_not_noise():
     assert score.quantile_error == pytest.approx(wanted, abs=1e-12)
 
 
+def test_the_quantile_compared_is_the_one_asked_for_and_is_named():
+    x = samples(400)
+    answers = answers_of(Exact(noise=1.0), x, SeedTree(1))
+    found = {share: cross_validate(Fixed(Exact()), answers, share) for share in (0.9, 0.9973)}
+    for share, score in found.items():
+        assert score.quantile == np.quantile(answers.y, share)
+    assert found[0.9].quantile_error != found[0.9973].quantile_error
+    choice = choose(Exact(noise=1.0), (Fixed(Exact()),), x, SeedTree(1), quantile=0.9)
+    assert choice.scores[0].quantile == found[0.9].quantile
+    assert choice.table["error of the 90 % quantile [arcsec]"] == [found[0.9].quantile_error]
+    assert replace(choice.scores[0], target=0.99995).quantile_name == "99.995 % quantile"
+    off = replace(GOOD, quantile_error=3.0)
+    assert Gate().shortfalls(off) == ("its 99.73 % quantile is off by 6.0%, more than 2.0%",)
+    with pytest.raises(InputError, match="quantile"):
+        cross_validate(Fixed(Exact()), answers, 1.0)
+
+
 def test_no_fit_sees_what_it_predicts():
     x = samples(100)
     candidate = Fixed(Exact())
@@ -163,6 +181,7 @@ def test_the_best_of_those_that_pass_is_fitted_to_all_answers():
     assert choice.chosen is best.response
     assert best.shown[-1].shape[0] == 200
     assert "best: Q² = 1.000 on 200 answers" in choice.reason
+    assert "its 99.73 % quantile off by 0.0%" in choice.reason
 
 
 def test_below_the_gate_nothing_stands_in():

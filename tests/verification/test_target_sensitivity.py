@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.limited_measure import limited_measure
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_cells import parsed_spectrum
 from tolalloc.uncertainty.zones import Feature
 
 
@@ -68,6 +69,67 @@ def test_index_and_lift_are_those_of_the_closed_form(limit):
     truth = true_first(limit)
     assert (np.abs(found.first - truth) < 4 * found.first_resamples.std(axis=0) + 0.02 * truth).all()
     assert found.p_value[:2].max() < 0.001 < found.p_value[2]
+
+
+@dataclass(frozen=True)
+class SumOfAll:
+    """Sum of all columns."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...] = ("y [-]",)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
+
+
+MANY = ErrorModel((source("one"), source("few", each=4), source("pins", each=9)))
+"""Sources whose columns are standard normal, so that their shares of the variance of a sum are as 1 to 4 to 9."""
+
+
+def test_the_excess_orders_sources_of_many_columns_as_their_shares_of_the_variance():
+    """Within 4 standard errors of the closed form; the lifts, diluted by the columns, are all the same."""
+    limit, deviation = 1.5 * np.sqrt(14.0), np.sqrt(14.0)
+    sample = monte_carlo(SumOfAll(MANY.columns), MANY, MANY.zones, SeedTree(0), 20_000)
+    found = target_sensitivity(sample, MANY, limit, SeedTree(0).child("t"), permutations=9)
+    np.testing.assert_array_equal(found.columns, [1, 4, 9])
+    truth = found.columns / 14.0 * (limit / deviation) * norm.pdf(1.5) / norm.sf(1.5)
+    error = found.columns * found.lift_resamples.std(axis=0)
+    assert (np.abs(found.excess - truth) < 4 * error).all()
+    assert (np.diff(found.excess) > 4 * np.hypot(error[1:], error[:-1])).all()
+    low, high = found.excess_interval
+    assert (low < found.excess).all()
+    assert (found.excess < high).all()
+    np.testing.assert_allclose(high - low, found.columns * np.diff(found.lift_interval, axis=0)[0])
+
+
+def test_a_source_of_many_columns_is_not_behind_one_of_few_whose_lift_is_higher():
+    """Shares 5/14 of one column and 9/14 of nine: the lifts rank them the wrong way round."""
+    errors = ErrorModel((source("one"), source("pins", each=9)))
+    weights = np.array([np.sqrt(5.0)] + [1.0] * 9)
+
+    @dataclass(frozen=True)
+    class Weighted(SumOfAll):
+        def __call__(self, x: np.ndarray) -> Evaluation:
+            return super().__call__(x * weights)
+
+    sample = monte_carlo(Weighted(errors.columns), errors, errors.zones, SeedTree(1), 20_000)
+    found = target_sensitivity(sample, errors, 1.5 * np.sqrt(14.0), SeedTree(1), permutations=9)
+    assert found.lift[0] > found.lift[1]
+    assert found.excess[1] > found.excess[0]
+
+
+def test_an_output_that_does_not_vary_is_refused():
+    sample = drawn(2, 2000)
+    same = replace(sample.evaluation, values=np.ones_like(sample.evaluation.values))
+    for limit in (0.5, 1.5):
+        with pytest.raises(SolveError, match="same for all the worst units"):
+            target_sensitivity(replace(sample, evaluation=same), SIZES, limit, SeedTree(2))
+
+
+def test_failed_units_do_not_make_a_sample_too_small():
+    sample = monte_carlo(Sum(fail=10), SIZES, SIZES.zones, SeedTree(3), 1000)
+    found = target_sensitivity(sample, SIZES, 5.0, SeedTree(3), permutations=9, resamples=9)
+    assert (found.units, found.outside) == (990, 50)
 
 
 def test_intervals_cover():
@@ -152,6 +214,13 @@ def test_what_fills_the_zone_measures_as_much_as_the_zone(generator):
         np.testing.assert_allclose(np.abs(limited_measure(one, columns)), full, rtol=0.006)
 
 
+def test_random_teeth_are_measured_at_the_teeth(generator):
+    spectrum, teeth = parsed_spectrum("1:2.0 random:1.0/40")
+    one = source("s", Feature.PITCH, spectrum=spectrum, teeth=teeth)
+    columns = one.zone * one.at_limit(generator.random((20, len(one.columns))))
+    np.testing.assert_allclose(limited_measure(one, columns), one.zone, rtol=1e-9)
+
+
 def test_a_size_is_measured_from_the_middle_of_its_zone():
     one = source("s", middle=4.0, over=2.0)
     np.testing.assert_allclose(limited_measure(one, np.array([[3.0]])), 3.0 * 2.0 - 4.0)
@@ -164,4 +233,7 @@ def test_a_joint_source_is_measured_in_its_own_deviations(generator):
     errors = ErrorModel((source("a"),), joint=(joint,))
     x = errors.deviations(errors.standard_values(generator.random((4000, 3))), errors.zones)
     assert limited_measures(errors, x).shape == (4000, 2)
+    sample = monte_carlo(SumOfAll(errors.columns), errors, errors.zones, SeedTree(4), 4000)
+    found = target_sensitivity(sample, errors, 1.0, SeedTree(4), permutations=9, resamples=9)
+    np.testing.assert_array_equal(found.columns, [1, 1])
     np.testing.assert_allclose((limited_measures(errors, x)[:, 1] ** 2).mean(), 0.5, rtol=1e-6)

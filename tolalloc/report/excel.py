@@ -18,7 +18,7 @@ def write_workbook(results: StudyResults, path: Path) -> None:
     sheets = {
         "capability": tables.capability(results),
         "drawing": tables.before_after(results),
-        "allocation": table_frame(tables.allocated_sources(results)),
+        "allocation": table_frame(tables.allocated_sources(results), path.parent),
         "modification": tables.modification(results),
         "sensitivity": tables.ranking(results),
         "stack-up": tables.stack_up(results),

@@ -21,6 +21,8 @@ _SLOPE_STEP = 0.1
 """Change of a factor that its slope is taken over, wide enough to move many units past each other [-]."""
 _CONFIDENCE = 0.9
 """Confidence of the two-sided interval of every factor [-]."""
+_ROWS_AT_ONCE = 2**17
+"""Units of all trials that one call of the response takes, unless one trial alone has more [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +153,7 @@ def fewest_units(target: float) -> int:
 
 
 class _Openings:
-    """The same units with one zone multiplied by a factor, for several sources in one call of the response."""
+    """The same units with one zone multiplied by a factor, for several sources in each call of the response."""
 
     def __init__(
         self,
@@ -170,6 +172,14 @@ class _Openings:
         self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
     ) -> Float[np.ndarray, "trial 3"]:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
+        trials = max(1, _ROWS_AT_ONCE // self.standard.shape[0])
+        parts = (slice(start, start + trials) for start in range(0, sources.size, trials))
+        return np.concatenate([self._quantiles_at_once(sources[part], factors[part]) for part in parts])
+
+    def _quantiles_at_once(
+        self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
+    ) -> Float[np.ndarray, "trial 3"]:
+        """Return the same from one call of the response."""
         zones = np.repeat(self.zones[np.newaxis], sources.size, axis=0)
         zones[np.arange(sources.size), sources] *= factors
         evaluation = self.response(np.concatenate([self.errors.deviations(self.standard, own) for own in zones]))

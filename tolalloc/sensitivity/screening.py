@@ -27,6 +27,12 @@ from tolalloc.uncertainty.seeds import SeedTree
 
 _CURVE_POINTS = 100
 """Points at which delta compares two densities, SALib's number."""
+FEWEST_TRAJECTORIES = 2
+"""Trajectories without which the effects have no scatter [-]."""
+FEWEST_UNITS_OF_CLASS = 10
+"""Units of a class of PAWN, below which its distance to the whole sample is chance [-]."""
+CLASSES = 10
+"""Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +85,7 @@ class MomentIndependent:
     delta_resamples
         The same from bootstrap resamples of the units [-].
     pawn_dummy, delta_dummy
-        Largest index among the dummies, columns that the output does not depend on: a level that means nothing [-].
+        Largest index among the dummies, vectors that the output does not depend on: a level that means nothing [-].
     units, failed
         Good units, and those without a usable answer [-].
     """
@@ -137,7 +143,7 @@ def elementary_effects(
     Raises
     ------
     InputError
-        An odd number of levels, or a trim outside 0 to 0.5.
+        Fewer than two trajectories, an odd number of levels, or a trim outside 0 to 0.5.
     SolveError
         More trajectories hold a failed sample than allowed, or fewer than two are left.
 
@@ -145,6 +151,8 @@ def elementary_effects(
     ----------
     Morris 1991; Campolongo, Cariboni & Saltelli 2007, mu* and groups; SALib draws the trajectories.
     """
+    if trajectories < FEWEST_TRAJECTORIES:
+        raise InputError.at("elementary effects", "trajectories", trajectories, f"{FEWEST_TRAJECTORIES} or more")
     if levels < 2 or levels % 2:
         raise InputError.at("elementary effects", "levels", levels, "an even number, 2 or more")
     if not 0.0 < trim < 0.5:
@@ -161,7 +169,7 @@ def elementary_effects(
     evaluation = response(errors.deviations(errors.standard_values(uniform), zones))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
     used = int(np.count_nonzero(whole))
-    if trajectories - used > largest_failed_share * trajectories or used < 2:
+    if trajectories - used > largest_failed_share * trajectories or used < FEWEST_TRAJECTORIES:
         raise SolveError(
             f"Elementary effects: {trajectories - used} of {trajectories} trajectories hold a failed sample; allowed "
             f"is {largest_failed_share:.4g} of them, and two must be left."
@@ -191,7 +199,7 @@ def moment_independent(
     errors: ErrorModel,
     seeds: SeedTree,
     *,
-    classes: int = 10,
+    classes: int = CLASSES,
     resamples: int = 50,
     dummies: int = 20,
     largest_failed_share: float = LARGEST_FAILED_SHARE,
@@ -211,15 +219,18 @@ def moment_independent(
     resamples
         Bootstrap resamples of the units for delta [-].
     dummies
-        Columns that the output does not depend on; one more without an effect passes them all with probability
-        1/(dummies + 1) [-].
+        Vectors that the output does not depend on, each the source of most measures in a random order of the units.
+        A source without an effect passes them all with probability 1/(dummies + 1), or less if it has fewer
+        measures [-].
     largest_failed_share
         Share of the units that may fail [-].
 
     Raises
     ------
+    InputError
+        Too few units for the classes.
     SolveError
-        More units failed.
+        More units failed, or the output does not vary.
 
     Notes
     -----
@@ -232,8 +243,14 @@ def moment_independent(
     Pianosi & Wagener 2018 (PAWN from given data); Plischke, Borgonovo & Smith 2013, eq. (26) and (30) (delta).
     """
     require_few_failures(sample, "moment-independent indices", largest_failed_share)
+    drawn, needed = sample.x.shape[0], FEWEST_UNITS_OF_CLASS * classes
+    if drawn < needed:
+        raise InputError.at("moment-independent indices", "units", drawn, f"{needed} or more")
     y, known = sample.values, _known(errors, sample.x[sample.evaluation.good])
-    known += list(seeds.child("dummies").generator().random((dummies, y.size, 1)))
+    if not np.ptp(y) > 0.0:
+        raise SolveError("Moment-independent indices: the output is the same for all units; no source can be ranked.")
+    widest, shuffle = max(known, key=lambda own: own.shape[1]), seeds.child("dummies").generator()
+    known += [shuffle.permutation(widest) for _ in range(dummies)]
     pawns = np.array([_pawn(columns, y, classes).max() for columns in known])
     generator = seeds.child("resamples").generator()
     with one_blas_thread():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.uncertainty.error_model import ErrorModel
@@ -16,6 +16,8 @@ from tolalloc.uncertainty.seeds import SeedTree
 
 WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
+FEWEST_OUTSIDE = 50
+"""Units needed on either side of the threshold [-]."""
 _CLASSES_PER_ROOT = 2
 """Classes of a measure over √units: fewer would hide how steeply the chance rises, more would scatter [-]."""
 
@@ -42,6 +44,8 @@ class TargetSensitivity:
         Mean square of the standardised columns among the units outside over that of all units; 1 means no part [-].
     lift_resamples
         The same from bootstrap resamples of the units [-].
+    columns
+        Columns of each source that vary [-].
     p_value
         Share of random choices of as many units whose lift is as far from 1 or farther, two-sided [-].
     median, median_outside
@@ -58,6 +62,7 @@ class TargetSensitivity:
     first_resamples: Float[np.ndarray, "resample source"]
     lift: Float[np.ndarray, " source"]
     lift_resamples: Float[np.ndarray, "resample source"]
+    columns: Int[np.ndarray, " source"]
     p_value: Float[np.ndarray, " source"]
     median: Float[np.ndarray, " source"]
     median_outside: Float[np.ndarray, " source"]
@@ -72,6 +77,16 @@ class TargetSensitivity:
         """90 % percentile interval of the lifts [-]."""
         return percentile_interval(self.lift_resamples)
 
+    @property
+    def excess(self) -> Float[np.ndarray, " source"]:
+        """Sum over a source's columns of their mean squares beyond 1, which many columns do not dilute [-]."""
+        return np.asarray(self.columns * (self.lift - 1.0))
+
+    @property
+    def excess_interval(self) -> Float[np.ndarray, "2 source"]:
+        """90 % percentile interval of the excesses [-]."""
+        return np.asarray(self.columns * (self.lift_interval - 1.0))
+
 
 def target_sensitivity(
     sample: MonteCarlo,
@@ -79,7 +94,7 @@ def target_sensitivity(
     limit: float,
     seeds: SeedTree,
     *,
-    fewest: int = 50,
+    fewest: int = FEWEST_OUTSIDE,
     resamples: int = 400,
     permutations: int = 1999,
     largest_failed_share: float = LARGEST_FAILED_SHARE,
@@ -108,12 +123,15 @@ def target_sensitivity(
     InputError
         The worst 5 % are fewer units than needed.
     SolveError
-        More units failed.
+        More units failed, or the output is the same for all the worst units.
 
     Notes
     -----
     The index of a vector is that given its length, so it leaves out what the vector's direction adds. The lift of a
-    vector takes all its columns. In a correlated error model both also show what a source only goes along with.
+    vector is the mean over all its columns, so it compares sources of as many columns; the excess is the sum and
+    compares all: for a sum of normal columns the excesses are to each other as the shares of the variance. In a
+    correlated error model all of them also show what a source only goes along with, so a block's excesses do not add
+    up to what the block does.
     Classes hide a part of a large index far out (measured: 6 % of it with 85 of 6,144 units outside); its interval is
     too wide near 0, where the p-value says more.
 
@@ -125,8 +143,10 @@ def target_sensitivity(
     require_few_failures(sample, "target sensitivity", largest_failed_share)
     good = sample.evaluation.good
     x, values = sample.x[good], sample.values
-    threshold, is_limit = _threshold(values, limit, fewest)
+    threshold, is_limit = _threshold(values, limit, fewest, units=good.size)
     outside = values > threshold
+    if not outside.any():
+        raise SolveError("Target sensitivity: the output is the same for all the worst units, so none is set apart.")
     measures, squares = limited_measures(errors, x), _mean_squares(errors, x)
     tables = np.stack([_table(measure, outside) for measure in measures.T])
     return TargetSensitivity(
@@ -140,6 +160,7 @@ def target_sensitivity(
         first_resamples=_first_resamples(tables, seeds.child("first"), resamples),
         lift=squares[outside].mean(axis=0) / squares.mean(axis=0),
         lift_resamples=_lift_resamples(squares, outside, seeds.child("lift"), resamples),
+        columns=_varying_columns(errors, x),
         p_value=_p_value(squares, outside, seeds.child("permutations"), permutations),
         median=np.median(measures, axis=0),
         median_outside=np.median(measures[outside], axis=0),
@@ -175,14 +196,25 @@ def _mean_squares(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> 
     return np.column_stack([squares[:, where == name].mean(axis=1) for name in dict.fromkeys(errors.source_of_column)])
 
 
-def _threshold(values: Float[np.ndarray, " unit"], limit: float, fewest: int) -> tuple[float, bool]:
+def _varying_columns(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Int[np.ndarray, " source"]:
+    """Return how many of each source's columns vary [-]."""
+    where, varies = np.array(errors.source_of_column), x.std(axis=0) > 0.0
+    return np.array([np.count_nonzero(varies[where == name]) for name in dict.fromkeys(errors.source_of_column)])
+
+
+def fewest_units(fewest: int = FEWEST_OUTSIDE) -> int:
+    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
+    return int(np.ceil(fewest / WORST_SHARE))
+
+
+def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, fewest: int, *, units: int) -> tuple[float, bool]:
     """Return the limit, or what cuts off the worst units if it divides them too unevenly, and which it is."""
     outside = int(np.count_nonzero(values > limit))
     if fewest <= outside <= values.size - fewest:
         return limit, True
-    if WORST_SHARE * values.size < fewest:
-        needed = int(np.ceil(fewest / WORST_SHARE))
-        raise InputError.at("target sensitivity", "units", values.size, f"{needed} or more for {outside} outside")
+    needed = fewest_units(fewest)
+    if units < needed:
+        raise InputError.at("target sensitivity", "units", units, f"{needed} or more for {outside} outside")
     return float(np.quantile(values, 1.0 - WORST_SHARE)), False
 
 

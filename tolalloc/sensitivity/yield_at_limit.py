@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import t as student
 
 from tolalloc.exceptions import InputError
 from tolalloc.sensitivity.capability import (
@@ -15,9 +15,8 @@ from tolalloc.sensitivity.capability import (
     ShareInterval,
     capability,
     defects_per_million_opportunities,
-    wilson_interval,
 )
-from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState
+from tolalloc.sensitivity.monte_carlo import CONFIDENCE, LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
 from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
 from tolalloc.sensitivity.rare_failure.result import RareFailure
 from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
@@ -27,6 +26,8 @@ from tolalloc.uncertainty.seeds import SeedTree
 METHOD = "Monte Carlo"
 RARE = 1e-3
 """Share of random units beyond the limit below which a failure is rare [-]."""
+FEWEST_RUNS = 2
+"""Runs of the subset simulation without which their spread is not known [-]."""
 LARGEST_DIFFERENCE = 3.0
 """Difference of two estimates in standard errors beyond which they contradict each other [-]."""
 
@@ -40,8 +41,8 @@ class YieldAtLimit:
     limit
         Largest output allowed [output].
     interval
-        Yield with its two-sided interval: Wilson's from random units, or where few of them exceed the limit that of a
-        log-normally distributed estimate [-].
+        Yield with its two-sided 95 % interval: that of `MonteCarlo.within` from random units, or where few of them
+        exceed the limit that of a log-normally distributed estimate [-].
     estimate
         Probability of a unit beyond the limit by the method relied on, with its calls, failed samples and cautions.
     estimates
@@ -85,14 +86,13 @@ class YieldAtLimit:
 
 def yield_at_limit(
     limit_state: ResponseLimit,
+    sample: MonteCarlo,
     seeds: SeedTree,
     *,
-    units: int = 20_000,
     samples: int = 4000,
     runs: int = 5,
     weighted: int = 20_000,
-    confidence: float = 0.95,
-    largest_failed_share: float = 0.01,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> YieldAtLimit:
     """Return the yield at a limit.
 
@@ -100,16 +100,15 @@ def yield_at_limit(
     ----------
     limit_state
         The limit on the response.
+    sample
+        Random units whose first output is the limited one; they decide alone if a thousandth of them or more exceed
+        the limit, units without an answer included.
     seeds
         Node of the seed tree.
-    units
-        Random units, which decide alone if a thousandth of them or more exceed the limit [-].
     samples, runs
         Samples of each level, and independent runs of the subset simulation, two or more [-].
     weighted
         Samples of the widened distribution [-].
-    confidence
-        Confidence of the interval [-].
     largest_failed_share
         Share of each method's samples that may fail [-].
 
@@ -122,46 +121,51 @@ def yield_at_limit(
 
     Notes
     -----
+    The interval from random units holds for independent ones, those of the Monte Carlo design.
     Subset simulation is relied on, and widened sampling tells whether it may be. Widened sampling takes its directions
     from failures that subset simulation has found, so both are blind to a region that every run has missed.
     """
-    if runs < 2:
-        raise InputError.at("yield at a limit", "runs", runs, "2 or more")
-    plain, indices = _random_units(limit_state, seeds.child("units"), units, largest_failed_share)
-    rejected = round(plain.effective_samples)
+    if runs < FEWEST_RUNS:
+        raise InputError.at("yield at a limit", "runs", runs, f"{FEWEST_RUNS} or more")
+    require_few_failures(sample, "yield at a limit", largest_failed_share)
+    limit = limit_state.limit
+    within = sample.within(limit)
+    plain = _random_units(sample, within)
     rare: tuple[RareFailure, ...] = ()
     if plain.probability < RARE:
         rare = _rare_estimates(limit_state, seeds, samples, runs, weighted, largest_failed_share)
     reached = len(rare) == 2
     return YieldAtLimit(
-        limit=limit_state.limit,
-        interval=log_normal_interval(rare[0], confidence)
+        limit=limit,
+        interval=log_normal_interval(rare[0])
         if reached
-        else wilson_interval(units, units - rejected, confidence),
+        else ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE),
         estimate=rare[0] if reached else plain,
         estimates=(plain, *rare),
         verdict=_verdict(plain, *rare),
-        capability=indices,
-        defects_per_million=defects_per_million_opportunities(rejected, units),
+        capability=capability(sample.values, Limits(upper=limit)),
+        defects_per_million=defects_per_million_opportunities(within.rejected, within.units),
     )
 
 
-def log_normal_interval(failure: RareFailure, confidence: float = 0.95) -> ShareInterval:
+def log_normal_interval(failure: RareFailure, confidence: float = CONFIDENCE) -> ShareInterval:
     """Return the yield with the interval of a log-normally distributed estimate of the share beyond the limit.
 
     Parameters
     ----------
     failure
-        Estimate above zero with its standard error.
+        Estimate above zero of two or more runs of a subset simulation, with its standard error.
     confidence
         Confidence of the interval [-].
 
     References
     ----------
-    p·exp(±z·√(ln(1 + δ²))) with δ the coefficient of variation; unlike p ± z·s it cannot fall below zero.
+    p·exp(±t·√(ln(1 + δ²))) with δ the coefficient of variation and t Student's quantile of one degree of freedom less
+    than runs, because few runs know little of their own spread; unlike p ± t·s it cannot fall below zero.
     """
     spread = np.sqrt(np.log1p(failure.coefficient_of_variation**2))
-    factor = float(np.exp(norm.isf((1 - confidence) / 2) * spread))
+    runs = len({level.run for level in failure.levels})
+    factor = float(np.exp(student.isf((1 - confidence) / 2, runs - 1) * spread))
     return ShareInterval(
         estimate=1 - failure.probability,
         low=max(0.0, 1 - failure.probability * factor),
@@ -170,26 +174,19 @@ def log_normal_interval(failure: RareFailure, confidence: float = 0.95) -> Share
     )
 
 
-def _random_units(
-    limit_state: ResponseLimit, seeds: SeedTree, units: int, largest_failed_share: float
-) -> tuple[RareFailure, Capability]:
-    """Return the share of random units rejected, those without an answer included, and the capability of the others."""
-    counted = CountedLimitState(limit_state, largest_failed_share)
-    values = counted.values(seeds.generator().standard_normal((units, limit_state.variables)))
-    rejected = int(np.count_nonzero(values < 0)) + counted.failed
-    share = rejected / units
-    lost = f"{counted.failed} of {units} units have no usable answer and count as rejected"
-    plain = RareFailure(
+def _random_units(sample: MonteCarlo, within: Yield) -> RareFailure:
+    """Return the share of random units rejected, those without an answer included."""
+    share, units = within.rejected / within.units, within.units
+    lost = f"{sample.failed} of {units} units have no usable answer and count as rejected"
+    return RareFailure(
         probability=share,
-        standard_error=float(np.sqrt(share * (1 - share) / units)) if rejected else float("inf"),
-        calls=counted.calls,
-        failed=counted.failed,
+        standard_error=float(np.sqrt(share * (1 - share) / units)) if within.rejected else float("inf"),
+        calls=units,
+        failed=sample.failed,
         method=METHOD,
-        cautions=(lost,) * bool(counted.failed),
-        effective_samples=float(rejected),
+        cautions=(lost,) * bool(sample.failed),
+        effective_samples=float(within.rejected),
     )
-    outputs = limit_state.limit - values[np.isfinite(values)]
-    return plain, capability(outputs, Limits(upper=limit_state.limit))
 
 
 def _rare_estimates(
@@ -202,7 +199,7 @@ def _rare_estimates(
 ) -> tuple[RareFailure, ...]:
     """Return the estimate of subset simulation and, if two runs reached the limit, that of widened sampling."""
     levels = subset_simulation(limit_state, seeds.child("levels"), samples, runs, largest_failed_share)
-    if sum(states.size > 0 for states in levels.failing) < 2:
+    if sum(states.size > 0 for states in levels.failing) < FEWEST_RUNS:
         return (levels,)
     widened = seeds.child("widened")
     return levels, widened_sampling(limit_state, levels.failing, widened, weighted, largest_failed_share)

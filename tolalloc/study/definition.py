@@ -46,6 +46,10 @@ NEGLECTED = (
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 
+_FILES = ("reducer", "tolerances", "processes", "correlations", "unit", "stiffness")
+"""Fields of a study that name files; what they hold counts, not where they stand."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """A study.
@@ -179,7 +183,8 @@ class Prepared:
         known = self.identified.content if self.identified else None  # the reducer holds the values alone
         errors = self.space.errors
         sources, correlation = errors.sources, errors.correlation
-        content = (asdict(self.study), self.reducer, known, sources, correlation, self.unit, self.kernel.torque)
+        asked = {name: value for name, value in asdict(self.study).items() if name not in _FILES}
+        content = (asked, self.reducer, known, sources, correlation, self.unit, self.kernel.torque)
         return hashlib.sha256(repr(content).encode()).hexdigest()
 
 

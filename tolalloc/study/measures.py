@@ -176,13 +176,13 @@ class Measures:
         limit, seeds = self.prepared.requirement.limit, self._seeds("reject")
         return target_sensitivity(sample, self.errors, limit, seeds, largest_failed_share=self._failed_share)
 
-    def beyond(self) -> YieldAtLimit:
-        """Return the probability of a unit beyond the limit."""
+    def beyond(self, sample: MonteCarlo) -> YieldAtLimit:
+        """Return the probability of a unit beyond the limit, from a sample and where it is rare from more units."""
         errors, effort, limit = self.errors, self._effort, self.prepared.requirement.limit
         return yield_at_limit(
             ResponseLimit(response=self.kernel, errors=errors, zones=errors.zones, limit=limit),
+            sample,
             self._seeds("beyond"),
-            units=effort.units,
             samples=effort.level_units,
             runs=effort.level_runs,
             weighted=effort.widened_units,
@@ -217,7 +217,14 @@ class Measures:
                 )
             ]
         x = sample.x[: self._effort.surrogate_units]
-        return choose(self.kernel, candidates, x, self._seeds("surrogates"), largest_failed_share=self._failed_share)
+        return choose(
+            self.kernel,
+            candidates,
+            x,
+            self._seeds("surrogates"),
+            quantile=self.prepared.requirement.target,
+            largest_failed_share=self._failed_share,
+        )
 
 
 def _first(sample: MonteCarlo, units: int) -> MonteCarlo:

@@ -48,7 +48,7 @@ def rank(study: Study, progress: Progress, *, quick: bool = False) -> RankingRes
             shapley, local, derivatives = measures.shapley(), measures.local(), measures.derivatives()
             effects, moments, classical = measures.effects(), measures.moments(sample), measures.classical()
         with record.stage("units out of the limit"):
-            reject, beyond = measures.reject(sample), measures.beyond()
+            reject, beyond = measures.reject(sample), measures.beyond(sample)
         with record.stage("surrogates"):
             choice = measures.choice(sample)
         with record.stage("zones alone"):

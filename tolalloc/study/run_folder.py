@@ -162,7 +162,7 @@ def write_run(folder: Path, prepared: Prepared, results: StudyResults, record: R
     write_json(manifest(prepared, results, record), folder / "manifest.json")
     write_json(summary(results), folder / "summary.json")
     tables.ranking(results).to_csv(folder / "sensitivity.csv", index=False)
-    table_frame(tables.allocated_sources(results)).to_csv(folder / "allocation.csv", index=False)
+    table_frame(tables.allocated_sources(results), folder).to_csv(folder / "allocation.csv", index=False)
     tables.pareto(results).to_csv(folder / "pareto.csv", index=False)
     write_workbook(results, folder / "results.xlsx")
     for figure in study_figures(results):

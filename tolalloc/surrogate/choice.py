@@ -40,7 +40,7 @@ class Gate:
             (score.q2 >= self.q2, f"Q² = {score.q2:.3f} is below {self.q2:g}"),
             (
                 quantile_error <= self.quantile_error,
-                f"its quantile is off by {quantile_error:.1%}, more than {self.quantile_error:.1%}",
+                f"its {score.quantile_name} is off by {quantile_error:.1%}, more than {self.quantile_error:.1%}",
             ),
             (failed <= self.failed_share, f"{failed:.1%} of its predictions fail, more than {self.failed_share:.1%}"),
         )
@@ -85,19 +85,19 @@ class Choice:
             )
         return (
             f"The surrogate is {score.name}: Q² = {score.q2:.3f} on {score.held_out} answers that it had not seen, its "
-            f"quantile off by {abs(score.quantile_share):.1%}."
+            f"{score.quantile_name} off by {abs(score.quantile_share):.1%}."
         )
 
     @property
     def table(self) -> dict[str, list[str] | list[float] | list[int]]:
         """Columns of a table with one row per candidate, by headers that state the unit."""
-        unit = self.output[self.output.rindex("[") :]
+        unit, quantile = self.output[self.output.rindex("[") :], self.scores[self.best].quantile_name
         return {
             "candidate": [score.name for score in self.scores],
             "Q² [-]": [score.q2 for score in self.scores],
             f"rms error {unit}": [score.rms_error for score in self.scores],
-            f"error of the quantile {unit}": [score.quantile_error for score in self.scores],
-            "error of the quantile [%]": [score.quantile_share * 100 for score in self.scores],
+            f"error of the {quantile} {unit}": [score.quantile_error for score in self.scores],
+            f"error of the {quantile} [%]": [score.quantile_share * 100 for score in self.scores],
             "predictions per second [1/s]": [score.per_second for score in self.scores],
             "speed over the response [-]": [score.speed for score in self.scores],
             "trained on [-]": [score.trained for score in self.scores],
@@ -113,6 +113,7 @@ def choose(
     x: Float[np.ndarray, "sample column"],
     seeds: SeedTree,
     gate: Gate = Gate(),
+    quantile: float = 0.9973,
     largest_failed_share: float = 0.01,
 ) -> Choice:
     """Return the candidate with the highest Q² among those that pass the gate, fitted to all answers.
@@ -129,13 +130,15 @@ def choose(
         Node of the seed tree.
     gate
         What must be reached.
+    quantile
+        Share of the units below the quantile that is compared, the yield that the surrogate is asked about [-].
     largest_failed_share
         Share of samples that may fail in the response [-].
 
     Raises
     ------
     InputError
-        No candidate, or too few samples.
+        No candidate, too few samples, or a quantile outside 0 to 1.
     SolveError
         Too many samples failed.
 
@@ -147,7 +150,7 @@ def choose(
     if not candidates:
         raise InputError.at("surrogate", "candidates", tuple(candidates), "one or more")
     answers = answers_of(response, x, seeds, largest_failed_share=largest_failed_share)
-    scores = tuple(cross_validate(candidate, answers) for candidate in candidates)
+    scores = tuple(cross_validate(candidate, answers, quantile) for candidate in candidates)
     passed = [at for at, score in enumerate(scores) if not gate.shortfalls(score)]
     best = max(passed or range(len(scores)), key=lambda at: scores[at].q2)
     return Choice(

@@ -17,6 +17,9 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Response
 from tolalloc.uncertainty.seeds import SeedTree
 
+FOLDS = 5
+FEWEST_OF_FOLD = 2
+"""Samples of a fold, without which its error has no scatter [-]."""
 _CLOCKED = 256
 """Samples of each fold on which the candidate and the response are clocked, the shortest time of all folds counts [-].
 """
@@ -82,6 +85,8 @@ class Score:
         Quantile of the predictions less that of the answers [output].
     quantile
         Quantile of the answers [output].
+    target
+        Share of the units below that quantile [-].
     speed
         Predictions in the time of one answer [-].
     per_second
@@ -97,6 +102,7 @@ class Score:
     rms_error: float
     quantile_error: float
     quantile: float
+    target: float
     speed: float
     per_second: float
     trained: int
@@ -108,12 +114,17 @@ class Score:
         """Error of the quantile over the quantile [-]."""
         return self.quantile_error / self.quantile
 
+    @property
+    def quantile_name(self) -> str:
+        """Which quantile is compared."""
+        return f"{100 * self.target:.6g} % quantile"
+
 
 def answers_of(
     response: Response,
     x: Float[np.ndarray, "sample column"],
     seeds: SeedTree,
-    folds: int = 5,
+    folds: int = FOLDS,
     largest_failed_share: float = 0.01,
 ) -> Answers:
     """Return the answers of a response in random folds.
@@ -138,7 +149,7 @@ def answers_of(
     SolveError
         More samples failed.
     """
-    if not 2 <= folds <= x.shape[0] // 2:
+    if not 2 <= folds <= x.shape[0] // FEWEST_OF_FOLD:
         raise InputError.at("surrogate", "folds", folds, f"2 to half of the {x.shape[0]} samples")
     fold = np.empty(x.shape[0], int)
     fold[seeds.generator().permutation(fold.size)] = np.arange(fold.size) % folds
@@ -167,6 +178,8 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
 
     Raises
     ------
+    InputError
+        A quantile outside 0 to 1.
     SolveError
         Not one prediction is good.
 
@@ -174,6 +187,8 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
     -----
     The clocked speed alone differs from run to run.
     """
+    if not 0.0 < quantile < 1.0:
+        raise InputError.at("surrogate", "quantile", quantile, "a number between 0 and 1")
     predicted, mean = np.full(answers.y.size, np.nan), np.empty(answers.y.size)
     seconds, own_seconds, trained = [], [], []
     for seen, unseen in answers.splits:
@@ -197,6 +212,7 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
         rms_error=float(np.sqrt((error**2).mean())),
         quantile_error=float(np.quantile(predicted[good], quantile)) - limit,
         quantile=limit,
+        target=quantile,
         speed=min(seconds) / min(own_seconds),
         per_second=1 / min(own_seconds),
         trained=min(trained),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, field
+from itertools import combinations, zip_longest
 
 import numpy as np
 from jaxtyping import Float
@@ -24,9 +24,10 @@ class Pair:
     Parameters
     ----------
     one, other
-        Names of the sources; the first column of one goes with the first of the other, and so on.
+        Names of the sources; like columns of both go together, x with x and cos1 with cos1.
     correlation
-        Of the standard normal numbers behind the columns; for normal sources that of the columns themselves [-].
+        Of the standard normal numbers behind the columns; for normal sources that of the columns themselves, for others
+        near it [-].
     place
         Where it stands, for messages.
     """
@@ -34,7 +35,7 @@ class Pair:
     one: str
     other: str
     correlation: float
-    place: str = "correlations"
+    place: str = field(default="correlations", repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class Correlation:
     """
 
     pairs: tuple[Pair, ...] = ()
-    origin: str = "correlations"
+    origin: str = field(default="correlations", repr=False)
 
     def among(self, sources: Sequence[Source]) -> tuple[Pair, ...]:
         """Return the pairs whose sources both vary and whose correlation is not zero."""
@@ -58,17 +59,17 @@ class Correlation:
         return tuple(pair for pair in self.pairs if pair.correlation and {pair.one, pair.other} <= varying)
 
     def require_sound(self, sources: Sequence[Source]) -> None:
-        """Raise unless the pairs name sources of equal shape and all correlations can hold together.
+        """Raise unless the pairs name sources with like columns and all correlations can hold together.
 
         Raises
         ------
         InputError, UnknownNameError
             The pair that is not allowed.
         """
-        shapes = {source.name: len(source.columns) for source in sources}
+        known = {source.name: source for source in sources}
         seen: dict[frozenset[str], Pair] = {}
         for pair in self.pairs:
-            _require_allowed(pair, shapes)
+            _require_allowed(pair, known)
             first = seen.setdefault(frozenset((pair.one, pair.other)), pair)
             if abs(first.correlation - pair.correlation) > _ROUNDING:
                 raise InputError.at(
@@ -132,20 +133,22 @@ class Correlation:
         return tuple(sentences)
 
 
-def _require_allowed(pair: Pair, shapes: Mapping[str, int]) -> None:
-    """Raise unless a pair names two sources with as many columns each, and a correlation."""
+def _require_allowed(pair: Pair, known: Mapping[str, Source]) -> None:
+    """Raise unless a pair names two sources with like columns, and a correlation."""
     place = f"{pair.place}, {pair.one} with {pair.other}"
     for name in (pair.one, pair.other):
-        if name not in shapes:
-            raise UnknownNameError.among(pair.place, "source", name, shapes)
+        if name not in known:
+            raise UnknownNameError.among(pair.place, "source", name, known)
     if not -1 <= pair.correlation <= 1:
         raise InputError.at(place, "correlation", pair.correlation, "-1 to 1")
     if pair.one == pair.other:
         raise InputError.at(place, "pair", pair.one, "two different sources")
-    if shapes[pair.one] != shapes[pair.other]:
-        raise InputError.at(
-            place,
-            "columns",
-            f"{shapes[pair.one]} and {shapes[pair.other]}",
-            "equally many of both sources, as two bores or two diameters have",
-        )
+    columns = zip_longest(known[pair.one].columns, known[pair.other].columns, fillvalue="nothing")
+    for one, other in columns:
+        if one.removeprefix(pair.one) != other.removeprefix(pair.other):
+            raise InputError.at(
+                place,
+                "columns",
+                f"{one} with {other}",
+                "like columns of both sources, as two diameters, two bores or two pitches of the same orders have",
+            )

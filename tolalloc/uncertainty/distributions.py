@@ -17,6 +17,8 @@ from scipy.special import ndtr
 Numbers = Float[np.ndarray, "..."]
 
 INSIDE_AT_CP_1 = 0.9973
+ABOVE_ZERO, BELOW_ONE = float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
+"""Smallest and largest probability whose quantile is finite [-]."""
 LEVELS = np.linspace(-8.2, 8.2, 4097)
 """Standard normal numbers that cover all probabilities between 0 and the float below 1 [-]."""
 LEVELS.setflags(write=False)

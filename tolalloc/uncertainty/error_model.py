@@ -11,10 +11,8 @@ from scipy.special import ndtr, ndtri
 
 from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.correlation import Correlation
+from tolalloc.uncertainty.distributions import ABOVE_ZERO, BELOW_ONE
 from tolalloc.uncertainty.sources import Source
-
-_BELOW_ONE = float(np.nextafter(1.0, 0.0))
-"""Largest uniform number whose normal deviate is finite [-]."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,7 @@ class ErrorModel:
                 own = np.zeros_like(normal[0])
                 for other, numbers in zip(block, normal, strict=True):
                     own += factor[..., source, other, np.newaxis] * numbers
-                mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), np.finfo(float).tiny, _BELOW_ONE)
+                mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), ABOVE_ZERO, BELOW_ONE)
         return mixed
 
     def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -92,10 +92,11 @@ class MeasuredParts:
 
     Notes
     -----
-    At another zone the parts are assumed to deviate in proportion to it.
+    At another zone the parts are assumed to deviate in proportion to it. The path stays out of the text of a record, so
+    that a digest of the same parts in another folder is the same.
     """
 
-    path: Path
+    path: Path = field(repr=False)
     values: tuple[float, ...]
     are_radii: bool
     zone: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
 
@@ -11,9 +11,16 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
-from tolalloc.uncertainty.distributions import LEVELS, NORMAL, RAYLEIGH, Distribution, Family, Marginal, Numbers
-
-_BELOW_ONE = float(np.nextafter(1.0, 0.0))
+from tolalloc.uncertainty.distributions import (
+    BELOW_ONE,
+    LEVELS,
+    NORMAL,
+    RAYLEIGH,
+    Distribution,
+    Family,
+    Marginal,
+    Numbers,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +108,7 @@ class Folded:
 
     def quantile(self, probability: Numbers) -> Numbers:
         """Return the values that are not exceeded with these probabilities [own unit]."""
-        from_zero = np.minimum(0.5 + 0.5 * probability, _BELOW_ONE)
+        from_zero = np.minimum(0.5 + 0.5 * probability, BELOW_ONE)
         return np.asarray(np.maximum(self.symmetric.quantile(from_zero), 0.0))
 
     def probability(self, value: Numbers) -> Numbers:
@@ -146,8 +153,15 @@ def smoothing_width(values: Float[np.ndarray, " part"]) -> float:
 
 
 def smoothed_magnitude(values: Float[np.ndarray, " part"]) -> Folded:
-    """Return the distribution of measured radii [largest radius]; mirrored at 0, none of them becomes negative."""
-    return Folded(smoothed(np.concatenate([values, -values]), smoothing_width(values)))
+    """Return the distribution of measured radii [largest radius].
+
+    Notes
+    -----
+    They are smoothed as deviations are and then mirrored at 0, so that none becomes negative. The mean square stays the
+    measured one; mean and standard deviation do as far as no part lies within the smoothing width of 0.
+    """
+    batches = smoothed(values, smoothing_width(values)).batches
+    return Folded(Mixture(NORMAL, batches + tuple(replace(batch, shift=-batch.shift) for batch in batches)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,6 +19,9 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 ANGULAR = ("tilt", "phase", "rotation")
 """Last part of the name of a source whose columns are angles."""
 
+_ROUNDING = 1e-9
+"""Mean of a deviation over its zone, up to which it is rounding [-]."""
+
 
 def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozenset[str]:
     """Return the columns that are taken as zero: those of a source that a pattern such as ``*.tilt`` names.
@@ -197,7 +200,8 @@ class Source:
         """What the zone became, where it became anything else."""
         mean, deviation = (number * self.zone / MICROMETRE for number in self.zone_mapping.moments)
         if self.feature is Feature.SIZE:
-            spread = f"{self._kind}, mean {mean:+.3g} µm off the middle, σ = {deviation:.3g} µm"
+            off = f"{mean:+.3g}" if abs(mean) > _ROUNDING * self.zone / MICROMETRE else "0"
+            spread = f"{self._kind}, mean {off} µm off the middle, σ = {deviation:.3g} µm"
         elif self.feature is Feature.POSITION:
             spread = f"radius {self._kind}, mean {mean:.3g} µm, σ = {deviation:.3g} µm, any phase"
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -116,8 +117,17 @@ def _read(path: Path) -> pd.DataFrame:
     return frame.fillna("")
 
 
-def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
-    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
+def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.DataFrame:
+    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads.
+
+    Parameters
+    ----------
+    sources
+        The rows.
+    folder
+        Folder that the table is written to, from where its files of measured parts are named; without it they are named
+        in such a way that they are found from everywhere.
+    """
     rows = []
     for source in sources:
         zone, middle = source.zone / MICROMETRE, source.middle / MICROMETRE
@@ -136,7 +146,7 @@ def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
                 "shift": source.shift,
                 "shape": source.shape or "",
                 "batches": batches_text(source.batches),
-                "measured": source.measured.path.as_posix() if source.measured else "",
+                "measured": _path_from(folder, source.measured.path) if source.measured else "",
                 "measured_zone": source.measured.zone / MICROMETRE if source.measured else "",
                 "sorted": "yes" if source.sorted else "no",
                 "process": source.process,
@@ -153,6 +163,11 @@ def table_frame(sources: Sequence[Source]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows).rename(columns=HEADERS)
+
+
+def _path_from(folder: Path | None, path: Path) -> str:
+    """Return the path as it is written into a table of this folder, or absolute without one."""
+    return (Path(os.path.relpath(path, folder.resolve())) if folder else path).as_posix()
 
 
 def with_zones(sources: Sequence[Source], zones: Sequence[float]) -> tuple[Source, ...]:

@@ -16,7 +16,17 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from tolalloc.uncertainty.distributions import INSIDE_AT_CP_1, RAYLEIGH, Distribution, Marginal, Placed, Sorted, moments
+from tolalloc.uncertainty.distributions import (
+    ABOVE_ZERO,
+    BELOW_ONE,
+    INSIDE_AT_CP_1,
+    RAYLEIGH,
+    Distribution,
+    Marginal,
+    Placed,
+    Sorted,
+    moments,
+)
 
 Spectrum = tuple[tuple[int, float], ...]
 """Order of the turn and relative amplitude, one pair per harmonic."""
@@ -63,7 +73,7 @@ def harmonic_range_quantile(spectrum: Spectrum, teeth: int = 0, base: Marginal =
         return 2.0 * base.reach * spectrum[0][1]
     uniform = qmc.Sobol(2 * len(spectrum), rng=np.random.default_rng(1)).random_base2(15 if teeth else 14)
     turn = _waves_over_turn(spectrum, teeth)
-    columns = ndtri(uniform) if base == RAYLEIGH else _vectors(base.quantile(uniform[:, 0::2]), uniform[:, 1::2])
+    columns = ndtri(uniform) if base == RAYLEIGH else _isotropic(base, uniform)
     weights = np.repeat([amplitude for _, amplitude in spectrum], 2)
     ranges = [np.ptp((part * weights) @ turn, axis=1) for part in np.split(columns, columns.shape[0] // 2048)]
     return float(np.quantile(np.concatenate(ranges), INSIDE_AT_CP_1))
@@ -83,6 +93,22 @@ def _vectors(
     phase = 2 * np.pi * uniform
     pairs = np.stack([magnitude * np.cos(phase), magnitude * np.sin(phase)], axis=-1)
     return pairs.reshape(uniform.shape[0], -1)
+
+
+def _isotropic(magnitude: Marginal, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+    """Return both components of vectors of random magnitude at any phase, for independent uniform numbers in (0, 1).
+
+    Notes
+    -----
+    The two normal numbers of a vector give its direction; the probability of their length, Rayleigh's, gives the
+    magnitude. So a vector turns and grows with its normal numbers, and vectors whose normal numbers are correlated
+    point alike, as normal ones do, however the axes lie.
+    """
+    normal = ndtri(uniform).reshape(uniform.shape[0], -1, 2)
+    length = np.hypot(normal[..., 0], normal[..., 1])
+    share = np.clip(-np.expm1(-(length**2) / 2.0), ABOVE_ZERO, BELOW_ONE)
+    direction = normal / np.maximum(length, ABOVE_ZERO)[..., np.newaxis]
+    return np.asarray((direction * magnitude.quantile(share)[..., np.newaxis]).reshape(uniform.shape))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,10 +191,9 @@ class ZoneMapping:
         """Return the columns' deviations per unit of zone for independent uniform numbers in (0, 1)."""
         if self.feature is Feature.SIZE:
             return np.asarray(self.marginal.quantile(uniform) / 2.0)
-        if self.marginal == RAYLEIGH:  # a normal number on each axis is the same, and needs no phase
+        if self.marginal == RAYLEIGH:  # the normal numbers are the vectors
             return np.asarray(ndtri(uniform) * (self.wave_deviation * np.repeat(self.amplitudes, 2)))
-        magnitude = self.marginal.quantile(uniform[:, 0::2]) * self.amplitudes / (self.extent * self.cp)
-        return _vectors(magnitude, uniform[:, 1::2])
+        return _isotropic(self.marginal, uniform) * np.repeat(self.amplitudes / (self.extent * self.cp), 2)
 
     def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases.

@@ -83,12 +83,12 @@ def _orders(results: RankingResults) -> tuple[str, ...]:
 
 def _rejects(results: RankingResults) -> tuple[str, ...]:
     """Return what drives the units out."""
-    found, at = results.reject, int(np.argmax(results.reject.lift))
+    found, at = results.reject, int(np.argmax(results.reject.excess))
     where = f"the limit of {found.threshold:g}″" if found.is_limit else f"{found.threshold:.1f}″, the worst 5 %"
     low, high = found.lift_interval[:, at]
     return (
-        f"Beyond {where} ({found.outside} of {found.units} units), {found.sources[at]} stands out most: its mean "
-        f"square deviation is {found.lift[at]:.2f} ({low:.2f}…{high:.2f}) times that of all units.",
+        f"Beyond {where} ({found.outside} of {found.units} units), {found.sources[at]} takes part most: the mean "
+        f"square of its deviations is {found.lift[at]:.2f} ({low:.2f}…{high:.2f}) times that of all units.",
     )
 
 

@@ -95,24 +95,24 @@ def sample_figure(results: RankingResults) -> Figure:
 
 
 def reject_figure(results: RankingResults) -> Figure:
-    """Draw how much larger the deviations of the units outside are."""
+    """Draw how much larger the deviations of the units outside are, summed over the columns of each source."""
     frame = limit_tables.reject_table(results).head(_SHOWN // 2)
     return Figure(
         name="rejects",
         title="What the units outside have in common",
-        x_label="mean square deviation outside over that of all units [-]",
+        x_label="mean square deviation outside beyond that of all units, sum over columns [-]",
         y_label="",
         series=(
             Series(
-                label="lift with its 90 % interval",
+                label="excess with its 90 % interval",
                 kind="bars",
                 x=list(frame["source"]),
-                y=list(frame["lift [-]"]),
-                low=list(frame["lift low 5 % [-]"]),
-                high=list(frame["lift high 95 % [-]"]),
+                y=list(frame["excess [-]"]),
+                low=list(frame["excess low 5 % [-]"]),
+                high=list(frame["excess high 95 % [-]"]),
             ),
         ),
-        vertical=((1.0, "no part"),),
+        vertical=((0.0, "no part"),),
     )
 
 

@@ -102,10 +102,14 @@ def stack_up_table(results: RankingResults) -> pd.DataFrame:
 def reject_table(results: RankingResults) -> pd.DataFrame:
     """Return what the units outside have in common, the strongest source first."""
     found = results.reject
-    first, lift = found.first_interval, found.lift_interval
+    first, lift, excess = found.first_interval, found.lift_interval, found.excess_interval
     frame = pd.DataFrame(
         {
             "source": found.sources,
+            "excess [-]": found.excess,
+            "excess low 5 % [-]": excess[0],
+            "excess high 95 % [-]": excess[1],
+            "columns [-]": found.columns,
             "lift [-]": found.lift,
             "lift low 5 % [-]": lift[0],
             "lift high 95 % [-]": lift[1],
@@ -117,7 +121,7 @@ def reject_table(results: RankingResults) -> pd.DataFrame:
             "median outside [µm]": found.median_outside / MICROMETRE,
         }
     )
-    return frame.sort_values("lift [-]", ascending=False, kind="stable").reset_index(drop=True)
+    return frame.sort_values("excess [-]", ascending=False, kind="stable").reset_index(drop=True)
 
 
 def inverse_table(results: RankingResults) -> pd.DataFrame:
