@@ -5,8 +5,8 @@ tolalloc rank studies/rv20e_sensitivity.py --quick
 
 import sys
 
+from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import main
-from tolalloc.sensitivity.capability import Limits
 from tolalloc.study.definition import Study
 
 study = Study(

@@ -188,7 +188,7 @@ def test_a_limit_on_an_unknown_output_names_the_known_ones(tmp_path):
     text = script.read_text(encoding="utf-8").replace(
         "Study(", "Study(other_limits={'lost motoin [arcmin]': Limits(upper=1.0)}, "
     )
-    script.write_text("from tolalloc.sensitivity.capability import Limits\n" + text, encoding="utf-8")
+    script.write_text("from tolalloc.capability.indices import Limits\n" + text, encoding="utf-8")
     result = tolalloc("rank", script, "--quick", "--out", tmp_path / "report")
     assert result.returncode == 2
     assert "other_limits" in result.stderr and "lost motion [arcmin]" in result.stderr

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.capability import (
+from tolalloc.capability.indices import (
     Limits,
     capability,
     defects_per_million_opportunities,
     quantile_interval,
     wilson_interval,
 )
+from tolalloc.exceptions import InputError
 
 SAMPLE = np.array([9.0, 11.0, 10.0, 12.0, 8.0, 10.0])
 """Mean 10, sum of squares 10, moving ranges 2 1 2 4 2, variances of its pairs 2 2 2."""

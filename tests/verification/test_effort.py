@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tolalloc.capability.monte_carlo import monte_carlo
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened import widened_sampling
+from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.exceptions import InputError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import monte_carlo
-from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
-from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
-from tolalloc.sensitivity.rare_failure.widened import widened_sampling
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.target import target_sensitivity
-from tolalloc.sensitivity.yield_at_limit import yield_at_limit
 from tolalloc.study.effort import QUICK, RankingEffort
 from tolalloc.surrogate.validation import answers_of
 from tolalloc.uncertainty.error_model import ErrorModel

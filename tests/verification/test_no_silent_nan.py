@@ -11,18 +11,18 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from tolalloc.capability.indices import Limits, capability, quantile_interval
+from tolalloc.capability.monte_carlo import monte_carlo
+from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
+from tolalloc.capability.rare_failure.importance import importance_sampling
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened import widened_sampling
+from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.capability import Limits, capability, quantile_interval
 from tolalloc.sensitivity.classical import classical_estimate
-from tolalloc.sensitivity.monte_carlo import monte_carlo
-from tolalloc.sensitivity.rare_failure.form import DesignPoints, design_point, design_points
-from tolalloc.sensitivity.rare_failure.importance import importance_sampling
-from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
-from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
-from tolalloc.sensitivity.rare_failure.widened import widened_sampling
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.sources import Source

@@ -9,17 +9,17 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
+from tolalloc.capability.rare_failure.form import design_point
+from tolalloc.capability.rare_failure.limit_state import LimitState, LimitStateWithGradient
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit, ResponseLimitWithGradient
+from tolalloc.capability.rare_failure.result import Level, RareFailure
+from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened import widened_sampling
+from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
 from tolalloc.exceptions import InputError
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import WithDerivatives
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo, proportion
-from tolalloc.sensitivity.rare_failure.form import design_point
-from tolalloc.sensitivity.rare_failure.limit_state import LimitState, LimitStateWithGradient
-from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit, ResponseLimitWithGradient
-from tolalloc.sensitivity.rare_failure.result import Level, RareFailure
-from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
-from tolalloc.sensitivity.rare_failure.widened import widened_sampling
-from tolalloc.sensitivity.yield_at_limit import log_normal_interval, yield_at_limit
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.correlation import Correlation, Pair
 from tolalloc.uncertainty.error_model import ErrorModel
@@ -191,7 +191,7 @@ def test_methods_that_contradict_each_other_are_not_relied_on(monkeypatch):
         found = widened_sampling(*arguments)
         return replace(found, probability=found.probability / 100, standard_error=found.standard_error / 100)
 
-    monkeypatch.setattr("tolalloc.sensitivity.yield_at_limit.widened_sampling", too_small)
+    monkeypatch.setattr("tolalloc.capability.yield_at_limit.widened_sampling", too_small)
     limit = limited(Radius, normals(2), 4.5)
     found = yield_at_limit(limit, units_of(limit, 0, 2000), SeedTree(0), samples=1000, runs=4)
     assert found.verdict.startswith("Do not rely on subset simulation")

@@ -9,8 +9,8 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import kstest, qmc
 
+from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import monte_carlo
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.sampling import SamplingDesign, uniform_chunk, uniform_chunks
 from tolalloc.uncertainty.seeds import CHUNK, SeedTree

@@ -10,9 +10,9 @@ from SALib.analyze import morris as salib_morris
 from SALib.sample import morris
 from scipy.stats import norm
 
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.uncertainty.correlation import Correlation, Pair
 from tolalloc.uncertainty.error_model import ErrorModel

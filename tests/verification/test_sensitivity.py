@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.capability.monte_carlo import allowed_rejections, monte_carlo, proportion
 from tolalloc.exceptions import SolveError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import allowed_rejections, monte_carlo, proportion
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.uncertainty.error_model import ErrorModel

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity
 from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.error_model import ErrorModel

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.quantile import LocalQuantile, local_quantile
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
 from tolalloc.response.kernel import KernelResponse, WithDerivatives
-from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import MICROMETRE
 

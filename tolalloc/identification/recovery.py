@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.capability.monte_carlo import Yield, proportion
 from tolalloc.identification.data import data_of
 from tolalloc.identification.gauss_newton import gauss_newton
 from tolalloc.identification.information import information
@@ -16,7 +17,6 @@ from tolalloc.identification.prediction import KernelPredictor
 from tolalloc.identification.problem import IdentificationProblem
 from tolalloc.identification.simulation import SimulatedBench
 from tolalloc.reducer.design import Reducer
-from tolalloc.sensitivity.monte_carlo import Yield, proportion
 from tolalloc.uncertainty.seeds import SeedTree
 
 

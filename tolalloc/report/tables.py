@@ -9,11 +9,11 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.capability.indices import Limits, quantile_interval
+from tolalloc.capability.indices import capability as sample_capability
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.report.results import StudyResults
 from tolalloc.report.sobol_table import sobol_table
-from tolalloc.sensitivity.capability import Limits, quantile_interval
-from tolalloc.sensitivity.capability import capability as sample_capability
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import with_zones
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE

@@ -47,3 +47,32 @@ class Response(Protocol):
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
         ...
+
+
+@runtime_checkable
+class Derived(Protocol):
+    """Answers with the derivative of the first output by every column."""
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """Outputs and status of every sample."""
+        ...
+
+    @property
+    def by_column(self) -> Float[np.ndarray, "sample column"]:
+        """Derivatives [output per unit of the column]."""
+        ...
+
+
+@runtime_checkable
+class ResponseWithDerivatives(Protocol):
+    """A response that knows its derivatives."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of X."""
+        ...
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
+        """Return the outputs of every sample and their derivatives."""
+        ...

@@ -1,1 +1,1 @@
-"""What matters: Sobol indices with confidence in the ranking, and the classical estimates beside them."""
+"""What drives an output: indices with the confidence of their ranking, and the measures beside them."""

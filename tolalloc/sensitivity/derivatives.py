@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.exceptions import SolveError
-from tolalloc.response.interface import Evaluation
-from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.response.interface import ResponseWithDerivatives
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.uncertainty.error_model import ErrorModel
@@ -20,35 +19,6 @@ from tolalloc.units import MICROMETRE
 
 _STEP = 1e-4
 """Step of the differences in standard normal space; rounding and curvature then both cost about 1e-8 [-]."""
-
-
-@runtime_checkable
-class Derived(Protocol):
-    """Answers with the derivative of the first output by every column."""
-
-    @property
-    def evaluation(self) -> Evaluation:
-        """Outputs and status of every sample."""
-        ...
-
-    @property
-    def by_column(self) -> Float[np.ndarray, "sample column"]:
-        """Derivatives [output per unit of the column]."""
-        ...
-
-
-@runtime_checkable
-class ResponseWithDerivatives(Protocol):
-    """A response that knows its derivatives."""
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the inputs, in the order of X."""
-        ...
-
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
-        """Return the outputs of every sample and their derivatives."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from tolalloc.capability.indices import quantile_interval
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Response
-from tolalloc.sensitivity.capability import quantile_interval
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.seeds import SeedTree
 

@@ -16,9 +16,9 @@ from SALib.analyze.delta import calc_delta
 from SALib.sample import morris
 
 from tolalloc.blas import one_blas_thread
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.response.interface import Response
-from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures

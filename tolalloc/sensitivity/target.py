@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.sensitivity.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.limited_measure import limited_measure

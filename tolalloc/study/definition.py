@@ -10,6 +10,8 @@ from pathlib import Path
 
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
 from tolalloc.allocation.verification import Requirement
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.model import EquivalentModel
@@ -20,8 +22,6 @@ from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.kernel import KernelResponse
 from tolalloc.response.outputs import OTHER_OUTPUTS
 from tolalloc.response.stiffness import stiffness_source
-from tolalloc.sensitivity.capability import Limits
-from tolalloc.sensitivity.monte_carlo import allowed_rejections
 from tolalloc.study.effort import Effort
 from tolalloc.uncertainty.correlated import CorrelatedSource
 from tolalloc.uncertainty.correlation import Correlation

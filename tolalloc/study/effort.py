@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
+from tolalloc.capability import yield_at_limit
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity import screening, target, yield_at_limit
+from tolalloc.sensitivity import screening, target
 from tolalloc.sensitivity.sobol import SobolEffort
 from tolalloc.surrogate import validation
 from tolalloc.uncertainty.sampling import SamplingDesign

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
-from tolalloc.sensitivity.capability import Limits
 from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
 from tolalloc.sensitivity.derivatives import (
     DerivativeMeasures,
@@ -16,8 +19,6 @@ from tolalloc.sensitivity.derivatives import (
     local_derivatives,
 )
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
-from tolalloc.sensitivity.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
 from tolalloc.sensitivity.screening import (
     ElementaryEffects,
     MomentIndependent,
@@ -28,7 +29,6 @@ from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import Player, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
-from tolalloc.sensitivity.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.study.definition import Prepared
 from tolalloc.study.effort import RankingEffort
 from tolalloc.surrogate.choice import Choice, choose

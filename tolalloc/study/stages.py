@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
+from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.cycloid.assessment import Assessment, assess
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.equivalent.outputs import order_spectrum
@@ -25,7 +26,6 @@ from tolalloc.report.results import ExampleUnit, StudyResults
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
 from tolalloc.sensitivity.classical import classical_estimate
-from tolalloc.sensitivity.monte_carlo import MonteCarlo
 from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from tolalloc.capability.indices import Limits, capability, quantile_interval
+from tolalloc.capability.monte_carlo import proportion
 from tolalloc.report.ranking.results import RankingResults
-from tolalloc.sensitivity.capability import Limits, capability, quantile_interval
-from tolalloc.sensitivity.monte_carlo import proportion
 from tolalloc.units import MICROMETRE
 
 

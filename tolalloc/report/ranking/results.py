@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import MonteCarlo
+from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.reducer.design import Reducer
-from tolalloc.sensitivity.capability import Limits
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.derivatives import DerivativeMeasures, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
-from tolalloc.sensitivity.monte_carlo import MonteCarlo
 from tolalloc.sensitivity.order_contribution import OrderContribution
 from tolalloc.sensitivity.ranking import Reproduction
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 from tolalloc.sensitivity.target import TargetSensitivity
-from tolalloc.sensitivity.yield_at_limit import YieldAtLimit
 from tolalloc.surrogate.choice import Choice
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.sampling import SamplingDesign

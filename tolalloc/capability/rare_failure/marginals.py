@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import log_ndtr, ndtr
 
+from tolalloc.capability.rare_failure.limit_state import LimitValues
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.rare_failure.limit_state import LimitValues
 
 
 @runtime_checkable

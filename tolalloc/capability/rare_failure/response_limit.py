@@ -9,9 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr
 
-from tolalloc.response.interface import Response
-from tolalloc.sensitivity.derivatives import ResponseWithDerivatives
-from tolalloc.sensitivity.rare_failure.limit_state import LimitValues
+from tolalloc.capability.rare_failure.limit_state import LimitValues
+from tolalloc.response.interface import Response, ResponseWithDerivatives
 from tolalloc.uncertainty.error_model import ErrorModel
 
 _STEP = 1e-3

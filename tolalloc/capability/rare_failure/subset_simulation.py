@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
+from tolalloc.capability.rare_failure.result import Level, RareFailure
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState, LimitState
-from tolalloc.sensitivity.rare_failure.result import Level, RareFailure
 from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Subset simulation"

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.capability.rare_failure.importance import FEWEST_EFFECTIVE_SAMPLES
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
+from tolalloc.capability.rare_failure.result import RareFailure
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.rare_failure.importance import FEWEST_EFFECTIVE_SAMPLES
-from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState, LimitState
-from tolalloc.sensitivity.rare_failure.result import RareFailure
 from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Widened sampling"

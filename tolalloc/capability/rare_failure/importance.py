@@ -9,10 +9,10 @@ from jaxtyping import Float, Int
 from scipy.optimize import minimize_scalar
 from scipy.special import log_ndtr, logsumexp, ndtr
 
+from tolalloc.capability.rare_failure.form import DesignPoint, DesignPoints
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
+from tolalloc.capability.rare_failure.result import RareFailure
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.rare_failure.form import DesignPoint, DesignPoints
-from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState, LimitState
-from tolalloc.sensitivity.rare_failure.result import RareFailure
 from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Importance sampling"

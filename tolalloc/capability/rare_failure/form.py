@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr
 
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitStateWithGradient
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.rare_failure.limit_state import CountedLimitState, LimitState, LimitStateWithGradient
 from tolalloc.uncertainty.seeds import SeedTree
 
 _STEP = 1e-4

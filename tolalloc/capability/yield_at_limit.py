@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from tolalloc.exceptions import InputError
-from tolalloc.sensitivity.capability import (
+from tolalloc.capability.indices import (
     MILLION,
     Capability,
     Limits,
@@ -16,11 +15,12 @@ from tolalloc.sensitivity.capability import (
     capability,
     defects_per_million_opportunities,
 )
-from tolalloc.sensitivity.monte_carlo import CONFIDENCE, LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
-from tolalloc.sensitivity.rare_failure.response_limit import ResponseLimit
-from tolalloc.sensitivity.rare_failure.result import RareFailure
-from tolalloc.sensitivity.rare_failure.subset_simulation import subset_simulation
-from tolalloc.sensitivity.rare_failure.widened import widened_sampling
+from tolalloc.capability.monte_carlo import CONFIDENCE, LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.result import RareFailure
+from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened import widened_sampling
+from tolalloc.exceptions import InputError
 from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Monte Carlo"
