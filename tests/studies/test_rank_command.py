@@ -16,8 +16,8 @@ from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 ROOT = Path(__file__).parents[2]
 PEAK_TO_PEAK = "peak-to-peak transmission error"
-EFFORT = """effort=Effort(ranking=RankingEffort(units=2048, sobol=SobolEffort(start=256, limit=256), trajectories=8,
-    moment_units=512, derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2,
+EFFORT = """effort=Effort(ranking=RankingEffort(units=2048, trajectories=8,
+    sobol=SobolEffort(start=256, limit=256, second_order=True), moment_units=512, derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2,
     widened_units=500, permutations=200))"""
 
 
@@ -77,6 +77,14 @@ def test_the_report_is_complete(ranked):
     ):
         assert heading in page
     assert "<script src" not in page
+
+
+def test_pairs_say_what_errors_add_together(ranked):
+    pairs = pd.read_csv(ranked / "tables" / "pairs.csv")
+    assert len(pairs) == 15
+    assert (pairs["S2 low 5 % [-]"] <= pairs["second index S2 [-]"]).mean() > 0.9
+    # The two discs and the housing act together, pin and groove hardly at all.
+    assert "pin.diameter" not in set(pairs.iloc[0][["source", "with"]])
 
 
 def test_the_answer_for_programs_is_whole(ranked):

@@ -119,7 +119,7 @@ class Measures:
         orders
             Orders of the output turn [-].
         blocks
-            Number of blocks; as many as the ranking needs if 0 [-].
+            Number of blocks, without pairs; as many as the ranking needs if 0 [-].
         """
         errors, effort = self.errors, replace(self._effort.sobol, largest_failed_share=self._failed_share)
         readings = (*REQUIREMENTS, orders_reading(orders)) if orders else REQUIREMENTS
@@ -128,7 +128,7 @@ class Measures:
             errors,
             errors.zones,
             self._seeds(name),
-            replace(effort, start=blocks, limit=blocks) if blocks else effort,
+            replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
             Player.BLOCK if errors.is_correlated else Player.SOURCE,
             ranked=tuple(self.limits),
         )

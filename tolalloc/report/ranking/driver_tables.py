@@ -27,6 +27,24 @@ def ranking_table(results: RankingResults) -> pd.DataFrame:
     )
 
 
+def pairs_table(results: RankingResults) -> pd.DataFrame:
+    """Return what pairs of sources add only together, the largest first; empty unless second order was asked for."""
+    sobol = results.sobol.of(PEAK_TO_PEAK)
+    low, high = sobol.second_interval
+    return pd.DataFrame(
+        [
+            {
+                "source": sobol.sources[sobol.pairs[at][0]],
+                "with": sobol.sources[sobol.pairs[at][1]],
+                "second index S2 [-]": sobol.second[at],
+                "S2 low 5 % [-]": low[at],
+                "S2 high 95 % [-]": high[at],
+            }
+            for at in np.argsort(-sobol.second, kind="stable")
+        ]
+    )
+
+
 def overall_table(results: RankingResults) -> pd.DataFrame:
     """Return one ranking over all outputs with a limit: the largest total index of each source and where it has it."""
     overall, sobol = results.sobol.overall, results.sobol

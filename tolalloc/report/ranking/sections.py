@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from tolalloc.report.document import Section
 from tolalloc.report.ranking import driver_tables, figures, limit_tables, trust_tables
 from tolalloc.report.ranking.results import RankingResults
@@ -20,7 +22,11 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
                 "indices. Intervals of 90 % and places come from resampled blocks.",
             ),
             figures=(figures.ranking_figure(results),),
-            tables=(("ranking", driver_tables.ranking_table(results)), ("growth", driver_tables.growth_table(results))),
+            tables=(
+                ("ranking", driver_tables.ranking_table(results)),
+                *_pairs(results),
+                ("growth", driver_tables.growth_table(results)),
+            ),
         ),
         *_correlated(results),
         Section(
@@ -43,6 +49,12 @@ def driver_sections(results: RankingResults) -> tuple[Section, ...]:
             tables=(("orders", driver_tables.orders_table(results)),),
         ),
     )
+
+
+def _pairs(results: RankingResults) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """Return the table of pairs, if the study asked for it."""
+    pairs = driver_tables.pairs_table(results)
+    return () if pairs.empty else (("pairs", pairs),)
 
 
 def _correlated(results: RankingResults) -> tuple[Section, ...]:
