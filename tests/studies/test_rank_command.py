@@ -16,9 +16,10 @@ from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 ROOT = Path(__file__).parents[2]
 PEAK_TO_PEAK = "peak-to-peak transmission error"
-EFFORT = """effort=Effort(ranking=RankingEffort(units=2048, trajectories=8,
-    sobol=SobolEffort(start=256, limit=256, second_order=True), moment_units=512, derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2,
-    widened_units=500, permutations=200))"""
+EFFORT = """effort=Effort(ranking=RankingEffort(
+    units=2048, sobol=SobolEffort(start=256, limit=256, second_order=True), trajectories=8, moment_units=512,
+    derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2, widened_units=500,
+    permutations=200))"""
 
 
 def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
