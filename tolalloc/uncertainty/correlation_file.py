@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from itertools import combinations, permutations
 from pathlib import Path
 
-import pandas as pd
-
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.uncertainty.correlation import Correlation, Pair
 from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.table_file import read_table_file
 
 LIST_HEADERS = ("sources", "correlation", "note")
 
@@ -48,27 +46,12 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
 
 
 def _read(path: Path) -> list[Row]:
-    """Return the rows with text in every cell, the header first, or say what is wrong with the file as a whole."""
-    try:
-        if path.suffix.lower() in (".xlsx", ".xlsm"):
-            frame = pd.read_excel(path, header=None, dtype=str, keep_default_na=False)
-        else:
-            frame = pd.read_csv(
-                path, header=None, dtype=str, keep_default_na=False, skip_blank_lines=False, encoding="utf-8-sig"
-            )
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except (OSError, zipfile.BadZipFile, ValueError) as error:  # pandas' own errors are ValueErrors
-        reason = " ".join(str(error).split())
-        raise InputError(
-            f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? ({reason})."
-        ) from None
-    cells = frame.fillna("").to_numpy().tolist()
-    rows = [(f"{path}, row {number}", [str(cell).strip() for cell in row]) for number, row in enumerate(cells, start=1)]
-    kept = [row for row in rows if any(row[1])]
-    if len(kept) < 2:
+    """Return the rows with their places, the header first."""
+    frame = read_table_file(path)
+    if len(frame) < 2:
         raise InputError(f"{path}: the table has no rows below its header; a list or a matrix is needed.")
-    return kept
+    cells = frame.to_numpy().tolist()
+    return [(f"{path}, row {number + 1}", row) for number, row in zip(frame.index, cells, strict=True)]
 
 
 def _pairs_of_list(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path, validated
 from tolalloc.uncertainty.process_capability import load_process_capabilities, with_process
 from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.table_file import read_table_file
 from tolalloc.uncertainty.tolerance_cells import batches_text, spectrum_text, typed_cells
 from tolalloc.uncertainty.tolerance_row import ToleranceRow
 from tolalloc.uncertainty.unit_file import DATA
@@ -75,7 +75,7 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
     processes = load_process_capabilities(capabilities)
     sources: dict[str, Source] = {}
-    for number, row in enumerate(frame.to_dict("records"), start=2):
+    for number, row in zip(frame.index + 1, frame.to_dict("records"), strict=True):
         identity = str(row.get("id", "")).strip()
         place = f"{path}, row {number} ({identity or 'no id'})"
         cells = typed_cells(ToleranceRow, {str(key): str(value) for key, value in row.items()}, place)
@@ -90,31 +90,16 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
 
 
 def _read(path: Path) -> pd.DataFrame:
-    """Return the table as text with bare headers, or say what is wrong with the file as a whole."""
-    try:
-        if path.suffix.lower() in (".xlsx", ".xlsm"):
-            frame = pd.read_excel(path, dtype=str, keep_default_na=False)
-        else:
-            frame = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8-sig", index_col=False)
-    except (
-        pd.errors.ParserError,
-        pd.errors.EmptyDataError,
-        UnicodeDecodeError,
-        zipfile.BadZipFile,
-        ValueError,
-    ) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(
-            f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? ({reason})."
-        ) from None
-    frame.columns = [str(header).split(" [")[0].strip() for header in frame.columns]
+    """Return the table as text with bare headers, or say what is wrong with it as a whole."""
+    cells = read_table_file(path)
+    frame = cells.iloc[1:].set_axis([header.split(" [")[0].strip() for header in cells.iloc[0]], axis="columns")
     for header in frame.columns:
         if header not in HEADERS:
             raise UnknownNameError.among(path, "column", header, HEADERS)
     for header in REQUIRED:
         if header not in frame.columns:
             raise InputError(f"{path}: the column {header!r} is missing; needed are {', '.join(REQUIRED)}.")
-    return frame.fillna("")
+    return frame
 
 
 def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.DataFrame:
