@@ -23,8 +23,9 @@ from tolalloc.measurement.readings import (
     read_column,
 )
 from tolalloc.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.uncertainty.table_file import read_text_table
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
-from tolalloc.uncertainty.unit_table import load_units, read_text_table, unit_names
+from tolalloc.uncertainty.unit_table import load_units, unit_names
 from tolalloc.units import ARCSECOND, DEGREE
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.unit_table import TextTable, read_text_table, split_header
+from tolalloc.uncertainty.table_file import TextTable, read_text_table, split_header
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
 MISSING = ("", "nan", "na", "n/a", "-", "inf", "+inf", "-inf")

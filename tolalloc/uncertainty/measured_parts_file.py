@@ -9,7 +9,8 @@ import numpy as np
 
 from tolalloc.exceptions import InputError
 from tolalloc.uncertainty.measured_parts import MeasuredParts
-from tolalloc.uncertainty.unit_table import LARGEST_LENGTH, TextTable, read_text_table, split_header
+from tolalloc.uncertainty.table_file import TextTable, read_text_table, split_header
+from tolalloc.uncertainty.unit_table import LARGEST_LENGTH
 from tolalloc.uncertainty.zones import Feature
 from tolalloc.units import MICROMETRE
 

@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, shipped_or_path, validated
 from tolalloc.uncertainty.distributions import Distribution
+from tolalloc.uncertainty.table_file import read_text_table, split_header
 from tolalloc.uncertainty.tolerance_cells import require_shape, typed_cells
 from tolalloc.uncertainty.unit_file import DATA
-from tolalloc.uncertainty.unit_table import read_text_table, split_header
 from tolalloc.uncertainty.zones import Feature
 
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
