@@ -9,6 +9,7 @@ import pytest
 
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.equivalent.outputs import order_spectrum
+from tolalloc.equivalent.status import Status, count_statuses
 from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.seeds import SeedTree
@@ -78,3 +79,12 @@ def test_a_failed_reading_fails_its_sample_alone(prepared, x):
     found = response(x)
     assert np.flatnonzero(~found.good).tolist() == [3]
     assert np.concatenate(seen).tolist() == found.status.tolist()
+
+
+def test_a_failed_unit_has_a_status_that_reports_count(response, x):
+    broken = x.copy()
+    broken[2, 0] = np.nan
+    found = response(broken)
+    assert np.flatnonzero(~found.good).tolist() == [2]
+    assert Status(int(found.status[2])) is Status.NOT_FINITE
+    assert sum(count_statuses(found.status).values()) == found.status.size

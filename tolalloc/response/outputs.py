@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.outputs import OUTPUTS, Solved, waves
+from tolalloc.equivalent.status import Status
 from tolalloc.response.chunks import map_chunks
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
@@ -21,9 +22,6 @@ Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 _EVERY = 9
 """The loop and the forces are read at every so many of the angles at which a single loop is drawn [-]."""
 _ANGLES = LOOP_ANGLES[::_EVERY]
-
-_NOT_FINITE = np.uint8(255)
-"""Status of a sample whose loop has no answer at some torque; the loop keeps no status of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +50,9 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
     values = np.stack(
         [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE], axis=1
     )
-    return values, np.where(np.isfinite(values).all(axis=1), 0, _NOT_FINITE).astype(np.uint8)
+    # A loop keeps no statuses: an angle without an equilibrium is not a number in it.
+    status = np.where(np.isfinite(values).all(axis=1), Status.CONVERGED, Status.NOT_CONVERGED)
+    return values, status.astype(np.uint8)
 
 
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
