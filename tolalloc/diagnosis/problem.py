@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
 
 from tolalloc.diagnosis.readings import Readings
 from tolalloc.equivalent.answers import Equilibria
@@ -17,7 +16,6 @@ from tolalloc.response.chunks import map_chunks
 from tolalloc.response.kernel import KernelResponse
 from tolalloc.uncertainty.error_model import ErrorModel
 
-_TINY, _BELOW_ONE = np.finfo(float).tiny, np.nextafter(1.0, 0.0)
 _STEP = 1e-4
 """Step of the standard normal numbers in the derivative of the deviations, which are smooth in them [-]."""
 
@@ -71,8 +69,7 @@ class CurveProblem:
 
     def deviations(self, numbers: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] for standard normal numbers."""
-        uniform = np.clip(ndtr(numbers), _TINY, _BELOW_ONE)
-        return self.errors.deviations(self.errors.standard_values(uniform), self.zones)
+        return self.errors.deviations_of_normal(numbers, self.zones)
 
     def curves(self, deviations: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample angle"]:
         """Return the transmission error at the angles of the readings, not a number where one angle failed [rad]."""

@@ -179,3 +179,14 @@ class ErrorModel:
         middles = [*(source.middle / source.lever for source in self.active), *(0.0 for _ in self.joint)]
         middle = np.repeat(middles, counts)
         return np.asarray(standard * np.repeat(zones, counts) + middle)
+
+    def deviations_of_normal(
+        self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns [m, angles rad] that are as probable as independent standard normal numbers.
+
+        Notes
+        -----
+        Beyond 8.2 standard deviations the uniform numbers reach 1 as closely as they can, and the deviations stay.
+        """
+        return self.deviations(self.standard_values(np.clip(ndtr(numbers), ABOVE_ZERO, BELOW_ONE)), zones)

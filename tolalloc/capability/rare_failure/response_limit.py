@@ -7,7 +7,6 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
 
 from tolalloc.capability.rare_failure.limit_state import LimitValues
 from tolalloc.response.interface import Response, ResponseWithDerivatives
@@ -15,7 +14,6 @@ from tolalloc.uncertainty.error_model import ErrorModel
 
 _STEP = 1e-3
 """Step of the differences in standard normal space; up to 6, rounding and curvature both cost less than 1e-4 [-]."""
-_ABOVE_ZERO, _BELOW_ONE = float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
 
 
 @runtime_checkable
@@ -37,10 +35,6 @@ class ResponseLimit:
         Zones of the active sources [m].
     limit
         Largest output allowed [output].
-
-    Notes
-    -----
-    Beyond 8.2 standard deviations the uniform numbers reach 1 as closely as they can, and the deviations stay.
     """
 
     response: Response
@@ -55,8 +49,7 @@ class ResponseLimit:
 
     def deviations(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
         """Return the deviations that are as probable as the standard normal numbers [m, angles rad]."""
-        uniform = np.clip(ndtr(u), _ABOVE_ZERO, _BELOW_ONE)
-        return self.errors.deviations(self.errors.standard_values(uniform), self.zones)
+        return self.errors.deviations_of_normal(u, self.zones)
 
     def __call__(self, u: Float[np.ndarray, "sample variable"]) -> LimitValues:
         """Return the distance of every sample from the limit [output]."""
