@@ -9,10 +9,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import gumbel_r, kstest, lognorm, norm, uniform
 
+from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
 from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
 from tolalloc.capability.rare_failure.importance import importance_sampling
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitValues
-from tolalloc.capability.rare_failure.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.uncertainty.seeds import SeedTree
