@@ -88,6 +88,19 @@ def test_pairs_say_what_errors_add_together(ranked):
     assert "pin.diameter" not in set(pairs.iloc[0][["source", "with"]])
 
 
+def test_every_measure_lies_in_its_interval(ranked):
+    measures = pd.read_csv(ranked / "tables" / "measures.csv")
+    for name, value in (
+        ("bound", "bound of ST by derivatives [-]"),
+        ("mu*", "Morris mu* [arcsec]"),
+        ("delta", "delta [-]"),
+    ):
+        (low,) = [header for header in measures if header.startswith(f"{name} low 5 %")]
+        (high,) = [header for header in measures if header.startswith(f"{name} high 95 %")]
+        assert measures[value].between(measures[low], measures[high]).all(), name
+        assert (measures[high] > measures[low]).all(), name
+
+
 def test_the_answer_for_programs_is_whole(ranked):
     answer = json.loads((ranked / "summary.json").read_text(encoding="utf-8"))
     assert len(answer["ranking"]) == 6

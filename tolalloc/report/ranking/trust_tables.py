@@ -13,13 +13,21 @@ from tolalloc.units import MICROMETRE
 def measures_table(results: RankingResults) -> pd.DataFrame:
     """Return every measure of every source side by side, in the order of the total index."""
     sobol, local = results.sobol.of(PEAK_TO_PEAK), results.local
+    effects, moments = results.effects, results.moments
+    spread, distance = effects.mu_star_interval(0), moments.delta_interval
     columns = {
         "total index ST [-]": (sobol.sources, sobol.total),
         "bound of ST by derivatives [-]": (results.derivatives.sources, results.derivatives.bound),
-        "Morris mu* [arcsec]": (results.effects.sources, results.effects.mu_star[0]),
-        "Morris sigma [arcsec]": (results.effects.sources, results.effects.sigma[0]),
-        "PAWN [-]": (results.moments.sources, results.moments.pawn),
-        "delta [-]": (results.moments.sources, results.moments.delta),
+        "bound low 5 % [-]": (results.derivatives.sources, results.derivatives.bound_interval[0]),
+        "bound high 95 % [-]": (results.derivatives.sources, results.derivatives.bound_interval[1]),
+        "Morris mu* [arcsec]": (effects.sources, effects.mu_star[0]),
+        "mu* low 5 % [arcsec]": (effects.sources, spread[0]),
+        "mu* high 95 % [arcsec]": (effects.sources, spread[1]),
+        "Morris sigma [arcsec]": (effects.sources, effects.sigma[0]),
+        "PAWN [-]": (moments.sources, moments.pawn),
+        "delta [-]": (moments.sources, moments.delta),
+        "delta low 5 % [-]": (moments.sources, distance[0]),
+        "delta high 95 % [-]": (moments.sources, distance[1]),
         "Sens at nominal [arcsec/µm]": (local.sources, local.at_nominal),
         "Sens, root mean square [arcsec/µm]": (local.sources, local.root_mean_square),
         "alone at its limit [arcsec]": (results.classical.sources, results.classical.alone),
