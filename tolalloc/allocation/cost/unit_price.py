@@ -1,0 +1,194 @@
+"""What a good unit costs: quality loss, scrap, rework and inspection, and the yield that makes it cheapest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError, SolveError
+
+
+@dataclass(frozen=True, kw_only=True)
+class QualityLoss:
+    """What a unit costs its user although it is within its limit, growing with the square of the deviation.
+
+    Parameters
+    ----------
+    limit
+        Deviation from the best value at which the loss is `at_limit` [unit of the output].
+    at_limit
+        Loss of a unit at the limit, such as its repair [cost units].
+
+    Raises
+    ------
+    InputError
+        A limit that is not above 0, or a loss below 0.
+
+    References
+    ----------
+    G. Taguchi, E. A. Elsayed, T. C. Hsiang, Quality Engineering in Production Systems, McGraw-Hill (1989).
+    """
+
+    limit: float
+    at_limit: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.limit) and self.limit > 0):
+            raise InputError.at("quality loss", "limit", self.limit, "a finite number above 0")
+        if not (isfinite(self.at_limit) and self.at_limit >= 0):
+            raise InputError.at("quality loss", "at_limit", self.at_limit, "a finite number, 0 or above")
+
+    def nominal_is_best(self, offset: float, deviation: float) -> float:
+        """Return the mean loss per unit where the nominal value is best [cost units].
+
+        Parameters
+        ----------
+        offset
+            Mean less nominal value [unit of the output].
+        deviation
+            Standard deviation [unit of the output].
+        """
+        return self.at_limit / self.limit**2 * (offset**2 + deviation**2)
+
+    def smaller_is_better(self, mean: float, deviation: float) -> float:
+        """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units].
+
+        Parameters
+        ----------
+        mean, deviation
+            Mean and standard deviation [unit of the output].
+        """
+        return self.nominal_is_best(mean, deviation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnitPrice:
+    """What becomes of units beyond the limit, and so what a good unit costs.
+
+    Parameters
+    ----------
+    inspection
+        Inspecting one unit [cost units].
+    rework_share
+        Share of the units beyond the limit that rework makes good; the others are scrapped [-].
+    rework
+        Reworking one unit [cost units].
+    scrap
+        Scrapping one unit, beyond what making it cost [cost units].
+
+    Raises
+    ------
+    InputError
+        A cost below 0 or a share outside 0 to 1.
+    """
+
+    inspection: float = 0.0
+    rework_share: float = 0.0
+    rework: float = 0.0
+    scrap: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            largest = 1.0 if name == "rework_share" else np.inf
+            if not (isfinite(value) and 0 <= value <= largest):
+                allowed = "a number from 0 to 1" if name == "rework_share" else "a finite number, 0 or above"
+                raise InputError.at("price of a unit", name, value, allowed)
+
+    def good_share(self, target: float) -> float:
+        """Return the share of good units after rework [-].
+
+        Parameters
+        ----------
+        target
+            Yield before rework [-].
+
+        Raises
+        ------
+        InputError
+            A yield outside 0 to 1, or one that leaves no good unit.
+        """
+        good = target + (1 - target) * self.rework_share
+        if not (0 <= target <= 1 and good > 0):
+            raise InputError.at("price of a unit", "yield", target, "a share from 0 to 1 that leaves good units")
+        return good
+
+    def of_good_unit(self, manufacturing: float, target: float) -> float:
+        """Return what all units cost over the number of good ones [cost units].
+
+        Parameters
+        ----------
+        manufacturing
+            Making one unit, good or bad [cost units].
+        target
+            Yield before rework [-].
+
+        Raises
+        ------
+        InputError
+            As `good_share`.
+        """
+        beyond = self.rework_share * self.rework + (1 - self.rework_share) * self.scrap
+        return (manufacturing + self.inspection + (1 - target) * beyond) / self.good_share(target)
+
+
+@dataclass(frozen=True, kw_only=True)
+class YieldLadder:
+    """Prices of a good unit over yield targets.
+
+    Parameters
+    ----------
+    targets
+        Yield targets [-].
+    manufacturing
+        Cheapest unit made to each target; not a number where no design reaches it [cost units].
+    prices
+        Price of a good unit [cost units].
+    """
+
+    targets: Float[np.ndarray, " step"]
+    manufacturing: Float[np.ndarray, " step"]
+    prices: Float[np.ndarray, " step"]
+
+    @property
+    def best(self) -> float:
+        """Yield target with the cheapest good unit [-]."""
+        return float(self.targets[np.nanargmin(self.prices)])
+
+    @property
+    def unreached(self) -> int:
+        """Number of targets that no design reaches [-]."""
+        return int(np.isnan(self.manufacturing).sum())
+
+
+def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields: Sequence[float]) -> YieldLadder:
+    """Return the prices of a good unit over a ladder of yield targets; its `best` is the cheapest.
+
+    Parameters
+    ----------
+    cost_of_yield
+        Manufacturing cost of the cheapest design that keeps a yield, or not a number where none does.
+    price
+        What becomes of the units beyond the limit.
+    yields
+        Yield targets to choose from [-].
+
+    Raises
+    ------
+    InputError
+        There is no target, or one is no share.
+    SolveError
+        No design reaches any of the targets.
+    """
+    if not yields:
+        raise InputError.at("price of a unit", "yields", list(yields), "one target or more")
+    for target in yields:  # before anything long runs
+        price.good_share(target)
+    manufacturing = np.array([cost_of_yield(target) for target in yields], dtype=float)
+    prices = [price.of_good_unit(float(cost), target) for cost, target in zip(manufacturing, yields, strict=True)]
+    if np.isnan(manufacturing).all():
+        raise SolveError(f"No design reaches any of the yields {', '.join(f'{target:.4g}' for target in yields)}.")
+    return YieldLadder(targets=np.array(yields, dtype=float), manufacturing=manufacturing, prices=np.array(prices))
