@@ -1,0 +1,204 @@
+"""The convex program: least cost for one choice of processes, compiled once and solved for many stacks."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
+
+import cvxpy as cp
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.allocation.program.certificate import cost_bound
+from tolalloc.allocation.program.least_infeasible import LeastInfeasible, least_infeasible
+from tolalloc.allocation.program.priced_cost import convex_cost
+from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Solution, Stack
+from tolalloc.exceptions import SolveError
+
+_PRECISE = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-10}
+"""What the solver aims at first, on the scaled program: zones to about 1e-6 [-]."""
+_USUAL = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9}
+"""What it aims at where rounding keeps it from that [-]."""
+_REDUCED = {"reduced_tol_gap_abs": 1e-8, "reduced_tol_gap_rel": 1e-8, "reduced_tol_feas": 1e-8}
+"""What it may stop with [-]."""
+_ENOUGH = 1e-10
+"""Gap below which the certificate is not polished further [-]."""
+
+
+class _StackParameters(NamedTuple):
+    """One stack, divided by its scale, over zones divided by their units."""
+
+    adding: cp.Parameter
+    spreading: cp.Parameter
+    slopes: cp.Parameter
+    room: cp.Parameter
+
+
+class ConvexProgram:
+    """Least cost of features that are made by given processes, with every stack within its room.
+
+    Parameters
+    ----------
+    features
+        What is chosen.
+    processes
+        Position of the process of every feature.
+    stacks
+        Number of stacks that every solve brings.
+    shared
+        Variables that belong to no feature.
+
+    Raises
+    ------
+    InputError
+        A cost is not convex.
+
+    Notes
+    -----
+    Zones are counted in the geometric middle of their process's range, stacks in their room, costs in what they change
+    there, so the solver sees numbers of order one whatever the unit. The stacks and all bounds are parameters: cvxpy
+    compiles once.
+    """
+
+    def __init__(
+        self, features: Sequence[Feature], processes: Int[np.ndarray, " feature"], stacks: int, shared: Shared
+    ) -> None:
+        self.features, self.shared, self.processes = tuple(features), shared, processes
+        self._made = tuple(feature.processes[at] for feature, at in zip(features, processes, strict=True))
+        self.lower = np.array([process.minimum for process in self._made])
+        self.upper = np.array([process.maximum for process in self._made])
+        self._units = np.sqrt(self.lower * self.upper)
+        losses = np.array([feature.loss for feature in features]) * self._units**2
+        slopes = [float(made.cost.slope(np.array(unit))) for made, unit in zip(self._made, self._units, strict=True)]
+        self._cost_scale = float(np.abs(slopes) @ self._units + losses.sum()) or 1.0
+        count, shares = len(self.features), len(shared.names)
+        self._zones, self._shared = cp.Variable(count, pos=True), cp.Variable(shares)
+        self._bounds = [cp.Parameter(count) for _ in range(2)] + [cp.Parameter(shares) for _ in range(2)]
+        self._stacks = [
+            _StackParameters(
+                cp.Parameter(count, nonneg=True), cp.Parameter(count, nonneg=True), cp.Parameter(shares), cp.Parameter()
+            )
+            for _ in range(stacks)
+        ]
+        made = [
+            convex_cost(f"feature {feature.name}", process.rescaled(unit), self._zones[at])
+            for at, (feature, process, unit) in enumerate(zip(features, self._made, self._units, strict=True))
+        ]
+        cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
+        self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
+        self._kept = [self._load(stack) <= stack.room for stack in self._stacks]
+        around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]
+        self._problem = cp.Problem(cp.Minimize(cost), [*self._keeping, *self._kept, *around])
+
+    def _load(self, stack: _StackParameters) -> cp.Expression:
+        spread = cp.norm2(cp.multiply(stack.spreading, self._zones))
+        return stack.adding @ self._zones + spread + stack.slopes @ self._shared
+
+    def solve(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None = None,
+        upper: Float[np.ndarray, " feature"] | None = None,
+        shared_lower: Float[np.ndarray, " shared"] | None = None,
+        shared_upper: Float[np.ndarray, " shared"] | None = None,
+    ) -> Solution | None:
+        """Return the cheapest design within the bounds, or None where no design keeps all stacks.
+
+        Parameters
+        ----------
+        stacks
+            What must be kept.
+        lower, upper
+            Bounds of the zones, inside those of the processes unless they are given [unit of the zone].
+        shared_lower, shared_upper
+            Bounds of the shared variables.
+
+        Raises
+        ------
+        SolveError
+            The solver ended neither with a design nor with the proof that there is none.
+        """
+        problem = self._restricted(stacks, lower, upper, shared_lower, shared_upper)
+        if not least_infeasible(problem).feasible:
+            return None
+        units, scales, made = self._units, problem.scales, [feature.processes[0] for feature in problem.features]
+        low, high = np.array([each.minimum for each in made]), np.array([each.maximum for each in made])
+        # A shared variable that cannot move has no interior, and interior-point solvers stumble over it.
+        still = problem.shared.lower == problem.shared.upper
+        held = np.where(still, problem.shared.lower, 0.0)
+        around = (np.where(still, -1.0, problem.shared.lower), np.where(still, 1.0, problem.shared.upper))
+        for parameter, value in zip(self._bounds, (low / units, high / units, *around), strict=True):
+            parameter.value = value
+        for parameters, stack, scale in zip(self._stacks, stacks, scales, strict=True):
+            parameters.adding.value, parameters.spreading.value = (
+                stack.adding * units / scale,
+                stack.spreading * units / scale,
+            )
+            parameters.slopes.value = np.where(still, 0.0, stack.slopes) / scale
+            parameters.room.value = (stack.room - stack.slopes @ held) / scale
+        self._run()
+        return self._solution(problem, low, high)
+
+    def least_infeasible(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None = None,
+        upper: Float[np.ndarray, " feature"] | None = None,
+        shared_lower: Float[np.ndarray, " shared"] | None = None,
+        shared_upper: Float[np.ndarray, " shared"] | None = None,
+    ) -> LeastInfeasible:
+        """Return the design with the smallest largest overload; the arguments are those of `solve`."""
+        found = least_infeasible(self._restricted(stacks, lower, upper, shared_lower, shared_upper))
+        return replace(found, processes=self.processes)
+
+    def _restricted(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None,
+        upper: Float[np.ndarray, " feature"] | None,
+        shared_lower: Float[np.ndarray, " shared"] | None,
+        shared_upper: Float[np.ndarray, " shared"] | None,
+    ) -> AllocationProblem:
+        """Return the allocation whose only processes are the chosen ones, within the bounds."""
+        low = self.lower if lower is None else np.maximum(lower, self.lower)
+        high = self.upper if upper is None else np.minimum(upper, self.upper)
+        features = tuple(
+            replace(feature, processes=(replace(made, minimum=float(least), maximum=float(most)),))
+            for feature, made, least, most in zip(self.features, self._made, low, high, strict=True)
+        )
+        shared = replace(
+            self.shared,
+            lower=self.shared.lower if shared_lower is None else shared_lower,
+            upper=self.shared.upper if shared_upper is None else shared_upper,
+        )
+        return AllocationProblem(features=features, stacks=tuple(stacks), shared=shared)
+
+    def _run(self) -> None:
+        """Solve the compiled program, less precisely where it must be; how precisely shows in the gap."""
+        for settings in (_PRECISE, _USUAL):
+            with warnings.catch_warnings(), suppress(cp.SolverError):
+                warnings.simplefilter("ignore")
+                self._problem.solve(solver=cp.CLARABEL, **settings, **_REDUCED)
+                if self._problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+                    return
+        raise SolveError(f"The convex program of the allocation ended as {self._problem.status}.")
+
+    def _solution(
+        self, problem: AllocationProblem, low: Float[np.ndarray, " feature"], high: Float[np.ndarray, " feature"]
+    ) -> Solution:
+        zones = np.clip(self._zones.value * self._units, low, high)
+        cost = problem.cost(zones, np.zeros(zones.size, dtype=int))
+        prices = np.array([max(float(kept.dual_value), 0.0) for kept in self._kept]) * self._cost_scale / problem.scales
+        return Solution(
+            zones=zones,
+            processes=self.processes,
+            shared=np.clip(self._shared.value, problem.shared.lower, problem.shared.upper),
+            cost=cost,
+            bound=cost_bound(problem, prices, zones, enough=cost - _ENOUGH * abs(cost)),
+            prices=prices,
+            bound_prices=np.maximum(np.stack([side.dual_value for side in self._keeping], axis=1), 0.0)
+            * (self._cost_scale / self._units)[:, None],
+        )

@@ -1,0 +1,33 @@
+"""The exact front: the least cost for every room of one stack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.program.convex import ConvexProgram
+from tolalloc.allocation.program.problem import Solution, Stack
+
+
+def front(
+    program: ConvexProgram, stacks: Sequence[Stack], at: int, rooms: Float[np.ndarray, " point"]
+) -> tuple[Solution | None, ...]:
+    """Return the cheapest design for every room of one stack, None for a room that no design keeps.
+
+    Parameters
+    ----------
+    program
+        The compiled program.
+    stacks
+        All stacks; the rooms of the others stay.
+    at
+        Position of the stack [-].
+    rooms
+        Its rooms [unit of the stack].
+    """
+    return tuple(
+        program.solve([*stacks[:at], replace(stacks[at], room=float(room)), *stacks[at + 1 :]]) for room in rooms
+    )

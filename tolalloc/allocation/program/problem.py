@@ -1,0 +1,184 @@
+"""An allocation as a mathematical program: features to make, tolerance stacks to keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.allocation.cost.model import Process
+from tolalloc.exceptions import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Feature:
+    """One zone to be chosen: of one callout, or of a group of callouts that change together.
+
+    Parameters
+    ----------
+    name
+        Name of the feature or group.
+    processes
+        Ways to make it, one of which is chosen.
+    loss
+        Quality loss per zone², 0 or above [cost units per unit²].
+
+    Raises
+    ------
+    InputError
+        There is no process, or the loss is negative.
+    """
+
+    name: str
+    processes: tuple[Process, ...]
+    loss: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.processes:
+            raise InputError.at(f"feature {self.name}", "processes", "an empty list", "one process or more")
+        if not self.loss >= 0:
+            raise InputError.at(f"feature {self.name}", "loss", self.loss, "0 or above")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stack:
+    """A tolerance stack that must stay within its room: adding·zones + ‖spreading∘zones‖₂ + slopes·shared ≤ room.
+
+    Parameters
+    ----------
+    name
+        What the stack keeps.
+    adding
+        What a feature adds per zone in the worst case, 0 or above [unit of the stack per unit of the zone].
+    spreading
+        What a feature adds per zone in quadrature, 0 or above [unit of the stack per unit of the zone].
+    room
+        Largest value allowed [unit of the stack].
+    slopes
+        Change with the shared variables [unit of the stack per unit of the variable].
+
+    Raises
+    ------
+    InputError
+        A zone would relieve the stack.
+    """
+
+    name: str
+    adding: Float[np.ndarray, " feature"]
+    spreading: Float[np.ndarray, " feature"]
+    room: float
+    slopes: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        for name, weights in (("adding", self.adding), ("spreading", self.spreading)):
+            if not np.all(weights >= 0):
+                raise InputError.at(f"stack {self.name}", name, weights.tolist(), "numbers that are 0 or above")
+
+    def load(
+        self, zones: Float[np.ndarray, "*designs feature"], shared: Float[np.ndarray, "*designs shared"]
+    ) -> Float[np.ndarray, "*designs"]:
+        """Return the value of the stack [unit of the stack]."""
+        spread = np.sqrt(((self.spreading * zones) ** 2).sum(axis=-1))
+        return np.asarray(zones @ self.adding + spread + shared @ self.slopes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shared:
+    """Variables that move all stacks at once and cost nothing, such as the two clearances of the modification.
+
+    Parameters
+    ----------
+    names
+        Their names.
+    lower, upper
+        Their bounds, in a unit that makes them of order one [unit of the variable].
+    """
+
+    names: tuple[str, ...] = ()
+    lower: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
+    upper: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocationProblem:
+    """Features and stacks: least cost such that every stack stays within its room.
+
+    Parameters
+    ----------
+    features
+        What is chosen.
+    stacks
+        What must be kept.
+    shared
+        Variables that belong to no feature.
+    """
+
+    features: tuple[Feature, ...]
+    stacks: tuple[Stack, ...]
+    shared: Shared = field(default_factory=Shared)
+
+    @cached_property
+    def losses(self) -> Float[np.ndarray, " feature"]:
+        """Quality loss per zone² of every feature."""
+        return np.array([feature.loss for feature in self.features])
+
+    @cached_property
+    def scales(self) -> Float[np.ndarray, " stack"]:
+        """Size of every stack: its room, or a thousandth of its largest load where that is more [unit of the stack]."""
+        zones = np.array([max(made.maximum for made in feature.processes) for feature in self.features])
+        reach = np.maximum(np.abs(self.shared.lower), np.abs(self.shared.upper))
+        loads = [float(stack.load(zones, np.zeros(reach.size)) + np.abs(stack.slopes) @ reach) for stack in self.stacks]
+        return np.maximum(np.abs([stack.room for stack in self.stacks]), 1e-3 * np.array(loads))
+
+    def cost(self, zones: Float[np.ndarray, " feature"], processes: Int[np.ndarray, " feature"]) -> float:
+        """Return the cost of zones made by the processes at the given positions [cost units]."""
+        made = [
+            float(feature.processes[at].total(np.asarray(zone)))
+            for feature, zone, at in zip(self.features, zones, processes, strict=True)
+        ]
+        return sum(made) + float(self.losses @ zones**2)
+
+    def overload(
+        self, zones: Float[np.ndarray, " feature"], shared: Float[np.ndarray, " shared"]
+    ) -> Float[np.ndarray, " stack"]:
+        """Return by how much every stack exceeds its room, negative where it is kept [unit of the stack]."""
+        return np.array([float(stack.load(zones, shared)) - stack.room for stack in self.stacks])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """Zones and processes, with what proves how good they are.
+
+    Parameters
+    ----------
+    zones
+        Zone of every feature [unit of the zone].
+    processes
+        Position of the chosen process of every feature [-].
+    shared
+        Values of the shared variables [unit of the variable].
+    cost
+        Cost [cost units].
+    bound
+        Lower bound on the cost of every allowed choice, computed without the solver [cost units].
+    prices
+        Shadow price of every stack: cost saved per unit of room [cost units per unit of the stack].
+    bound_prices
+        Shadow price of the smallest and the largest zone of every feature: cost saved by moving that bound outwards
+        [cost units per unit of the zone].
+    """
+
+    zones: Float[np.ndarray, " feature"]
+    processes: Int[np.ndarray, " feature"]
+    shared: Float[np.ndarray, " shared"]
+    cost: float
+    bound: float
+    prices: Float[np.ndarray, " stack"]
+    bound_prices: Float[np.ndarray, "feature 2"]
+
+    @property
+    def gap(self) -> float:
+        """Cost over its lower bound, minus one [-]."""
+        return self.cost / self.bound - 1

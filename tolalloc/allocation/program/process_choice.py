@@ -1,0 +1,195 @@
+"""Which process makes every feature: branch and bound over all choices, proven by the Lagrange dual."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from tolalloc.allocation.program.alike_features import AlikeFeatures
+from tolalloc.allocation.program.certificate import ascend
+from tolalloc.allocation.program.convex import ConvexProgram
+from tolalloc.allocation.program.lagrange_dual import LagrangeDual, PricedProcesses
+from tolalloc.allocation.program.least_infeasible import LeastInfeasible, least_infeasible
+from tolalloc.allocation.program.problem import AllocationProblem, Solution
+from tolalloc.exceptions import SolveError
+
+_GAP = 1e-9
+"""Share of the cost by which a choice that is left out could be cheaper at most [-]."""
+
+Allowed = Bool[np.ndarray, " process"]
+
+
+def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | LeastInfeasible:
+    """Return the cheapest choice of processes and zones, with a bound over all choices.
+
+    Parameters
+    ----------
+    problem
+        The allocation.
+    most_nodes
+        Nodes after which the search ends with what it has; the gap of the solution says what is left [-].
+
+    Returns
+    -------
+    Solution or LeastInfeasible
+        The design that overloads the stacks least, where none keeps them all.
+
+    Raises
+    ------
+    InputError
+        A cost is not convex.
+    SolveError
+        The search ended before it found a design, or a convex program was not solved.
+    """
+    search = _Search(problem)
+    best = search.cheapest([np.ones(search.dual.feature.size, dtype=bool)], most_nodes)
+    if best is not None:
+        return best
+    closest = least_infeasible(problem)
+    if closest.feasible:
+        raise SolveError(f"No design was found within {most_nodes} nodes, though there are some.")
+    return closest
+
+
+def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 500) -> Solution | None:
+    """Return the cheapest design made by another set of processes than the best, or None if no other keeps the stacks.
+
+    Sets that differ only in which of several alike features takes which process count as one.
+
+    Parameters
+    ----------
+    problem
+        The allocation.
+    best
+        Its solution.
+    most_nodes
+        Nodes after which the search ends with what it has [-].
+
+    Raises
+    ------
+    InputError
+        A cost is not convex.
+    """
+    search = _Search(problem)
+    others, free = [], np.ones(search.dual.feature.size, dtype=bool)
+    for at, chosen in enumerate(search.dual.starts + best.processes):
+        differently = free.copy()
+        differently[chosen] = False
+        others.append(differently)
+        free[search.dual.feature == at] = False
+        free[chosen] = True
+    return search.cheapest(others, most_nodes)
+
+
+class _Search:
+    """Best-first branch and bound; every multiplier ever tried bounds every node.
+
+    Parameters
+    ----------
+    problem
+        The allocation.
+    """
+
+    def __init__(self, problem: AllocationProblem) -> None:
+        self.problem, self.dual, self._alike = problem, LagrangeDual(problem), AlikeFeatures(problem)
+        self._tried: list[PricedProcesses] = []
+        self._solved: dict[tuple[int, ...], Solution | None] = {}
+        self._best: Solution | None = None
+        zones = np.array([feature.processes[0].maximum for feature in problem.features])
+        self._add([self.dual.price(self.dual.span / problem.scales, self.dual.planes(zones))])
+
+    @property
+    def _enough(self) -> float:
+        """Bound from which on a node cannot hold anything cheaper [cost units]."""
+        return np.inf if self._best is None else self._best.cost - _GAP * abs(self._best.cost)
+
+    def cheapest(self, nodes: Iterable[Allowed], most_nodes: int) -> Solution | None:
+        """Return the cheapest design within the nodes, None if there is none."""
+        open_nodes = [(-np.inf, at, allowed) for at, allowed in enumerate(nodes)]
+        count, closed = len(open_nodes), [np.inf]
+        while open_nodes and open_nodes[0][0] < self._enough and most_nodes > 0:
+            most_nodes -= 1
+            allowed = self._alike.ordered(heapq.heappop(open_nodes)[2])
+            if not self._possible(allowed):
+                continue
+            bound, children = self._opened(allowed)
+            if not children:
+                closed.append(bound)
+            for child in children:
+                count += 1
+                heapq.heappush(open_nodes, (bound, count, child))
+        if self._best is None:
+            return None
+        return replace(self._best, bound=min(*closed, *(bound for bound, _, _ in open_nodes), self._best.cost))
+
+    def _opened(self, allowed: Allowed) -> tuple[float, list[Allowed]]:
+        """Return the bound of a node, and its children unless it is done with."""
+        top, bound = self._top(allowed)
+        if bound >= self._enough:
+            return bound, []
+        choice = self.dual.choice(top, allowed)
+        alone = np.zeros_like(allowed)
+        alone[choice] = True
+        solution = self._try(choice - self.dual.starts) if np.array_equal(self._alike.ordered(alone), alone) else None
+        if np.array_equal(alone, allowed):
+            return (np.inf if solution is None else max(bound, solution.bound)), []
+        return bound, self._children(top, allowed)
+
+    def _top(self, allowed: Allowed) -> tuple[PricedProcesses, float]:
+        """Return the best multipliers of a node and their bound, tried until the node is seen to be too dear."""
+        start, bound = self._best_tried(allowed)
+        if bound >= self._enough:
+            return start, bound
+        self._add(ascend(self.dual, start, allowed, self._enough)[1:])
+        return self._best_tried(allowed)
+
+    def _best_tried(self, allowed: Allowed) -> tuple[PricedProcesses, float]:
+        """Return the multipliers that bound a node best among all that were ever tried, and their bound."""
+        least = np.minimum.reduceat(np.where(allowed, self._least, np.inf), self.dual.starts, axis=1)
+        bounds = least.sum(axis=1) + [priced.constant for priced in self._tried]
+        at = int(np.argmax(bounds))
+        return self._tried[at], float(bounds[at])
+
+    def _add(self, tried: list[PricedProcesses]) -> None:
+        """Remember multipliers."""
+        self._tried += tried
+        self._least = np.stack([priced.least for priced in self._tried])
+
+    def _try(self, processes: Int[np.ndarray, " feature"]) -> Solution | None:
+        """Solve for one choice of processes, unless that is done already, and keep the cheapest design."""
+        key = tuple(processes.tolist())
+        if key not in self._solved:
+            program = ConvexProgram(self.problem.features, processes, len(self.problem.stacks), self.problem.shared)
+            found = self._solved[key] = program.solve(self.problem.stacks)
+            if found is not None:
+                self._add([self.dual.price(found.prices, self.dual.planes(found.zones))])
+                if self._best is None or found.cost < self._best.cost:
+                    self._best = found
+        return self._solved[key]
+
+    def _children(self, top: PricedProcesses, allowed: Allowed) -> list[Allowed]:
+        """Return one node per process of the feature whose processes are hardest to tell apart."""
+        least = [np.sort(part) for part in np.split(np.where(allowed, top.least, np.inf), self.dual.starts[1:])]
+        regret = [part[1] - part[0] if part.size > 1 else np.inf for part in least]
+        own = self.dual.feature == int(np.argmin(regret))
+        children = []
+        for process in np.flatnonzero(own & allowed):
+            child = allowed & ~own
+            child[process] = True
+            children.append(child)
+        return children
+
+    def _possible(self, allowed: Allowed) -> bool:
+        """Return whether a design made by allowed processes keeps all stacks."""
+        parts = np.split(allowed, self.dual.starts[1:])
+        if not all(part.any() for part in parts):
+            return False
+        features = tuple(
+            replace(feature, processes=tuple(made for made, free in zip(feature.processes, part, strict=True) if free))
+            for feature, part in zip(self.problem.features, parts, strict=True)
+        )
+        return least_infeasible(replace(self.problem, features=features)).feasible
