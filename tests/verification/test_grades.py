@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+
+from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_of, grade_zone, grade_zones
+from tolalloc.allocation.grade.ladder import Ladder, group_ladder, source_ladder
+from tolalloc.allocation.grade.preferred import Series, multiples
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.uncertainty.zones import Feature
+
+UM, MM = 1e-6, 1e-3
+
+# One row per size step, IT01 to IT18 [µm]: the table of the standard read the other way than the package holds it.
+PRINTED = """
+0.3 0.5 0.8 1.2 2   3  4  6  10 14 25  40  60  100 140 250  400  600  1000 1400
+0.4 0.6 1   1.5 2.5 4  5  8  12 18 30  48  75  120 180 300  480  750  1200 1800
+0.4 0.6 1   1.5 2.5 4  6  9  15 22 36  58  90  150 220 360  580  900  1500 2200
+0.5 0.8 1.2 2   3   5  8  11 18 27 43  70  110 180 270 430  700  1100 1800 2700
+0.6 1   1.5 2.5 4   6  9  13 21 33 52  84  130 210 330 520  840  1300 2100 3300
+0.6 1   1.5 2.5 4   7  11 16 25 39 62  100 160 250 390 620  1000 1600 2500 3900
+0.8 1.2 2   3   5   8  13 19 30 46 74  120 190 300 460 740  1200 1900 3000 4600
+1   1.5 2.5 4   6   10 15 22 35 54 87  140 220 350 540 870  1400 2200 3500 5400
+1.2 2   3.5 5   8   12 18 25 40 63 100 160 250 400 630 1000 1600 2500 4000 6300
+2   3   4.5 7   10  14 20 29 46 72 115 185 290 460 720 1150 1850 2900 4600 7200
+2.5 4   6   8   12  16 23 32 52 81 130 210 320 520 810 1300 2100 3200 5200 8100
+3   5   7   9   13  18 25 36 57 89 140 230 360 570 890 1400 2300 3600 5700 8900
+4   6   8   10  15  20 27 40 63 97 155 250 400 630 970 1550 2500 4000 6300 9700
+"""
+TABLE = [[float(value) for value in line.split()] for line in PRINTED.strip().splitlines()]
+
+
+def source(name="size", **changes):
+    own = {"part": "pin", "feature": Feature.SIZE, "zone": 5 * UM, "minimum": 1 * UM, "maximum": 20 * UM, "cost": 1.0}
+    return Source(name=name, **{**own, **changes})
+
+
+@pytest.mark.parametrize(("largest", "row"), [*zip(SIZE_STEPS, TABLE, strict=True)])
+def test_all_zones_are_the_printed_ones_at_both_ends_of_the_size_step(largest, row):
+    smallest = 1.01 if largest == 3 else SIZE_STEPS[SIZE_STEPS.index(largest) - 1] + 0.001
+    for nominal in (smallest, largest):
+        np.testing.assert_allclose([*grade_zones(nominal * MM).values()], np.array(row) * UM, rtol=1e-12)
+    assert tuple(grade_zones(largest * MM)) == GRADES
+
+
+def test_printed_zones_follow_the_formula_as_far_as_the_standard_rounds_them():
+    ends = np.array([1, *SIZE_STEPS], float)
+    mean = np.sqrt(ends[:-1] * ends[1:])
+    unit = 0.45 * np.cbrt(mean) + 0.001 * mean
+    factors = (7, 10, 16, 25, 40, 64, 100, 160, 250, 400, 640, 1000, 1600, 2500)
+    fine = [0.3 + 0.008 * mean, 0.5 + 0.012 * mean, 0.8 + 0.02 * mean]
+    middle = [fine[2] * (7 * unit / fine[2]) ** (power / 4) for power in (1, 2, 3)]
+    formula = np.array([*fine, *middle, *(factor * unit for factor in factors)]).T
+    apart = np.abs(np.array(TABLE) / formula - 1)
+    assert apart[:, :6].max() < 0.29  # IT01 to IT4, rounded to few preferred numbers
+    assert apart[:, 6:].max() < 0.16
+    assert apart[1:, 6:].max() < 0.10
+    assert np.median(apart[:, 6:]) < 0.02
+
+
+def test_the_grade_of_a_zone_is_the_coarsest_that_is_not_larger():
+    assert grade_of(30 * MM, 13 * UM) == "IT6"
+    assert grade_of(30 * MM, 20.9 * UM) == "IT6"
+    assert grade_of(30 * MM, 21 * UM) == "IT7"
+    assert grade_of(30 * MM, 0.59 * UM) is None
+    assert grade_of(30 * MM, 1.0) == "IT18"
+    for nominal in (2 * MM, 52 * MM, 500 * MM):
+        assert [grade_of(nominal, zone) for zone in grade_zones(nominal).values()] == [*GRADES]
+
+
+def test_sizes_outside_the_standard_are_refused():
+    for nominal in (0.0, -1 * MM, 500.1 * MM, float("nan")):
+        with pytest.raises(InputError, match="nominal"):
+            grade_zones(nominal)
+    with pytest.raises(UnknownNameError, match="IT19"):
+        grade_zone(10 * MM, "IT19")
+    with pytest.raises(UnknownNameError, match="IT14"):
+        grade_zone(1 * MM, "IT14")
+    assert grade_zone(1 * MM, "IT13") == pytest.approx(140 * UM)
+
+
+@pytest.mark.parametrize("series", Series)
+def test_preferred_zones_grow_evenly_and_stay_near_the_geometric_series(series):
+    zones = series.zones / UM
+    steps = len(series.value)
+    exact = 0.1 * 10 ** (np.arange(4 * steps + 1) / steps)
+    assert zones[0] == pytest.approx(0.1)
+    assert zones[-1] == pytest.approx(1000)
+    assert np.abs(zones / exact - 1).max() < 0.025
+    assert np.all(np.diff(zones) > 0)
+
+
+def test_multiples_stay_inside_the_range_and_survive_decimal_numbers():
+    np.testing.assert_allclose(multiples(0.1, 0.3, 0.6), [0.3, 0.4, 0.5, 0.6])
+    np.testing.assert_allclose(multiples(0.5, -0.9, 1.2), [-0.5, 0.0, 0.5, 1.0])
+    with pytest.raises(InputError, match="min and max"):
+        multiples(0.5, 0.6, 0.9)
+    with pytest.raises(InputError, match="step"):
+        multiples(0.0, 0.6, 0.9)
+
+
+def test_a_size_climbs_its_grades_and_anything_else_the_preferred_zones():
+    size = source_ladder(source(nominal=4 * MM))
+    assert size.labels == ("IT1", "IT2", "IT3", "IT4", "IT5", "IT6", "IT7", "IT8")
+    np.testing.assert_allclose(size.zones / UM, [1, 1.5, 2.5, 4, 5, 8, 12, 18])
+    for other in (source(), source(feature=Feature.POSITION, nominal=4 * MM)):
+        ladder = source_ladder(other)
+        assert ladder.labels[0] == "R10 1 µm"
+        assert ladder.labels[5] == "R10 3.2 µm"
+        np.testing.assert_allclose(ladder.zones[[0, -1]] / UM, [1, 20])
+    assert len(source_ladder(source(), series=Series.R20).zones) > len(source_ladder(source()).zones)
+
+
+def test_zones_given_by_the_user_replace_every_other_ladder():
+    ladder = source_ladder(source(nominal=4 * MM), given=(7 * UM, 3 * UM, 7 * UM, 50 * UM))
+    np.testing.assert_allclose(ladder.zones / UM, [3, 7])
+    assert ladder.labels == ("3 µm", "7 µm")
+    for zones in ((), (0.0, 1 * UM), (float("nan"),)):
+        with pytest.raises(InputError, match="zones"):
+            Ladder.given(zones)
+
+
+def test_a_locked_source_keeps_its_zone():
+    assert source_ladder(source(locked=True, zone=5.3 * UM)).labels == ("5.3 µm",)
+    kept = source_ladder(source(locked=True, zone=5.3 * UM, grade="IT5"))
+    assert kept.labels == ("IT5",)
+    assert kept.zones[0] == 5.3 * UM
+    with pytest.raises(InputError, match="locked"):
+        group_ladder((source(locked=True), source()))
+
+
+def test_a_range_without_a_step_names_the_nearest_steps():
+    with pytest.raises(InputError, match=r"source size: min and max.*\(2.6, 3.9\).*IT3 \(2.5 µm\) and IT4 \(4 µm\)"):
+        source_ladder(source(nominal=4 * MM, minimum=2.6 * UM, maximum=3.9 * UM, zone=3 * UM))
+    with pytest.raises(InputError, match=r"nearest of which are IT01 \(0.4 µm\)\."):
+        source_ladder(source(nominal=4 * MM, minimum=0.1 * UM, maximum=0.3 * UM, zone=0.2 * UM))
+    with pytest.raises(InputError, match=r"nearest of which are R10 1000 µm"):
+        source_ladder(source(minimum=1100 * UM, maximum=1200 * UM, zone=1150 * UM))
+
+
+def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
+    table = load_tolerance_table("rv20e_baseline")
+    bores = [source for source in table if source.group == "disc bores"]
+    assert {round(bore.zone / UM, 3) for bore in bores} == {3.8, 4.0}
+    ladder = group_ladder(bores)
+    np.testing.assert_allclose(ladder.zones / UM, [0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.2, 4, 5, 6.3])
+    alike = [source("a", nominal=20 * MM, group="g"), source("b", nominal=29 * MM, group="g")]
+    assert group_ladder(alike).labels[:2] == ("IT0", "IT1")
+    mixed = [source("a", nominal=20 * MM, group="g"), source("b", nominal=31 * MM, group="g")]
+    assert group_ladder(mixed).labels[0] == "R10 1 µm"
+    with pytest.raises(InputError, match="group g"):
+        group_ladder([source("a", maximum=4 * UM, group="g"), source("b", minimum=4.5 * UM, group="g")])

@@ -1,0 +1,157 @@
+"""The ladder of a source: the zones that its drawing may carry, from the tightest up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.grade.iso286 import grade_zones, size_step
+from tolalloc.allocation.grade.preferred import Series
+from tolalloc.exceptions import InputError
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.zones import Feature
+from tolalloc.units import MICROMETRE
+
+_ROUNDING = 1e-9
+"""What a zone may lose on its way through a table [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ladder:
+    """Increasing zones with the names that a drawing gives them.
+
+    Parameters
+    ----------
+    zones
+        The zones, tightest first [m].
+    labels
+        Their names.
+
+    Raises
+    ------
+    InputError
+        No zones, or zones that are not finite, above 0 and increasing.
+    """
+
+    zones: Float[np.ndarray, " step"]
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        zones = self.zones
+        if not (zones.size and np.all(np.isfinite(zones)) and zones[0] > 0 and np.all(np.diff(zones) > 0)):
+            listed = (zones / MICROMETRE).tolist()
+            raise InputError.at("ladder", "zones [µm]", listed, "one number above 0 or more, each above the last")
+
+    @classmethod
+    def given(cls, zones: Sequence[float]) -> Ladder:
+        """Return the ladder of a user's own zones.
+
+        Parameters
+        ----------
+        zones
+            The zones in any order [m].
+        """
+        ordered = np.unique(np.array(zones, dtype=float))
+        return cls(zones=ordered, labels=tuple(f"{zone / MICROMETRE:g} µm" for zone in ordered))
+
+    @classmethod
+    def grades(cls, nominal: float) -> Ladder:
+        """Return the standard tolerance grades of a nominal size [m]."""
+        zones = grade_zones(nominal)
+        return cls(zones=np.array([*zones.values()]), labels=(*zones,))
+
+    @classmethod
+    def preferred(cls, series: Series) -> Ladder:
+        """Return the zones of a series of preferred numbers."""
+        labels = tuple(f"{series.name} {zone / MICROMETRE:g} µm" for zone in series.zones)
+        return cls(zones=series.zones, labels=labels)
+
+    def within(self, minimum: float, maximum: float, place: str) -> Ladder:
+        """Return the steps inside a range.
+
+        Parameters
+        ----------
+        minimum, maximum
+            Smallest and largest zone that may be asked for [m].
+        place
+            Whose range it is.
+
+        Raises
+        ------
+        InputError
+            The range holds no step.
+        """
+        inside = (self.zones >= minimum * (1 - _ROUNDING)) & (self.zones <= maximum * (1 + _ROUNDING))
+        if not inside.any():
+            above = int(np.searchsorted(self.zones, minimum))
+            nearest = range(max(above - 1, 0), min(above + 1, len(self.labels)))
+            steps = " and ".join(f"{self.labels[at]} ({self.zones[at] / MICROMETRE:g} µm)" for at in nearest)
+            limits = (round(minimum / MICROMETRE, 4), round(maximum / MICROMETRE, 4))
+            allowed = f"a range that holds a step of its ladder, the nearest of which are {steps}"
+            raise InputError.at(place, "min and max [µm]", limits, allowed)
+        labels = tuple(label for label, kept in zip(self.labels, inside, strict=True) if kept)
+        return Ladder(zones=self.zones[inside], labels=labels)
+
+
+def source_ladder(source: Source, given: Sequence[float] = (), series: Series = Series.R10) -> Ladder:
+    """Return the ladder of one source.
+
+    Parameters
+    ----------
+    source
+        The source; a locked one keeps its zone.
+    given
+        The user's own zones in place of grades and preferred numbers [m].
+    series
+        Preferred numbers for what is not a size with a nominal value.
+
+    Raises
+    ------
+    InputError
+        The source's range holds no step.
+    """
+    if source.locked:
+        return Ladder(zones=np.array([source.zone]), labels=(source.grade or f"{source.zone / MICROMETRE:g} µm",))
+    return group_ladder((source,), given, series)
+
+
+def group_ladder(sources: Sequence[Source], given: Sequence[float] = (), series: Series = Series.R10) -> Ladder:
+    """Return the common ladder of sources that share one tolerance.
+
+    Parameters
+    ----------
+    sources
+        Sources of one group, none of them locked.
+    given
+        The user's own zones in place of grades and preferred numbers [m].
+    series
+        Preferred numbers for what is not a size with a nominal value.
+
+    Raises
+    ------
+    InputError
+        A member is locked, or no step lies in the range of every member.
+
+    Notes
+    -----
+    A drawing that gives a group one tolerance gives all its members the same zone, whatever the ratios of their zones
+    in the tolerance table. So a step is one zone for all of them, and costs what the members cost at that zone
+    together. Grades serve a group whose members are sizes of one size step; otherwise one grade would mean several
+    zones.
+    """
+    place = f"group {sources[0].group}" if len(sources) > 1 else f"source {sources[0].name}"
+    locked = [source.name for source in sources if source.locked]
+    if locked:
+        raise InputError.at(place, "locked members", locked, "none")
+    is_graded = all(source.feature is Feature.SIZE and source.nominal > 0 for source in sources)
+    if given:
+        ladder = Ladder.given(given)
+    elif is_graded and len({size_step(source.nominal) for source in sources}) == 1:
+        ladder = Ladder.grades(max(source.nominal for source in sources))
+    else:
+        ladder = Ladder.preferred(series)
+    minimum, maximum = max(source.minimum for source in sources), min(source.maximum for source in sources)
+    return ladder.within(minimum, maximum, place)

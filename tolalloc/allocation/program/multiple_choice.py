@@ -1,0 +1,84 @@
+"""Groups of choices: one is taken out of every group, and sums and root sums of squares stay within their rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+ROUNDING = 5e-13
+"""What rounding may add to a stack over its room [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MultipleChoice:
+    """Groups of choices, and what each adds to the stacks.
+
+    With z one where a choice is taken and zero elsewhere, a stack reads Σ adding·z + √(Σ squares·z) ≤ room.
+
+    Parameters
+    ----------
+    group
+        Group of every choice, ascending from 0 [-].
+    cost
+        Cost of every choice [cost units].
+    adding
+        What it adds to a stack, over the stack's scale [-].
+    squares
+        Square of what it adds in quadrature, 0 or above, over the square of that scale [-].
+    room
+        Room of every stack over its scale, which makes rooms and what is added of order one [-].
+    """
+
+    group: Int[np.ndarray, " choice"]
+    cost: Float[np.ndarray, " choice"]
+    adding: Float[np.ndarray, "stack choice"]
+    squares: Float[np.ndarray, "stack choice"]
+    room: Float[np.ndarray, " stack"]
+
+    @cached_property
+    def starts(self) -> Int[np.ndarray, " group"]:
+        """Position of the first choice of every group."""
+        return np.flatnonzero(np.diff(self.group, prepend=-1))
+
+    @cached_property
+    def undominated(self) -> Bool[np.ndarray, " choice"]:
+        """Choices beside which no other of their group costs no more and adds no more to any stack."""
+        burden = np.concatenate([self.cost[np.newaxis], self.adding, self.squares])
+        kept = np.ones(self.cost.size, dtype=bool)
+        for at in range(self.cost.size):
+            rivals = np.flatnonzero((self.group == self.group[at]) & kept)
+            rivals = rivals[rivals != at]
+            kept[at] = not np.all(burden[:, rivals] <= burden[:, [at]], axis=0).any()
+        return kept
+
+    def restricted(self, kept: Bool[np.ndarray, " choice"]) -> MultipleChoice:
+        """Return the program with some of the choices, at least one of every group."""
+        return replace(
+            self,
+            group=self.group[kept],
+            cost=self.cost[kept],
+            adding=self.adding[:, kept],
+            squares=self.squares[:, kept],
+        )
+
+    def overload(self, taken: Int[np.ndarray, " group"]) -> Float[np.ndarray, " stack"]:
+        """Return by how much every stack exceeds its room, over its scale [-]."""
+        spread = np.sqrt(self.squares[:, taken].sum(axis=1))
+        return np.asarray(self.adding[:, taken].sum(axis=1) + spread - self.room)
+
+    def allows(self, taken: Int[np.ndarray, " group"]) -> bool:
+        """Return whether every stack stays within its room."""
+        return bool(np.all(self.overload(taken) <= ROUNDING))
+
+    @cached_property
+    def possible(self) -> Bool[np.ndarray, " choice"]:
+        """Choices that keep every stack beside the least that all other groups may add to it."""
+        adding = np.minimum.reduceat(self.adding, self.starts, axis=1)
+        squares = np.minimum.reduceat(self.squares, self.starts, axis=1)
+        least_adding = adding.sum(axis=1, keepdims=True) + self.adding - adding[:, self.group]
+        least_squares = squares.sum(axis=1, keepdims=True) + self.squares - squares[:, self.group]
+        overload = least_adding + np.sqrt(np.maximum(least_squares, 0.0)) - self.room[:, np.newaxis]
+        return np.asarray(np.all(overload <= 2 * ROUNDING, axis=0))
