@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from tolalloc.cycloid.contact_stiffness import peak_pressure
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.equivalent.kinematics import Positions
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.outputs import OUTPUTS, Solved, waves
+from tolalloc.equivalent.radial_clearance import radial_clearance
 from tolalloc.equivalent.status import Status
 from tolalloc.response.chunks import map_chunks
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.units import ARCMINUTE, ARCSECOND
+from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 
@@ -57,8 +60,36 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
 
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     solved = Solved.of(model.equilibria(errors, np.copysign(model.reducer.load.rated_torque, torque), _ANGLES))
-    values = np.stack([output.value(solved) for output in OUTPUTS if output.name in _FORCES], axis=1)
+    own = [output.value(solved) for output in OUTPUTS if output.name in _FORCES]
+    values = np.stack([*own, *_pin_stress(model, solved.forces.pins)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))
+
+
+def _pin_stress(
+    model: EquivalentModel, pins: Float[np.ndarray, "chunk angle disc pin"]
+) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
+    """Return the largest force over face width [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
+
+    Notes
+    -----
+    Both take the force as spread evenly over the face width; a tilted tooth loads one end more.
+    """
+    stage, at = model.reducer.cycloid_stage, Positions(model.reducer, _ANGLES)
+    discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(model.reducer.disc_count)]
+    pin_angle = np.stack(discs, axis=1)
+    of_one_newton = peak_pressure(stage, model.reducer.contact_modulus, pin_angle, np.ones_like(pin_angle))
+    pressure = of_one_newton * np.sqrt(pins)  # Hertz's grows with the root of the force
+    return pins.max(axis=(1, 2, 3)) / (stage.face_width / MILLIMETRE), pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+
+
+def _radial_clearance(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "chunk column"],
+    torque: float,  # noqa: ARG001
+) -> Answer:
+    clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
+    status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
+    return clearance, status.astype(np.uint8)
 
 
 _FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
@@ -67,11 +98,16 @@ REQUIREMENTS = (
     Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
     Reading(outputs=("lost motion [arcmin]", "backlash [arcmin]", "torsional stiffness [N·m/arcmin]"), read=_loop),
     Reading(
-        outputs=tuple(f"{output.name}, rated torque [{output.unit}]" for output in OUTPUTS if output.name in _FORCES),
+        outputs=(
+            *(f"{output.name}, rated torque [{output.unit}]" for output in OUTPUTS if output.name in _FORCES),
+            "largest line load, rated torque [N/mm]",
+            "peak pressure, rated torque [MPa]",
+        ),
         read=_rated_load,
     ),
+    Reading(outputs=("radial clearance at tip and root [µm]",), read=_radial_clearance),
 )
-"""What a requirement may limit: transmission error, torque against twist, forces at rated torque."""
+"""What a requirement may limit: transmission error, torque against twist, load at rated torque, gap at tip and root."""
 
 
 OTHER_OUTPUTS = tuple(name for reading in REQUIREMENTS[1:] for name in reading.outputs)

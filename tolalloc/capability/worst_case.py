@@ -1,0 +1,182 @@
+"""The worst unit whose parts are all inside their zones, searched by ascent from many random units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
+from tolalloc.capability.zone_moves import extreme_in_zone, moved_towards
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.response.interface import ResponseWithDerivatives
+from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.uncertainty.seeds import SeedTree
+
+_WEIGHT = 0.3
+"""Weight of the newest gradient in the mean of all before [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstCase:
+    """The worst unit found inside the zones.
+
+    Parameters
+    ----------
+    value
+        Its output. Nothing proves that no other unit is worse: the true worst case is this or beyond [output].
+    x
+        Its deviations, in the order of the response's columns [m, angles rad].
+    by_zone
+        Change of the worst value with each zone [output/m].
+    ends
+        Worst value of every start, NaN where it had none; how closely they agree tells how far to trust the
+        search [output].
+    """
+
+    value: float
+    x: Float[np.ndarray, " column"]
+    by_zone: Float[np.ndarray, " source"]
+    ends: Float[np.ndarray, " start"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Units:
+    """Units, one of every start, as deviations per unit of zone, their values, and the mean gradients by column."""
+
+    values: Float[np.ndarray, " start"]
+    units: Float[np.ndarray, "start column"]
+    gradients: Float[np.ndarray, "start column"]
+
+    def or_worse(self, other: _Units) -> _Units:
+        """Return for every start the worse of both."""
+        worse = (other.values > self.values)[:, np.newaxis]
+        return _Units(
+            values=np.maximum(self.values, other.values),
+            units=np.where(worse, other.units, self.units),
+            gradients=np.where(worse, other.gradients, self.gradients),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Ascent:
+    """What is climbed: the output, with the sign that makes larger worse."""
+
+    response: ResponseWithDerivatives
+    errors: ErrorModel
+    zones: Float[np.ndarray, " source"]
+    sense: int
+
+    def first(self, uniform: Float[np.ndarray, "start column"]) -> _Units:
+        """Return units at the limits of all zones, at random phases, before they are solved."""
+        parts = zip(self.errors.active, self.errors.columns_of_source, strict=True)
+        units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
+        return _Units(values=np.full(units.shape[0], -np.inf), units=units, gradients=np.zeros_like(units))
+
+    def solved(self, at: _Units, weight: float) -> _Units:
+        """Return the values of the units, minus infinity where one has none, and gradients averaged with the given."""
+        found = self.response.with_derivatives(self.errors.deviations(at.units, self.zones))
+        good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
+        newest = np.where(good[:, np.newaxis], self.sense * found.by_column, at.gradients)
+        return _Units(
+            values=np.where(good, self.sense * found.evaluation.values[:, 0], -np.inf),
+            units=at.units,
+            gradients=at.gradients + weight * (newest - at.gradients),
+        )
+
+    def moved(self, at: _Units, part: float) -> _Units:
+        """Return units a part of the way to the extremes of the zones along the gradients."""
+        units = np.empty_like(at.units)
+        for source, own in zip(self.errors.active, self.errors.columns_of_source, strict=True):
+            extremes = extreme_in_zone(source, at.units[:, own], at.gradients[:, own])
+            units[:, own] = moved_towards(source, at.units[:, own], extremes, part)
+        return _Units(values=at.values, units=units, gradients=at.gradients)
+
+
+def worst_case(
+    response: ResponseWithDerivatives,
+    errors: ErrorModel,
+    zones: Float[np.ndarray, " source"],
+    seeds: SeedTree,
+    starts: int = 32,
+    steps: int = 60,
+    sense: Literal[1, -1] = 1,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
+) -> WorstCase:
+    """Return the worst unit that an ascent from many random units finds inside the zones.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model.
+    errors
+        The sources of the tolerance table; correlations do not count, any part may be anywhere in its zone.
+    zones
+        Zones of the active sources [m].
+    seeds
+        Node of the seed tree.
+    starts
+        Random units at the limits of all zones from which to ascend [-].
+    steps
+        Steps of every ascent [-].
+    sense
+        1 where large outputs are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
+    largest_failed_share
+        Share of all units solved that may fail [-].
+
+    Raises
+    ------
+    InputError
+        Sources without a zone, or no start or step.
+    SolveError
+        More units failed.
+
+    Notes
+    -----
+    Conditional gradient (Frank–Wolfe): the k-th step goes 2/(k + 1) of the way to the unit that is worst by the
+    gradient alone, source by source. A peak-to-peak has ridges, on either side of which the gradient points across;
+    so the gradient is a mean over the last few steps, which points along them. A size may end anywhere in its interval
+    and an axis anywhere in its circle; pitch and run-out fill their zones with the amplitudes of their spectrum, at any
+    phases. The change with the zones is that of the units' own deviations, by the mean gradient (envelope theorem).
+
+    References
+    ----------
+    Frank, M. and Wolfe, P. (1956). An algorithm for quadratic programming. Naval Research Logistics 3, 95-110.
+    """
+    if errors.joint:
+        raise InputError.at("worst case", "joint sources", errors.joint[0].name, "none, because they have no zone")
+    if min(starts, steps) < 1:
+        raise InputError.at("worst case", "starts and steps", (starts, steps), "1 or more")
+    ascent = _Ascent(response=response, errors=errors, zones=zones, sense=sense)
+    uniform = np.concatenate(list(seeds.uniform_chunks(starts, len(errors.columns))))
+    at = worst = ascent.first(uniform)
+    failed = 0
+    for step in range(steps):
+        at = ascent.solved(at, max(_WEIGHT, 1.0 / (step + 1)))
+        failed += int(np.isinf(at.values).sum())
+        worst = worst.or_worse(at)
+        at = ascent.moved(at, 2.0 / (step + 2))
+    # Steps only come ever closer to the corners of the zones, where a convex output is largest.
+    corner = ascent.solved(ascent.moved(worst, 1.0), 0.0)
+    failed += int(np.isinf(corner.values).sum())
+    worst = worst.or_worse(corner)
+    if failed > largest_failed_share * starts * (steps + 1) or np.isinf(worst.values).all():
+        raise SolveError(
+            f"Worst case: {failed} of {starts * (steps + 1)} units have no usable answer; allowed is a share of "
+            f"{largest_failed_share:.4g}."
+        )
+    return _result(ascent, worst)
+
+
+def _result(ascent: _Ascent, worst: _Units) -> WorstCase:
+    """Return the worst of all starts with the signs of the output."""
+    most, errors, sense = int(worst.values.argmax()), ascent.errors, ascent.sense
+    by_column = sense * worst.gradients[most] * worst.units[most]
+    return WorstCase(
+        value=sense * float(worst.values[most]),
+        x=errors.deviations(worst.units[[most]], ascent.zones)[0],
+        by_zone=np.array([by_column[own].sum() for own in errors.columns_of_source]),
+        ends=np.where(np.isinf(worst.values), np.nan, sense * worst.values),
+    )
