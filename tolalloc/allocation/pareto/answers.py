@@ -1,0 +1,146 @@
+"""Answers that are never asked for twice, in memory and in a checkpoint.
+
+A search that draws its random numbers from the seed tree is a function of the answers it gets. So a checkpoint holds
+the answers alone: a resumed search runs again from its first generation, reads what is known, and goes on with the
+same bits as if it had never stopped, random state included. Nothing in the file is ever executed, and a file from
+another version of a library can make a search slower but not wrong.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError
+
+_PROBED = 1e-6
+"""Relative difference up to which an answer asked for again is the same, on another machine too [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """A file that keeps the answers of a search.
+
+    Parameters
+    ----------
+    path
+        The file, new or written by the same search before.
+    every
+        New answers after which it is written [-].
+
+    Raises
+    ------
+    InputError
+        The number is below 1, or there is no folder to write to.
+    """
+
+    path: Path
+    every: int
+
+    def __post_init__(self) -> None:
+        if self.every < 1:
+            raise InputError.at("checkpoint", "every", self.every, "1 or more")
+        if not self.path.absolute().parent.is_dir():
+            raise InputError(f"{self.path}: there is no folder {self.path.absolute().parent} for the checkpoint.")
+
+
+class Answers:
+    """Everything that has been answered so far.
+
+    Parameters
+    ----------
+    ask
+        Gives the numbers of designs that nobody has asked for yet, one row each.
+    identity
+        Text that tells this problem from others.
+    checkpoint
+        Where the answers are kept beyond this process.
+
+    Raises
+    ------
+    InputError
+        The checkpoint is of another problem, is damaged, or is no checkpoint.
+    """
+
+    def __init__(
+        self,
+        ask: Callable[[Float[np.ndarray, "design gene"]], Float[np.ndarray, "design number"]],
+        identity: str,
+        checkpoint: Checkpoint | None = None,
+    ) -> None:
+        self._ask, self._checkpoint = ask, checkpoint
+        self._identity = hashlib.sha256(identity.encode()).hexdigest()
+        self._known: dict[bytes, Float[np.ndarray, " number"]] = {}
+        self._unsaved = 0
+        if checkpoint is not None and checkpoint.path.exists():
+            self._read(checkpoint.path)
+
+    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
+        """Return the numbers of every design; only new designs are asked for, in pieces as the checkpoint wants them.
+
+        Notes
+        -----
+        A piece ends where the file is written, so a resumed search asks for designs in the same company as before.
+        """
+        keys = [design.tobytes() for design in designs]
+        new = list({key: at for at, key in reversed(list(enumerate(keys))) if key not in self._known}.values())[::-1]
+        size = self._checkpoint.every if self._checkpoint else len(new)
+        for start in range(0, len(new), max(size, 1)):
+            piece = new[start : start + size]
+            for at, numbers in zip(piece, self._ask(designs[piece]), strict=True):
+                self._known[keys[at]] = numbers
+            self._unsaved += len(piece)
+            if self._unsaved >= size:
+                self.write()
+        return np.array([self._known[key] for key in keys])
+
+    def write(self) -> None:
+        """Write all answers to the checkpoint, if there is one; a reader finds the old file or the new one, whole."""
+        if self._checkpoint is None or not self._unsaved:
+            return
+        path = self._checkpoint.path
+        designs, numbers = np.array([np.frombuffer(key) for key in self._known]), np.array([*self._known.values()])
+        written = path.with_name(f"{path.name}.{os.getpid()}")
+        try:
+            with written.open("wb") as file:
+                np.savez(
+                    file,
+                    identity=np.array(self._identity),
+                    designs=designs,
+                    numbers=numbers,
+                    digest=np.array(_digest(self._identity, designs, numbers)),
+                )
+            written.replace(path)
+        finally:
+            written.unlink(missing_ok=True)
+        self._unsaved = 0
+
+    def _read(self, path: Path) -> None:
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                identity, digest = str(file["identity"]), str(file["digest"])
+                designs, numbers = file["designs"], file["numbers"]
+        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+            raise InputError(f"{path}: this is no complete checkpoint; is the file truncated?") from None
+        if digest != _digest(identity, designs, numbers):
+            raise InputError(f"{path}: the checkpoint is damaged; remove it to start anew.")
+        # Two problems may have the same names and bounds; what they answer tells them apart.
+        if identity != self._identity or not np.allclose(
+            self._ask(designs[:1]), numbers[:1], rtol=_PROBED, atol=0.0, equal_nan=True
+        ):
+            raise InputError(f"{path}: the checkpoint is of another problem; remove it or name another file.")
+        self._known = {design.tobytes(): row for design, row in zip(designs, numbers, strict=True)}
+
+
+def _digest(
+    identity: str, designs: Float[np.ndarray, "design gene"], numbers: Float[np.ndarray, "design number"]
+) -> str:
+    """Return the digest of all that a checkpoint holds."""
+    return hashlib.sha256(identity.encode() + designs.tobytes() + numbers.tobytes()).hexdigest()

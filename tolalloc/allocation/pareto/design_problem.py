@@ -1,0 +1,148 @@
+"""Cost and quantile of a reducer's design as a problem: logarithms of scales or ladder positions, and clearances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.response.interface import Response
+
+COST = Objective(name="cost [cost units]")
+
+
+def to_genes(designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
+    """Return designs with the logarithms of their scales."""
+    return np.concatenate([np.log(designs[..., :-2]), designs[..., -2:]], axis=-1)
+
+
+def from_genes(genes: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
+    """Return the designs whose scales have these logarithms."""
+    return np.concatenate([np.exp(genes[..., :-2]), genes[..., -2:]], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """A further objective.
+
+    Parameters
+    ----------
+    objective
+        What is made small or large.
+    value
+        Its values at designs, NaN where it failed.
+    """
+
+    objective: Objective
+    value: Callable[[Float[np.ndarray, "design variable"]], Float[np.ndarray, " design"]]
+
+
+RADIAL_CLEARANCE = Criterion(
+    objective=Objective(name="radial clearance [µm]", better="large"), value=lambda designs: designs[:, -1]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignProblem:
+    """Cost against the quantile of the peak-to-peak, and whatever else is asked for.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    quantile
+        Quantile of designs: the real kernel or what stands in for it.
+    ladders
+        Group → the scales that it may have, rising; other groups have every scale within their bounds [-].
+    further
+        Further objectives.
+    limits
+        Name of an objective → what it must not exceed, or not fall below if it is made large.
+
+    Raises
+    ------
+    InputError
+        A ladder that does not rise or leaves the bounds of its group, or a limit of zero.
+    UnknownNameError
+        A ladder of no group, or a limit of no objective.
+    """
+
+    space: DesignSpace
+    quantile: Response
+    ladders: Mapping[str, Float[np.ndarray, " position"]] = field(default_factory=dict)
+    further: tuple[Criterion, ...] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for group, ladder in self.ladders.items():
+            if group not in self.space.groups:
+                raise UnknownNameError.among("ladders", "group", group, self.space.groups)
+            at = self.space.groups.index(group)
+            lower, upper = float(self.space.lower[at]), float(self.space.upper[at])
+            if not (ladder.size and lower <= ladder[0] and ladder[-1] <= upper and np.all(np.diff(ladder) > 0)):
+                raise InputError.at(
+                    f"ladder of {group}", "scales", ladder.tolist(), f"rising numbers from {lower:.4g} to {upper:.4g}"
+                )
+        names = [objective.name for objective in self.objectives]
+        for name, limit in self.limits.items():
+            if name not in names:
+                raise UnknownNameError.among("limits", "objective", name, names)
+            if limit == 0:
+                raise InputError.at("limits", name, limit, "any other number, as violations are shares of it")
+
+    @cached_property
+    def objectives(self) -> tuple[Objective, ...]:
+        """What is traded off."""
+        return (COST, Objective(name=self.quantile.outputs[0]), *(criterion.objective for criterion in self.further))
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """The limits."""
+        return tuple(f"{name} at {limit:g}" for name, limit in self.limits.items())
+
+    @cached_property
+    def genes(self) -> Genes:
+        """Logarithms of scales or positions on ladders, and the clearances."""
+        lower, upper = to_genes(self.space.lower), to_genes(self.space.upper)
+        names, integer = list(self.space.columns), np.zeros(lower.size, bool)
+        for at, ladder in self._ladders:
+            names[at] = f"position of {names[at]} on {ladder.tolist()}"
+            integer[at], lower[at], upper[at] = True, 0.0, ladder.size - 1.0
+        return Genes(names=tuple(names), lower=lower, upper=upper, integer=integer)
+
+    @property
+    def _ladders(self) -> list[tuple[int, Float[np.ndarray, " position"]]]:
+        return [(self.space.groups.index(group), ladder) for group, ladder in self.ladders.items()]
+
+    def genes_of(self, designs: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, "design gene"]:
+        """Return the genes of designs; on a ladder the nearest step counts."""
+        genes = to_genes(designs)
+        for at, ladder in self._ladders:
+            genes[:, at] = np.abs(genes[:, at, np.newaxis] - np.log(ladder)).argmin(axis=1)
+        return self.genes.rounded(genes)
+
+    def designs_of(self, genes: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design variable"]:
+        """Return the designs that have these genes."""
+        genes = genes.copy()
+        for at, ladder in self._ladders:
+            genes[:, at] = np.log(ladder)[genes[:, at].astype(int)]
+        return from_genes(genes)
+
+    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
+        """Return the objectives of every design."""
+        designs = self.designs_of(designs)
+        evaluation = self.quantile(designs)
+        others = [criterion.value(designs) for criterion in self.further]
+        values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *others])
+        violation = np.empty((len(designs), len(self.limits)))
+        names = [objective.name for objective in self.objectives]
+        for at, (name, limit) in enumerate(self.limits.items()):
+            number = names.index(name)
+            violation[:, at] = self.objectives[number].sign * (values[:, number] - limit) / abs(limit)
+        return Objectives(values=values, violation=violation, status=evaluation.status)

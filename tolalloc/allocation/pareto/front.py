@@ -1,0 +1,213 @@
+"""The Pareto front of cost against the quantile: found on a surrogate, improved and judged by the real kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem
+from tolalloc.allocation.pareto.found import Found
+from tolalloc.allocation.pareto.genetic import search
+from tolalloc.allocation.pareto.indicators import knee, spread_over
+from tolalloc.allocation.pareto.remembered import RememberedResponse
+from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.exceptions import SolveError
+from tolalloc.surrogate.regression import Baseline, Regression, Surrogate, fitted, gaussian_process
+from tolalloc.surrogate.validation import FOLDS, Answers, answers_of, cross_validate
+from tolalloc.uncertainty.seeds import SeedTree
+
+
+@dataclass(frozen=True, kw_only=True)
+class Front:
+    """Designs of which none is better in every objective, smallest quantile first.
+
+    Parameters
+    ----------
+    designs
+        Scales [-] and clearances [µm].
+    cost
+        Cost [cost units].
+    quantile
+        Quantile of the peak-to-peak that the search was told [arcsec].
+    on_kernel
+        The same on the real kernel where it was run, NaN elsewhere [arcsec].
+    further
+        Further objectives [as their names state].
+    knee
+        Position of the design where the front bends most [-].
+    failed
+        Designs that failed on the kernel, in all rounds [-].
+    """
+
+    designs: Float[np.ndarray, "design variable"]
+    cost: Float[np.ndarray, " design"]
+    quantile: Float[np.ndarray, " design"]
+    on_kernel: Float[np.ndarray, " design"]
+    further: Float[np.ndarray, "design criterion"]
+    knee: int
+    failed: int
+
+    @property
+    def rms_error(self) -> float:
+        """Root-mean-square difference between what the search was told and the kernel, along the front [arcsec]."""
+        return float(np.sqrt(np.nanmean((self.quantile - self.on_kernel) ** 2)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontEffort:
+    """How much the search for the front may spend.
+
+    Parameters
+    ----------
+    population, generations
+        Size of the search on the surrogate [-].
+    population_on_kernel, generations_on_kernel
+        The same where the surrogate does not earn its place and the kernel itself runs [-].
+    designs
+        Designs around the chosen one that the first surrogate learns from [-].
+    rounds
+        Searches, each followed by kernel runs along its front that improve the next surrogate [-].
+    points
+        Kernel runs along the front after each search [-].
+    """
+
+    population: int = 80
+    generations: int = 100
+    population_on_kernel: int = 20
+    generations_on_kernel: int = 3
+    designs: int = 36
+    rounds: int = 2
+    points: int = 12
+
+
+def _front(found: Found, problem: DesignProblem, number: int) -> Front:
+    """Return the front of a search, not yet judged by the kernel.
+
+    Raises
+    ------
+    SolveError
+        No design is allowed.
+    """
+    front = found.front(number)
+    if not len(front.designs):
+        nearest = found.least_violating()
+        raise SolveError(
+            f"Pareto search: no design keeps every limit; the nearest one exceeds {nearest.blocking} by "
+            f"{nearest.violation.max():.3g} of it."
+        )
+    order = np.argsort(front.answers.values[:, 1], kind="stable")
+    values = front.answers.values[order]
+    return Front(
+        designs=problem.designs_of(front.designs[order]),
+        cost=values[:, 0],
+        quantile=values[:, 1],
+        on_kernel=np.full(order.size, np.nan),
+        further=values[:, 2:],
+        knee=knee(front.losses[order]),
+        failed=0,
+    )
+
+
+def pareto_front(
+    response: QuantileResponse,
+    baseline: Baseline,
+    designs: Float[np.ndarray, "design variable"],
+    convex_front: Float[np.ndarray, "known variable"],
+    seeds: SeedTree,
+    effort: FrontEffort,
+    ladders: Mapping[str, Float[np.ndarray, " position"]] | None = None,
+    further: tuple[Criterion, ...] = (),
+    checkpoint: Checkpoint | None = None,
+    largest_failed_share: float = 0.05,
+) -> tuple[Front, Surrogate]:
+    """Return the front and the surrogate it was found on, improved by kernel runs along the front.
+
+    Parameters
+    ----------
+    response
+        Quantile of a design on the real kernel.
+    baseline
+        Convex model of the quantile, which the surrogate corrects.
+    designs
+        First designs to run on the kernel.
+    convex_front
+        Designs of the convex program, run on the kernel too and part of every first population.
+    seeds
+        Node of the seed tree.
+    effort
+        How much may be spent.
+    ladders
+        Group → the scales that it may have, rising [-].
+    further
+        Further objectives.
+    checkpoint
+        Where the kernel's answers are kept, so that an interrupted search goes on with the same bits.
+    largest_failed_share
+        Share of the kernel's designs that may fail; a design fails with the first of its units [-].
+
+    Raises
+    ------
+    SolveError
+        More designs failed, or none is allowed.
+    """
+    kernel = RememberedResponse(response, checkpoint)
+    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further)
+    known = problem.genes_of(convex_front)
+    asked = np.concatenate([designs, problem.designs_of(known)])
+    candidate = _Corrected(columns=response.columns, outputs=response.outputs, baseline=baseline)
+    for number in range(effort.rounds):
+        own = seeds.child(str(number))
+        surrogate = candidate.judged(answers_of(kernel, asked, own.child("surrogate"), FOLDS, largest_failed_share))
+        trusted = surrogate.earns_its_place
+        found = search(
+            replace(problem, quantile=surrogate) if trusted else problem,
+            known,
+            own,
+            effort.population if trusted else effort.population_on_kernel,
+            effort.generations if trusted else effort.generations_on_kernel,
+        )
+        front = _front(found, problem, effort.population)
+        picked = spread_over(front.cost.size, effort.points)
+        evaluation = kernel(front.designs[picked])
+        front.on_kernel[picked] = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+        asked = np.concatenate([asked, front.designs[picked]])
+        known = np.concatenate([known, problem.genes_of(front.designs[picked])])
+    kernel.answers.write()
+    return replace(front, failed=int(np.count_nonzero(~kernel(asked).good))), surrogate
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Corrected:
+    """The convex model corrected by a Gaussian process of their ratio."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    baseline: Baseline
+    name: str = "corrected convex model"
+
+    def rough(self, x: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, " design"]:
+        """Return the convex model, which may fall below zero far from its design, above zero [arcsec]."""
+        return np.maximum(self.baseline(x), 1.0)
+
+    def fit(self, x: Float[np.ndarray, "design variable"], y: Float[np.ndarray, " design"]) -> Regression:
+        """Return the correction through answers."""
+        estimator = fitted(gaussian_process(len(self.columns)), x, y / self.rough(x))
+        return Regression(columns=self.columns, outputs=self.outputs, estimator=estimator, baseline=self.rough)
+
+    def judged(self, answers: Answers) -> Surrogate:
+        """Return the correction through all answers, judged on each by a fit that has not seen it."""
+        score, whole = cross_validate(self, answers), self.fit(answers.x, answers.y)
+        return Surrogate(
+            columns=self.columns,
+            outputs=self.outputs,
+            estimator=whole.estimator,
+            baseline=self.rough,
+            q2=score.q2,
+            rms_error=score.rms_error,
+            trained=answers.y.size,
+            held_out=score.held_out,
+        )

@@ -1,0 +1,178 @@
+"""NSGA-II for two objectives, NSGA-III for more, on real and integer genes together."""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.algorithms.moo.nsga3 import NSGA3
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.core.repair import Repair
+from pymoo.operators.selection.tournament import TournamentSelection
+from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
+from pymoo.optimize import minimize
+from pymoo.util.ref_dirs import get_reference_directions
+from scipy.stats import qmc
+
+from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.found import Found
+from tolalloc.allocation.pareto.indicators import spread_over
+from tolalloc.allocation.pareto.problem import Genes, ParetoProblem
+from tolalloc.allocation.pareto.remembered import RememberedProblem
+from tolalloc.exceptions import InputError
+from tolalloc.uncertainty.seeds import SeedTree
+
+_MARGIN = 0.49
+"""How far the operators may leave the range of an integer gene, so that its ends are drawn as often as the rest [-]."""
+
+
+class _Searched(Problem):  # type: ignore[misc]
+    """The problem as pymoo sees it: everything is made small, and one constraint sums up all violations."""
+
+    def __init__(self, problem: ParetoProblem) -> None:
+        self.searched, genes = problem, problem.genes
+        self.asked: list[Float[np.ndarray, "design gene"]] = []
+        self.signs = np.array([objective.sign for objective in problem.objectives])
+        margin = _MARGIN * genes.integer
+        super().__init__(
+            n_var=genes.lower.size,
+            n_obj=self.signs.size,
+            n_ieq_constr=1,
+            xl=genes.lower - margin,
+            xu=genes.upper + margin,
+        )
+
+    def _evaluate(self, x: Float[np.ndarray, "design gene"], out: dict[str, object], *_: object, **__: object) -> None:
+        self.asked.append(x)
+        answers = self.searched(x)
+        out["F"], out["G"] = answers.values * self.signs, answers.total_violation[:, np.newaxis]
+
+
+class _Rounded(Repair):  # type: ignore[misc]
+    """Integer genes stay whole numbers."""
+
+    def __init__(self, genes: Genes) -> None:
+        super().__init__()
+        self.genes = genes
+
+    def _do(self, _: Problem, x: Float[np.ndarray, "design gene"], **__: object) -> Float[np.ndarray, "design gene"]:
+        return self.genes.rounded(x)
+
+
+def _less_violating(
+    population: Population, pairs: Int[np.ndarray, "pair 2"], random_state: np.random.Generator, **_: object
+) -> Int[np.ndarray, "pair 1"]:
+    """Return the less violating one of each pair, or either of equals.
+
+    pymoo's own tournament of NSGA-III draws its ties between violating designs from a generator without a seed.
+    """
+    violation = population.get("CV")[:, 0][pairs]
+    equal = violation[:, 0] == violation[:, 1]
+    winner = np.where(equal, random_state.integers(0, 2, len(pairs)), np.argmin(violation, axis=1))
+    return np.take_along_axis(pairs, winner[:, np.newaxis], axis=1)
+
+
+def reference_directions(objectives: int, population: int) -> Float[np.ndarray, "direction objective"]:
+    """Return the finest regular lattice of Das & Dennis with no more directions than the population has designs.
+
+    Parameters
+    ----------
+    objectives
+        Number of objectives [-].
+    population
+        Designs of a generation [-].
+    """
+    partitions = 1
+    while comb(partitions + objectives, objectives - 1) <= population:
+        partitions += 1
+    return np.asarray(get_reference_directions("das-dennis", objectives, n_partitions=partitions))
+
+
+def _first_population(
+    genes: Genes, known: Float[np.ndarray, "known gene"], population: int, seeds: SeedTree
+) -> Float[np.ndarray, "design gene"]:
+    """Return known designs, evenly picked if there are too many, and a space-filling rest."""
+    first = known[spread_over(len(known), population)] if len(known) else known
+    reach = genes.upper - genes.lower + 2 * _MARGIN * genes.integer
+    fill = qmc.LatinHypercube(genes.lower.size, rng=seeds.generator()).random(population - len(first))
+    return genes.rounded(np.concatenate([first, genes.lower - _MARGIN * genes.integer + fill * reach]))
+
+
+def _algorithm(objectives: int, population: int, **options: Any) -> Algorithm:
+    if objectives == 2:
+        # Distances that are renewed after every removal leave a more even front than the original's.
+        return NSGA2(pop_size=population, survival=RankAndCrowding(crowding_func="pcd"), **options)
+    return NSGA3(
+        reference_directions(objectives, population),
+        pop_size=population,
+        selection=TournamentSelection(func_comp=_less_violating),
+        **options,
+    )
+
+
+def search(
+    problem: ParetoProblem,
+    known: Float[np.ndarray, "known gene"],
+    seeds: SeedTree,
+    population: int = 80,
+    generations: int = 100,
+    checkpoint: Checkpoint | None = None,
+) -> Found:
+    """Return every design that a search has asked for, in that order.
+
+    Parameters
+    ----------
+    problem
+        What is searched.
+    known
+        Genes of designs known to be good, part of the first generation, possibly none.
+    seeds
+        Node of the seed tree.
+    population, generations
+        Designs of a generation and number of generations, the first among them [-].
+    checkpoint
+        Where the answers are kept, so that an interrupted search goes on with the same bits.
+
+    Raises
+    ------
+    InputError
+        One objective alone, too small a search, or a checkpoint of something else.
+
+    Notes
+    -----
+    A generation forgets good designs where its front is crowded; the front of all designs never gets worse.
+
+    References
+    ----------
+    Deb, Pratap, Agarwal & Meyarivan 2002, IEEE Trans. Evol. Comput. 6:182–197; Deb & Jain 2014, ibid. 18:577–601;
+    distances between neighbours renewed after every removal: Kukkonen & Deb 2006, CEC, 1179–1186.
+    """
+    count = len(problem.objectives)
+    if count < 2:
+        raise InputError.at("Pareto search", "number of objectives", count, "2 or more")
+    if population < count + 1 or generations < 1:
+        raise InputError.at(
+            "Pareto search", "population and generations", (population, generations), f"{count + 1} and 1, or more"
+        )
+    remembered = RememberedProblem(problem, checkpoint)
+    searched = _Searched(remembered)
+    minimize(
+        searched,
+        _algorithm(
+            count,
+            population,
+            sampling=_first_population(problem.genes, known, population, seeds.child("fill")),
+            repair=_Rounded(problem.genes),
+        ),
+        ("n_gen", generations),
+        seed=seeds.child("genetic").integer(),
+        copy_algorithm=False,
+    )
+    remembered.answers.write()
+    designs = np.concatenate(searched.asked)
+    return Found(problem=problem, designs=designs, answers=remembered(designs))

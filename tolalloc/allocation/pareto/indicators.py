@@ -1,0 +1,108 @@
+"""How good a front is, and where it bends. All take losses: objectives with the sign that makes small good."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from pymoo.indicators.hv import HV
+from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+REFERENCE = 1.1
+"""Where the hypervolume ends in every objective: ideal at 0, nadir at 1, so the ends of the front count too [-]."""
+
+
+def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
+    """Return which designs no other one beats in one objective without losing in another; equal ones stay both."""
+    front = np.zeros(len(losses), bool)
+    front[NonDominatedSorting().do(losses, only_non_dominated_front=True)] = True
+    return front
+
+
+def thinned(losses: Float[np.ndarray, "design objective"], number: int) -> Int[np.ndarray, " kept"]:
+    """Return the positions of at most so many designs of a front, those in the densest places left out one by one.
+
+    Parameters
+    ----------
+    losses
+        Losses of a front.
+    number
+        How many may stay [-].
+
+    References
+    ----------
+    Kukkonen & Deb 2006, CEC, 1179–1186, for two objectives; Kukkonen & Deb 2006, PPSN IX, 553–562, for more.
+    """
+    if len(losses) <= number:
+        return np.arange(len(losses))
+    crowding = get_crowding_function("pcd" if losses.shape[1] == 2 else "mnn")
+    distance = crowding.do(losses, n_remove=len(losses) - number)
+    return np.asarray(np.sort(np.argsort(-distance, kind="stable")[:number]))
+
+
+def normalised(
+    losses: Float[np.ndarray, "design objective"], front: Float[np.ndarray, "point objective"]
+) -> Float[np.ndarray, "design objective"]:
+    """Return losses where 0 is the best and 1 the worst value on a front [-]."""
+    ideal, nadir = front.min(axis=0), front.max(axis=0)
+    return np.asarray((losses - ideal) / np.where(nadir > ideal, nadir - ideal, 1.0))
+
+
+def hypervolume_ratio(
+    losses: Float[np.ndarray, "design objective"], exact: Float[np.ndarray, "point objective"]
+) -> float:
+    """Return the hypervolume of a front over that of the exact one [-].
+
+    Parameters
+    ----------
+    losses
+        Losses of the front, dominated designs allowed.
+    exact
+        Losses of points on the exact front, its ends among them.
+
+    Notes
+    -----
+    The volume of a few exact points is a staircase below the exact front's own, so a denser front may exceed 1.
+
+    References
+    ----------
+    Zitzler & Thiele 1999, IEEE Trans. Evol. Comput. 3:257–271; reference point of Ishibuchi et al. 2018, Evol.
+    Comput. 26:411–440.
+    """
+    volume = HV(ref_point=np.full(exact.shape[1], REFERENCE))
+    return float(volume(normalised(losses, exact)) / volume(normalised(exact, exact)))
+
+
+def knee(losses: Float[np.ndarray, "design objective"]) -> int:
+    """Return the position of the knee: the design farthest below the plane through the ends of the front.
+
+    Parameters
+    ----------
+    losses
+        Losses of a front.
+
+    Notes
+    -----
+    The ends of a normalised front of two objectives are (0, 1) and (1, 0), so the distance grows as the sum of the
+    objectives falls; with more of them the plane is that through the unit points. Unlike the bend angle it depends on
+    the whole front, not on the noise and the spacing of three neighbours. A front that bends nowhere gives one of its
+    ends.
+
+    References
+    ----------
+    Das 1999, Struct. Optim. 18:107–115.
+    """
+    return int(np.argmin(normalised(losses, losses).sum(axis=1)))
+
+
+def spread_over(count: int, number: int) -> list[int]:
+    """Return at most so many positions among ``count``, evenly spread, the first and the last among them.
+
+    Parameters
+    ----------
+    count
+        How many there are [-].
+    number
+        How many are wanted [-].
+    """
+    return [int(at) for at in np.unique(np.linspace(0, count - 1, min(number, count)).astype(int))]
