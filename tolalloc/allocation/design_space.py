@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.allocation.cost.closed_forms import Reciprocal
+from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.cost.sampled import SumOfCosts
+from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
+from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import CycloidStage, Modification
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.sources import Source
 from tolalloc.units import MICROMETRE
 
+AS_PRICED = "as priced in the tolerance table"
+"""Name of the process of a source that has no other: cost at its zone, falling as 1/zone."""
+
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
+
+_ROUNDING = 1e-9
+"""Distance of a scale from a process's range up to which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClearanceRange:
-    """Nominal clearances that the modification may leave between pins and teeth.
+    """Nominal clearances that the modification may leave between pins and teeth; equal bounds lock one.
 
     Parameters
     ----------
@@ -45,6 +57,14 @@ class DesignSpace:
         Cycloid stage of the reducer.
     clearances
         Range of the clearances.
+    processes
+        Source → ways to make it, zones in [m]; without an entry it costs what the tolerance table says at its zone,
+        and that falls as 1/zone.
+
+    Raises
+    ------
+    InputError
+        Members of a group that have no process in common, or none that can hold the ratios of their zones.
 
     Notes
     -----
@@ -55,6 +75,10 @@ class DesignSpace:
     errors: ErrorModel
     stage: CycloidStage
     clearances: ClearanceRange
+    processes: Mapping[str, tuple[Process, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _ = self.features  # contradictions are found before anything long runs
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
@@ -73,10 +97,21 @@ class DesignSpace:
             [-1 if source.locked else self.groups.index(source.group) for source in self.errors.active], dtype=int
         )
 
+    def by_scale(self, by_zone: Float[np.ndarray, "*units source"]) -> Float[np.ndarray, "*units group"]:
+        """Return derivatives by the scales from those by the zones [output/m → output]."""
+        members = self.group_of_source[:, np.newaxis] == np.arange(len(self.groups))
+        return np.asarray((by_zone * self.errors.zones) @ members)
+
     @cached_property
-    def costs(self) -> Float[np.ndarray, " group"]:
-        """Cost of each group at scale 1 [cost units]."""
-        return np.array([sum(source.cost for source in self._members(group)) for group in self.groups])
+    def features(self) -> tuple[Feature, ...]:
+        """Every group with the processes that all of its members have, over its scale."""
+        return tuple(Feature(name=group, processes=self._processes(group)) for group in self.groups)
+
+    @cached_property
+    def shared(self) -> Shared:
+        """The two clearances."""
+        low, high = np.array([self.clearances.flank, self.clearances.radial]).T / MICROMETRE
+        return Shared(names=(FLANK, RADIAL), lower=low, upper=high)
 
     @cached_property
     def locked_cost(self) -> float:
@@ -86,14 +121,54 @@ class DesignSpace:
     @cached_property
     def lower(self) -> Float[np.ndarray, " variable"]:
         """Smallest value of every variable."""
-        scales = [max(s.minimum / s.zone for s in self._members(group)) for group in self.groups]
-        return np.array([*scales, self.clearances.flank[0] / MICROMETRE, self.clearances.radial[0] / MICROMETRE])
+        scales = [min(process.minimum for process in feature.processes) for feature in self.features]
+        return np.append(scales, self.shared.lower)
 
     @cached_property
     def upper(self) -> Float[np.ndarray, " variable"]:
         """Largest value of every variable."""
-        scales = [min(s.maximum / s.zone for s in self._members(group)) for group in self.groups]
-        return np.array([*scales, self.clearances.flank[1] / MICROMETRE, self.clearances.radial[1] / MICROMETRE])
+        scales = [max(process.maximum for process in feature.processes) for feature in self.features]
+        return np.append(scales, self.shared.upper)
+
+    def problem(self, stacks: tuple[Stack, ...]) -> AllocationProblem:
+        """Return the allocation that keeps the stacks."""
+        return AllocationProblem(features=self.features, stacks=stacks, shared=self.shared)
+
+    def _processes(self, group: str) -> tuple[Process, ...]:
+        """Return the processes of a group; a member without an entry goes with whatever the others choose."""
+        members = self._members(group)
+        named = [self.processes[source.name] for source in members if source.name in self.processes]
+        names = [made.name for made in named[0]] if named else [AS_PRICED]
+        common = [name for name in names if all(name in {made.name for made in other} for other in named)]
+        if not common:
+            raise InputError(f"group {group}: its members have no process in common; they are made alike.")
+        found = [_joint(name, members, [self._made(source, name) for source in members]) for name in common]
+        possible = tuple(process for process in found if process)
+        if not possible:
+            raise InputError(f"group {group}: no process can hold the ratios of its members' zones.")
+        return possible
+
+    def _made(self, source: Source, name: str) -> Process:
+        """Return the process of a source by name, over its zone [m]."""
+        if source.name in self.processes:
+            return next(made for made in self.processes[source.name] if made.name == name)
+        return Process(
+            name=AS_PRICED,
+            cost=Reciprocal(factor=source.cost * source.zone),
+            minimum=source.minimum,
+            maximum=source.maximum,
+        )
+
+    def made_by(self, design: Float[np.ndarray, " variable"]) -> dict[str, Process]:
+        """Return the process of every source whose zone may change, over its zone [m]."""
+        names = dict(zip(self.groups, self.process_names(design), strict=True))
+        free = [source for source in self.errors.active if not source.locked]
+        return {source.name: self._made(source, names[source.group]) for source in free}
+
+    @cached_property
+    def first_zones(self) -> Float[np.ndarray, " group"]:
+        """Zone of the first member of every group in the tolerance table [m]."""
+        return np.array([self._members(group)[0].zone for group in self.groups])
 
     def _members(self, group: str) -> list[Source]:
         return [source for source in self.errors.active if not source.locked and source.group == group]
@@ -113,11 +188,47 @@ class DesignSpace:
         columns = [Modification.from_clearances(*clearances, self.stage) for clearances in ((1.0, 0.0), (0.0, 1.0))]
         return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
 
+    def process_positions(self, designs: Float[np.ndarray, "*designs variable"]) -> Int[np.ndarray, "*designs group"]:
+        """Return the position of the cheapest process that holds each scale, or comes nearest to it [-]."""
+        return np.stack([self._cheapest(at, designs[..., at])[0] for at in range(len(self.groups))], axis=-1)
+
+    def process_names(self, design: Float[np.ndarray, " variable"]) -> tuple[str, ...]:
+        """Return the name of the process of every group."""
+        positions = self.process_positions(design)
+        return tuple(feature.processes[at].name for feature, at in zip(self.features, positions, strict=True))
+
     def cost(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
-        """Return the cost, reciprocal in every zone [cost units]."""
-        return np.asarray((self.costs / designs[..., : len(self.groups)]).sum(axis=-1) + self.locked_cost)
+        """Return the cost, each group made by the cheapest process that holds it [cost units]."""
+        costs = [self._cheapest(at, designs[..., at])[1] for at in range(len(self.groups))]
+        return np.asarray(np.sum(costs, axis=0) + self.locked_cost)
+
+    def _cheapest(
+        self, group: int, scales: Float[np.ndarray, "*designs"]
+    ) -> tuple[Int[np.ndarray, "*designs"], Float[np.ndarray, "*designs"]]:
+        processes = self.features[group].processes
+        totals = np.stack([process.total(scales) for process in processes])
+        outside = np.stack([np.maximum(made.minimum - scales, scales - made.maximum) for made in processes])
+        outside = np.where(outside > _ROUNDING, outside, 0.0)
+        allowed = np.where(outside <= outside.min(axis=0), totals, np.inf)
+        return np.asarray(allowed.argmin(axis=0)), np.asarray(allowed.min(axis=0))
 
     def uniform(self, scale: float, modification: Modification) -> Float[np.ndarray, " variable"]:
         """Return the design with all zones scaled alike and the given modification, whatever the bounds."""
         clearances = [modification.flank_clearance(self.stage), modification.radial_clearance]
         return np.array([*([scale] * len(self.groups)), *(value / MICROMETRE for value in clearances)])
+
+
+def _joint(name: str, members: list[Source], made: list[Process]) -> Process | None:
+    """Return a process of a whole group over its scale, none if the members' ranges do not meet."""
+    zones = [source.zone for source in members]
+    minimum = max(each.minimum / zone for each, zone in zip(made, zones, strict=True))
+    maximum = min(each.maximum / zone for each, zone in zip(made, zones, strict=True))
+    if minimum > maximum:
+        return None
+    return Process(
+        name=name,
+        cost=SumOfCosts(models=tuple(each.cost for each in made), ratios=tuple(zones)),
+        minimum=minimum,
+        maximum=maximum,
+        change=sum(each.change for each in made),
+    )

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.local_model import Side
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import KernelResponse
 
@@ -62,57 +63,16 @@ class QuantileResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class LocalQuantile:
-    """Convex model of the quantile around one design: offset + slopes·clearances + ‖weights∘scales‖₂.
+    """The quantile that the convex model around a verified design predicts for other designs.
 
     Parameters
     ----------
-    offset
-        Constant part [arcsec].
-    slopes
-        Change with flank and radial clearance [arcsec/µm].
-    weights
-        Contribution of each group at scale 1 [arcsec].
-
-    Notes
-    -----
-    Theory page, equation (25). Value and gradient at the design are those of the kernel. The norm is how independent
-    random errors combine, so the model bends the right way and is convex in scales and clearances together.
+    side
+        The upper limit on the peak-to-peak at the verified design, with its model.
     """
 
-    offset: float
-    slopes: Float[np.ndarray, " 2"]
-    weights: Float[np.ndarray, " group"]
+    side: Side
 
     def __call__(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the model's quantile [arcsec]."""
-        spread = np.sqrt(((self.weights * designs[..., :-2]) ** 2).sum(axis=-1))
-        return np.asarray(self.offset + designs[..., -2:] @ self.slopes + spread)
-
-
-def local_quantile(
-    design: Float[np.ndarray, " variable"], quantile: float, gradient: Float[np.ndarray, " variable"]
-) -> LocalQuantile:
-    """Return the convex model with the given value and gradient at a design.
-
-    Parameters
-    ----------
-    design
-        Scales [-] and clearances [µm].
-    quantile
-        Quantile there [arcsec].
-    gradient
-        Its derivative by every variable [arcsec, arcsec/µm].
-
-    Notes
-    -----
-    ‖weights∘scales‖ is homogeneous, so its value is gradient·scales. A group whose larger zone lowers the quantile,
-    by noise or because its errors open the contact, gets weight zero: the model never rewards a larger error.
-    """
-    scales, clearances = design[:-2], design[-2:]
-    by_scale = np.maximum(gradient[:-2], 0.0)
-    spread = float(by_scale @ scales)
-    return LocalQuantile(
-        offset=float(quantile - spread - gradient[-2:] @ clearances),
-        slopes=gradient[-2:].copy(),
-        weights=np.sqrt(by_scale * spread / scales),
-    )
+        return self.side.limit + self.side.predicted(designs)

@@ -1,32 +1,31 @@
-"""From a requirement to a verified allocation: steps of the convex program, by hand beside it, and the front."""
+"""From requirements to a verified allocation: steps of the convex program, by hand beside it, and the front."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from tolalloc.allocation.convex import ConvexAllocation, cost_bound
+from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.pareto import Front, FrontEffort, from_genes, pareto_front, to_genes
-from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.verification import Requirement, VerifiedDesign, Verifier, answer
-from tolalloc.exceptions import InputError
+from tolalloc.allocation.program import process_choice
+from tolalloc.allocation.program.front import front
+from tolalloc.allocation.program.problem import Solution, Stack
+from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
+from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.trust_region import SETTLED, Programs, kept_stacks, step_to_optimum
+from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reducer.design import Modification
 from tolalloc.surrogate.regression import Surrogate
 from tolalloc.uncertainty.seeds import SeedTree
 
-AIM = 0.985
-"""Internal limit over the limit: about one standard error of the verified quantile inside it [-]."""
-
-SETTLED = 0.01
-"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
-
-
-_SIMILAR = 0.1
-"""Relative difference of cost within which designs share one convex model [-]."""
+_ROUNDING = 1e-9
+"""Distance from a bound, over the bound, up to which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,45 +49,77 @@ class SearchEffort:
 
 @dataclass(frozen=True, kw_only=True)
 class Allocation:
-    """Everything that the search found.
+    """What the search found.
 
     Parameters
     ----------
     limit
         Largest peak-to-peak allowed [arcsec].
+    groups
+        Names of the groups, in the order of the scales.
     chosen
         The cheapest design that fresh units on the real kernel show to be met, or the least violating one.
     tried
         All designs verified on the way, in order.
-    by_hand
-        Zones of the tolerance table scaled alike until met, modification as it was.
-    baseline
-        The tolerance table as it is, modification as it was.
-    bound
-        Lower bound on the cost of every design to which the chosen design's convex model gives its own quantile
-        [cost units].
-    surrogate
-        Surrogate of the quantile over designs, with its Q².
-    front
-        Pareto front of cost against the quantile.
-    convex_front
-        Designs of the convex program for a ladder of limits, the seed of NSGA-II [-, µm].
+    hand_tried
+        Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself.
+    optimum
+        Cheapest design of all that the chosen one's convex models let keep the limits as the chosen one does; without
+        locked zones.
+    locked_cost
+        Cost of the locked zones [cost units].
     """
 
     limit: float
+    groups: tuple[str, ...]
     chosen: VerifiedDesign
     tried: tuple[VerifiedDesign, ...]
-    by_hand: VerifiedDesign
-    baseline: VerifiedDesign
-    bound: float
-    surrogate: Surrogate
-    front: Front
-    convex_front: Float[np.ndarray, "design variable"]
+    hand_tried: tuple[VerifiedDesign, ...]
+    optimum: Solution
+    locked_cost: float
+
+    @property
+    def by_hand(self) -> VerifiedDesign:
+        """The cheapest met design with all zones scaled alike, or the least violating one."""
+        return answer(self.hand_tried)
+
+    @property
+    def baseline(self) -> VerifiedDesign:
+        """The tolerance table as it is, modification as it was."""
+        return self.hand_tried[0]
+
+    @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The chosen design's local models with the room that the search aims at, or that the design takes of it."""
+        return kept_stacks(self.chosen, self.tried)
+
+    @property
+    def bound(self) -> float:
+        """Lower bound on the cost of every such design, computed without the solver [cost units]."""
+        return self.optimum.bound + self.locked_cost
 
     @property
     def gap(self) -> float:
         """Cost of the chosen design over the bound, minus one [-]."""
         return self.chosen.cost / self.bound - 1
+
+    @property
+    def prices(self) -> dict[str, float]:
+        """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output]."""
+        return {
+            side.stack.name: float(price) for side, price in zip(self.chosen.sides, self.optimum.prices, strict=True)
+        }
+
+    @property
+    def bound_prices(self) -> dict[str, tuple[float, float]]:
+        """Group → cost saved by moving its smallest and its largest scale outwards [cost units per unit of scale]."""
+        prices = zip(self.groups, self.optimum.bound_prices.tolist(), strict=True)
+        return {group: (low, high) for group, (low, high) in prices}
+
+    @property
+    def blocking(self) -> Check | None:
+        """The requirement that the least violating design misses most, none where the chosen design meets them all."""
+        return None if self.chosen.met else self.chosen.blocking
 
     @property
     def saving(self) -> float:
@@ -105,84 +136,155 @@ class Allocation:
         return 1 - self.chosen.cost / (self.by_hand.cost * unused)
 
 
-def require_reachable(response: QuantileResponse, requirement: Requirement, place: str) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ConvexFront:
+    """The cheapest designs for several limits of the peak-to-peak, by the convex models around one design.
+
+    Parameters
+    ----------
+    limits
+        The limits that can be kept [arcsec].
+    designs
+        Scales [-] and clearances [µm].
+    cost, bound
+        Cost, and a lower bound on it that takes no solver's word [cost units].
+    """
+
+    limits: Float[np.ndarray, " limit"]
+    designs: Float[np.ndarray, "limit variable"]
+    cost: Float[np.ndarray, " limit"]
+    bound: Float[np.ndarray, " limit"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocationWithFront(Allocation):
+    """The same with the Pareto front of cost against the quantile of the peak-to-peak.
+
+    Parameters
+    ----------
+    surrogate
+        Surrogate of the quantile over designs, with its Q².
+    front
+        Pareto front of cost against the quantile.
+    exact
+        Front of the convex program, the seed of NSGA-II.
+    """
+
+    surrogate: Surrogate
+    front: Front
+    exact: ConvexFront
+
+
+def require_reachable(response: QuantileResponse, limit: float, target: float, place: str) -> None:
     """Raise unless the smallest zones of the table, with the best corner of the clearances, can keep the limit.
+
+    Parameters
+    ----------
+    response
+        Quantile of a design on the real kernel.
+    limit
+        Largest peak-to-peak allowed [arcsec].
+    target
+        Yield asked for [-].
+    place
+        Where they stand, for the message.
 
     Raises
     ------
     InputError
         The limit is below what the smallest zones leave, or no zone may change.
     """
-    if not response.space.groups:
-        raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
+    require_groups(response.space, place)
     lower, upper = response.space.lower, response.space.upper
     corners = [[*lower[:-2], flank, radial] for flank in (lower[-2], upper[-2]) for radial in (lower[-1], upper[-1])]
     least = float(response(np.array(corners)).values.min())
-    if not least <= requirement.limit:
+    if not least <= limit:
         raise InputError(
-            f"{place}: limit_arcsec is {requirement.limit:g}; allowed is {least:.3g} or more, the peak-to-peak that "
-            f"{requirement.target:.2%} of units keep with every zone at its smallest (min in the tolerance table)."
+            f"{place}: limit_arcsec is {limit:g}; allowed is {least:.3g} or more, the peak-to-peak that "
+            f"{target:.2%} of units keep with every zone at its smallest (min in the tolerance table)."
         )
 
 
-def scale_by_hand(verifier: Verifier, modification: Modification, steps: int) -> tuple[VerifiedDesign, ...]:
-    """Return designs with all zones scaled alike, the first the tolerance table as it is.
+def require_groups(space: DesignSpace, place: str) -> None:
+    """Raise unless a zone may change.
 
-    Notes
-    -----
-    The scale follows the design's own gradient until a met design has next to nothing left to gain: what an
-    engineer does with a few Monte Carlo runs.
+    Raises
+    ------
+    InputError
+        None may.
     """
-    space, limit, scale = verifier.space, verifier.requirement.limit, 1.0
-    tried: list[VerifiedDesign] = []
-    for step in range(steps):
-        tried.append(verifier.verify(space.uniform(scale, modification), f"by hand {step + 1}"))
-        bound = tried[-1].quantile_bound
-        rise = max(float(tried[-1].by_zone @ space.errors.zones) * scale, 0.1 * bound)
-        factor = float(np.clip(1 + (AIM * limit - bound) / rise, 0.4, 2.5))
-        if tried[-1].met and factor < 1 + SETTLED:
-            break
-        scale *= factor
-    return tuple(tried)
+    if not space.groups:
+        raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
 
 
-def step_to_optimum(
-    verifier: Verifier, program: ConvexAllocation, start: VerifiedDesign, effort: SearchEffort
-) -> tuple[VerifiedDesign, ...]:
-    """Return the designs of a trust-region sequence; each is verified on fresh units before the next is made.
+def _optimum(space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> Solution:
+    # A load that is its own room may lie beyond it by rounding.
+    stacks = tuple(replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried))
+    found = process_choice.allocate(space.problem(stacks))
+    if not isinstance(found, Solution):
+        raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")
+    return found
+
+
+def allocate(
+    verifier: Verifier,
+    hand_tried: tuple[VerifiedDesign, ...],
+    effort: SearchEffort,
+    start: VerifiedDesign | None = None,
+) -> Allocation:
+    """Return the cheapest verified allocation, or the least violating one with what blocks it.
 
     Parameters
     ----------
     verifier
-        Judges the designs and gives the convex model around each.
-    program
-        The convex program.
-    start
-        A verified design to start from.
+        Judges designs on fresh units.
+    hand_tried
+        Designs with all zones scaled alike, `tolalloc.allocation.by_hand.scale_by_hand`.
     effort
-        Steps and first reach.
-
-    Notes
-    -----
-    A quantile bound of a few thousand units is uncertain by a percent or two. Where the model of the last design also
-    explains earlier ones of similar cost, their mean deviation from it corrects it, so the noise averages out.
+        How much may be spent.
+    start
+        A verified design to start from, the best one by hand if there is none; with the reducer's own modification it
+        tells tolerances alone from tolerances and modification together.
     """
-    space, limit, reach = verifier.space, verifier.requirement.limit, effort.reach
-    tried = [start]
-    for step in range(effort.steps):
-        last = tried[-1]
-        design = np.clip(last.design, space.lower, space.upper)
-        lower, upper = np.maximum(space.lower, design / reach), np.minimum(space.upper, design * reach)
-        similar = [item for item in tried if abs(item.cost / last.cost - 1) < _SIMILAR]
-        correction = float(np.mean([item.quantile_bound - last.local(item.design) for item in similar]))
-        found = program.solve(last.local, AIM * limit - correction, lower, upper)
-        if found is None:  # even the region's smallest zones do not reach the limit: they are the step to take
-            found = np.append(lower[:-2], np.where(last.local.slopes > 0, lower[-2:], upper[-2:]))
-        if step > 0 and last.met and space.cost(found) > (1 - SETTLED) * last.cost:
-            break
-        tried.append(verifier.verify(found, f"convex {step + 1}"))
-        reach = max(1.25, float(np.sqrt(reach)))
-    return tuple(tried[1:])
+    first, space = start or answer(hand_tried), verifier.space
+    # By hand no bounds are asked for; a start that keeps them is an answer like any other.
+    inside = np.all((first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING)))
+    tried = ((first,) if inside else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
+    chosen = answer(tried)
+    return Allocation(
+        limit=verifier.limit,
+        groups=space.groups,
+        chosen=chosen,
+        tried=tried,
+        hand_tried=hand_tried,
+        optimum=_optimum(space, chosen, tried),
+        locked_cost=space.locked_cost,
+    )
+
+
+def exact_front(space: DesignSpace, best: VerifiedDesign, shares: Float[np.ndarray, " share"]) -> ConvexFront:
+    """Return the cheapest designs for several limits of the peak-to-peak, leaving out those that cannot be kept.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    best
+        The verified design whose models count; its processes stay.
+    shares
+        The limits over the one asked for [-].
+    """
+    program = Programs(space, len(best.sides)).of(space.process_positions(best.design))
+    first, stacks = best.sides[0], [side.stack for side in best.sides]
+    solved = front(program, stacks, 0, first.stack.room + (shares - 1) * first.limit)
+    known = [(share, found) for share, found in zip(shares.tolist(), solved, strict=True) if found]
+    designs = [np.concatenate([found.zones, found.shared]) for _, found in known]
+    return ConvexFront(
+        limits=np.array([share * first.limit for share, _ in known]),
+        designs=np.array(designs).reshape(-1, space.lower.size),
+        cost=np.array([found.cost + space.locked_cost for _, found in known]),
+        bound=np.array([found.bound + space.locked_cost for _, found in known]),
+    )
 
 
 def designs_around(
@@ -197,14 +299,14 @@ def designs_around(
     return from_genes(lower + unit * (upper - lower))
 
 
-def allocate(
+def allocate_with_front(
     response: QuantileResponse,
     verifier: Verifier,
     modification: Modification,
     seeds: SeedTree,
     effort: SearchEffort,
-) -> Allocation:
-    """Return the cheapest verified allocation and what it is compared with.
+) -> AllocationWithFront:
+    """Return the cheapest verified allocation, and the front of cost against the quantile of the peak-to-peak.
 
     Parameters
     ----------
@@ -219,32 +321,34 @@ def allocate(
     effort
         How much may be spent.
     """
-    space, limit = response.space, verifier.requirement.limit
-    by_hand, program = scale_by_hand(verifier, modification, effort.steps), ConvexAllocation(space)
-    tried = step_to_optimum(verifier, program, answer(by_hand), effort)
-    best = answer(tried)
-    convex_front = program.front(best.local, np.linspace(0.6, 1.5, effort.front.points) * limit)
-    front, surrogate = pareto_front(
+    space = verifier.space
+    found = allocate(verifier, scale_by_hand(verifier, modification, effort.steps), effort)
+    best = found.chosen
+    exact = exact_front(space, best, np.linspace(0.6, 1.5, effort.front.points))
+    pareto, surrogate = pareto_front(
         replace(response, spread=best.spread),
-        best.local,
+        LocalQuantile(side=best.sides[0]),
         designs_around(space, best.design, 2.5, effort.front.designs, seeds.child("designs")),
-        convex_front,
+        exact.designs,
         seeds.child("pareto"),
         effort.front,
     )
     # The front may have found something cheaper; it counts only if fresh units say so.
-    cheaper = (front.quantile <= best.quantile_bound) & (front.cost < (1 - SETTLED) * best.cost)
+    cheaper = (pareto.quantile <= best.quantile_bound) & (pareto.cost < (1 - SETTLED) * best.cost)
+    tried, chosen, optimum = found.tried, found.chosen, found.optimum
     if cheaper.any():
-        tried += (verifier.verify(front.designs[cheaper][np.argmin(front.cost[cheaper])], "front"),)
-    chosen = answer(tried)
-    return Allocation(
-        limit=limit,
+        tried += (verifier.verify(pareto.designs[cheaper][np.argmin(pareto.cost[cheaper])], "front"),)
+        chosen = answer(tried)
+        optimum = _optimum(space, chosen, tried)
+    return AllocationWithFront(
+        limit=found.limit,
+        groups=found.groups,
         chosen=chosen,
         tried=tried,
-        by_hand=answer(by_hand),
-        baseline=by_hand[0],
-        bound=cost_bound(space, chosen.local, float(chosen.local(chosen.design)), chosen.design),
+        hand_tried=found.hand_tried,
+        optimum=optimum,
+        locked_cost=found.locked_cost,
         surrogate=surrogate,
-        front=front,
-        convex_front=convex_front,
+        front=pareto,
+        exact=exact,
     )

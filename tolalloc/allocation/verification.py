@@ -5,30 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.quantile import LocalQuantile, local_quantile
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
-from tolalloc.response.kernel import KernelResponse, WithDerivatives
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.requirement import Check, Requirement
+from tolalloc.allocation.trial import FreshUnits, OutputTrial
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.exceptions import InputError
+from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.units import MICROMETRE
-
-
-@dataclass(frozen=True, kw_only=True)
-class Requirement:
-    """Upper limit on the peak-to-peak transmission error and the share of units that must keep it.
-
-    Parameters
-    ----------
-    limit
-        Largest peak-to-peak allowed, output side, one turn [arcsec].
-    target
-        Yield asked for [-].
-    """
-
-    limit: float
-    target: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,35 +27,58 @@ class VerifiedDesign:
         Which search made it, and its number there.
     design
         Scales [-] and clearances [µm].
+    processes
+        Name of the process of every group.
     cost
         Cost [cost units].
     sample
-        The fresh units on the real kernel.
+        The fresh units on the real kernel with their peak-to-peak.
     achieved
-        Yield within the limit.
-    met
-        Whether the one-sided 95 % lower bound of the yield reaches the target.
-    quantile_bound
-        Smallest limit that the sample shows to be kept at the target yield with that confidence [arcsec].
+        Yield within the limit of the peak-to-peak.
+    checks
+        How the design stands against every requirement, the peak-to-peak first.
+    joint
+        Share of units that keep the limits of all requirements.
+    outputs
+        Outputs of all requirements of every fresh unit, NaN where a unit has none.
     by_zone
-        Change of the quantile with the zone of each active source [arcsec/m].
-    local
-        Convex model of the quantile bound around this design.
+        Change of the peak-to-peak's quantile with the zone of each active source [arcsec/m].
     """
 
     name: str
     design: Float[np.ndarray, " variable"]
+    processes: tuple[str, ...]
     cost: float
     sample: MonteCarlo
     achieved: Yield
-    met: bool
-    quantile_bound: float
+    checks: tuple[Check, ...]
+    joint: Yield
+    outputs: dict[str, Float[np.ndarray, " unit"]]
     by_zone: Float[np.ndarray, " source"]
-    local: LocalQuantile
+
+    @property
+    def met(self) -> bool:
+        """Whether every requirement is shown to be met."""
+        return all(check.met for check in self.checks)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """All limited sides of all requirements."""
+        return tuple(side for check in self.checks for side in check.sides)
+
+    @property
+    def blocking(self) -> Check:
+        """The requirement with the largest relative excess."""
+        return max(self.checks, key=lambda check: check.tightest.relative_excess)
+
+    @property
+    def quantile_bound(self) -> float:
+        """What of the peak-to-peak is compared with its limit: at a yield, the smallest limit shown kept [arcsec]."""
+        return self.checks[0].sides[0].value
 
     @property
     def spread(self) -> float:
-        """Distance of the quantile bound from the mean of the sample over its standard deviation [-]."""
+        """Distance of that from the mean of the sample over its standard deviation [-]."""
         values = self.sample.values
         return float((self.quantile_bound - values.mean()) / values.std(ddof=1))
 
@@ -84,22 +93,42 @@ class Verifier:
         The design variables.
     kernel
         The real kernel.
-    requirement
-        Limit and target yield.
+    requirements
+        What must be kept; the first one limits the peak-to-peak from above.
     seeds
         Node of the seed tree; every verification takes its own child.
     units
         Units per verification [-].
+    slope_units
+        How many of them the derivatives of other outputs than the peak-to-peak are averaged over [-].
     largest_failed_share
-        Share of them that may fail [-].
+        Share of the units that may fail [-].
+
+    Raises
+    ------
+    InputError
+        No upper limit on the peak-to-peak stands first, or there are too few units for a guarantee.
     """
 
     space: DesignSpace
     kernel: KernelResponse
-    requirement: Requirement
+    requirements: tuple[Requirement, ...]
     seeds: SeedTree
     units: int
+    slope_units: int = 1024
     largest_failed_share: float = LARGEST_FAILED_SHARE
+
+    def __post_init__(self) -> None:
+        first = self.requirements[0]
+        if first.output != PEAK_TO_PEAK or first.limits.upper is None or first.limits.lower is not None:
+            raise InputError(f"requirements: the first one must be an upper limit on the {PEAK_TO_PEAK}.")
+        for requirement in self.requirements:
+            requirement.guarantee.require_enough(self.units)
+
+    @property
+    def limit(self) -> float:
+        """Largest peak-to-peak allowed [arcsec]."""
+        return float(self.requirements[0].limits.upper or np.inf)
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design judged by fresh units of its own.
@@ -109,56 +138,57 @@ class Verifier:
         SolveError
             More units failed.
         """
-        errors, zones = self.space.errors, self.space.zones(design)
-        uniform = np.concatenate(list(self.seeds.child(name).uniform_chunks(self.units, len(errors.columns))))
-        standard = errors.standard_values(uniform)
-        response = self.kernel.with_modification(self.space.modification(design))
-        x = errors.deviations(standard, zones)
-        answers = response.with_derivatives(x)
-        sample = MonteCarlo(x=x, evaluation=answers.evaluation)
-        require_few_failures(sample, name, self.largest_failed_share)
-        bound = sample.quantile_bound(self.requirement.target)
-        by_zone, by_clearance = self._gradient(standard, answers, min(bound, float(sample.values.max())))
-        by_scale = np.bincount(
-            self.space.group_of_source + 1,
-            weights=by_zone * errors.zones,
-            minlength=len(self.space.groups) + 1,
-        )[1:]
-        achieved = sample.within(self.requirement.limit)
+        seeds, errors = self.seeds.child(name), self.space.errors
+        outputs = tuple(dict.fromkeys(requirement.output for requirement in self.requirements))
+        others = tuple(output for output in outputs if output != PEAK_TO_PEAK)
+        fresh = FreshUnits(
+            space=self.space,
+            kernel=self.kernel,
+            design=design,
+            standard=errors.standard_values(np.concatenate([*seeds.uniform_chunks(self.units, len(errors.columns))])),
+            outputs=others,
+            slope_units=self.slope_units,
+            seeds=seeds,
+        )
+        require_few_failures(fresh.sample, name, self.largest_failed_share)
+        if others:
+            require_few_failures(MonteCarlo(x=fresh.x, evaluation=fresh.others), name, self.largest_failed_share)
+        checks = tuple(
+            requirement.check(OutputTrial(units=fresh, output=requirement.output)) for requirement in self.requirements
+        )
+        values = {output: fresh.values(output) for output in outputs}
+        kept = np.all([_kept(requirement, values[requirement.output]) for requirement in self.requirements], axis=0)
         return VerifiedDesign(
             name=name,
             design=design,
+            processes=self.space.process_names(design),
             cost=float(self.space.cost(design)),
-            sample=sample,
-            achieved=achieved,
-            met=achieved.bound >= self.requirement.target,
-            quantile_bound=bound,
-            by_zone=by_zone,
-            local=local_quantile(design, bound, np.concatenate([by_scale, by_clearance])),
+            sample=fresh.sample,
+            achieved=fresh.sample.within(self.limit),
+            checks=checks,
+            joint=proportion(self.units, int(np.count_nonzero(~kept))),
+            outputs=values,
+            by_zone=_by_zone(fresh, checks[0].sides[0].value),
         )
 
-    def _gradient(
-        self, standard: Float[np.ndarray, "unit column"], answers: WithDerivatives, quantile: float
-    ) -> tuple[Float[np.ndarray, " source"], Float[np.ndarray, " 2"]]:
-        """Return ∂quantile by the zones [arcsec/m] and by the clearances [arcsec/µm].
 
-        The quantile is mean + spread·σ of the sample, so its derivative is mean(D) + spread·cov(Y, D)/σ with D the
-        exact derivative of each unit's peak-to-peak; theory page, equation (24).
-        """
-        good = answers.evaluation.good
-        values = answers.evaluation.values[good, 0]
-        names = self.space.errors.source_of_column
-        starts = [names.index(source.name) for source in self.space.errors.active]
-        by_zone = np.add.reduceat(answers.by_column[good] * standard[good], starts, axis=1)
-        by_clearance = answers.by_modification[good] @ self.space.modification_by_clearance * MICROMETRE
-        derivative = np.concatenate([by_zone, by_clearance], axis=1)
-        mean, deviation = values.mean(), values.std()
-        weights = (1.0 + (quantile - mean) / deviation * (values - mean) / deviation) / values.size
-        gradient = weights @ derivative
-        return gradient[:-2], gradient[-2:]
+def _kept(requirement: Requirement, values: Float[np.ndarray, " unit"]) -> Bool[np.ndarray, " unit"]:
+    """Return which units keep the limits; one without an answer does not."""
+    low, high = requirement.limits.lower, requirement.limits.upper
+    return np.asarray((values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high)))
+
+
+def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"]:
+    """Return the change of mean + spread·σ of the peak-to-peak with the zones [arcsec/m]; equation (24)."""
+    values = fresh.sample.values
+    standard = (values - values.mean()) / values.std()
+    spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
+    return np.asarray((1.0 + spread * standard) @ fresh.by_zone / values.size)
 
 
 def answer(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
     """Return the cheapest met design, or the least violating one where none is met."""
     met = [design for design in tried if design.met]
-    return min(met, key=lambda design: design.cost) if met else min(tried, key=lambda design: design.quantile_bound)
+    if met:
+        return min(met, key=lambda design: design.cost)
+    return min(tried, key=lambda design: design.blocking.tightest.relative_excess)

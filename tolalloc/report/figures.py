@@ -68,7 +68,7 @@ def _peak_to_peak(results: StudyResults) -> Figure:
             Series(label="tolerance table as it is", kind="histogram", x=list(allocation.baseline.sample.values)),
             Series(label="allocated", kind="histogram", x=list(allocation.chosen.sample.values)),
         ),
-        vertical=((results.requirement.limit, f"limit {results.requirement.limit:g}″"),),
+        vertical=((results.limit, f"limit {results.limit:g}″"),),
     )
 
 
@@ -79,7 +79,7 @@ def _pareto(results: StudyResults) -> Figure:
     return Figure(
         name="pareto",
         title="Cost against the peak-to-peak that the target yield keeps",
-        x_label=f"peak-to-peak kept by {results.requirement.target:.2%} of units [arcsec]",
+        x_label=f"peak-to-peak kept by {results.target:.2%} of units [arcsec]",
         y_label="cost [cost units]",
         series=(
             Series(label="front (NSGA-II)", kind="line", x=list(front.quantile), y=list(front.cost)),
@@ -97,7 +97,7 @@ def _pareto(results: StudyResults) -> Figure:
                 y=[baseline.cost, by_hand.cost],
             ),
         ),
-        vertical=((results.requirement.limit, f"limit {results.requirement.limit:g}″"),),
+        vertical=((results.limit, f"limit {results.limit:g}″"),),
     )
 
 

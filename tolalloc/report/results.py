@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.search import Allocation
-from tolalloc.allocation.verification import Requirement
+from tolalloc.allocation.search import AllocationWithFront
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.equivalent.answers import Equilibria
@@ -60,8 +59,12 @@ class StudyResults:
         Identified stiffnesses that replaced the reducer's own, if any.
     torsional_stiffness
         Of the perfect reducer between 3 % and 100 % of rated torque [N·m/arcmin].
-    space, requirement
-        Design variables and the requirement.
+    space
+        Design variables.
+    limit
+        Largest peak-to-peak allowed [arcsec].
+    target
+        Share of units that must keep it [-].
     sobol, classical
         Ranking at the zones of the tolerance table, and the hand estimate beside it.
     stiffness
@@ -88,11 +91,12 @@ class StudyResults:
     identified: IdentifiedStiffness | None
     torsional_stiffness: float
     space: DesignSpace
-    requirement: Requirement
+    limit: float
+    target: float
     sobol: SobolIndices
     classical: ClassicalEstimate
     stiffness: StiffnessEffect | None
-    allocation: Allocation
+    allocation: AllocationWithFront
     unit: BuiltUnit | None
     neglected: tuple[str, ...]
     contacts: tuple[Assessment | None, Assessment | None]
@@ -141,13 +145,13 @@ class StudyResults:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on the answer."""
-        chosen, limit = self.allocation.chosen, self.requirement.limit
+        chosen, limit = self.allocation.chosen, self.limit
         found = []
         if self.quick:
             found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
         if not chosen.met:
             found.append(
-                f"No design was verified to meet the limit of {limit:g}″ at {self.requirement.target:.2%} yield; "
+                f"No design was verified to meet the limit of {limit:g}″ at {self.target:.2%} yield; "
                 f"the least violating one keeps {chosen.quantile_bound:.1f}″. The peak-to-peak limit is what blocks."
             )
         if not self.allocation.by_hand.met:

@@ -138,19 +138,21 @@ def _statistics(label: str, design: VerifiedDesign, limit: float, target: float)
 
 def capability(results: StudyResults) -> pd.DataFrame:
     """Return baseline, scaling by hand and chosen design side by side, each on its own fresh units."""
-    allocation, asked = results.allocation, results.requirement
+    allocation = results.allocation
     designs = {
         "tolerance table as it is": allocation.baseline,
         "all zones scaled alike": allocation.by_hand,
         "allocated": allocation.chosen,
     }
-    return pd.DataFrame([_statistics(label, design, asked.limit, asked.target) for label, design in designs.items()])
+    return pd.DataFrame(
+        [_statistics(label, design, results.limit, results.target) for label, design in designs.items()]
+    )
 
 
 def stack_up(results: StudyResults) -> pd.DataFrame:
     """Return worst case, root-sum-square and Monte Carlo at the zones of the tolerance table."""
     baseline = results.allocation.baseline.sample
-    target = results.requirement.target
+    target = results.target
     rows = [
         ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
         ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),

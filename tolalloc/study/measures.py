@@ -173,12 +173,12 @@ class Measures:
 
     def reject(self, sample: MonteCarlo) -> TargetSensitivity:
         """Return what the units of a sample beyond the limit share."""
-        limit, seeds = self.prepared.requirement.limit, self._seeds("reject")
+        limit, seeds = self.prepared.study.limit_arcsec, self._seeds("reject")
         return target_sensitivity(sample, self.errors, limit, seeds, largest_failed_share=self._failed_share)
 
     def beyond(self, sample: MonteCarlo) -> YieldAtLimit:
         """Return the probability of a unit beyond the limit, from a sample and where it is rare from more units."""
-        errors, effort, limit = self.errors, self._effort, self.prepared.requirement.limit
+        errors, effort, limit = self.errors, self._effort, self.prepared.study.limit_arcsec
         return yield_at_limit(
             ResponseLimit(response=self.kernel, errors=errors, zones=errors.zones, limit=limit),
             sample,
@@ -191,15 +191,15 @@ class Measures:
 
     def inverse(self, choice: Choice) -> InverseSensitivity:
         """Return how far each zone may open alone, on the surrogate if one has earned its place."""
-        errors, asked = self.errors, self.prepared.requirement
+        errors, asked = self.errors, self.prepared.study
         return inverse_sensitivity(
             choice.chosen or self.kernel,
             errors,
             errors.zones,
             self._seeds("inverse"),
-            limit=asked.limit,
-            target=asked.target,
-            units=max(self._effort.inverse_units, fewest_units(asked.target)),
+            limit=asked.limit_arcsec,
+            target=asked.yield_target,
+            units=max(self._effort.inverse_units, fewest_units(asked.yield_target)),
             largest_failed_share=self._failed_share,
         )
 
@@ -222,7 +222,7 @@ class Measures:
             candidates,
             x,
             self._seeds("surrogates"),
-            quantile=self.prepared.requirement.target,
+            quantile=self.prepared.study.yield_target,
             largest_failed_share=self._failed_share,
         )
 

@@ -107,8 +107,8 @@ def summary(results: StudyResults) -> dict[str, Any]:
     return {
         "reducer": results.reducer.name,
         "torque [N·m]": results.torque,
-        "limit [arcsec]": results.requirement.limit,
-        "yield target [-]": results.requirement.target,
+        "limit [arcsec]": results.limit,
+        "yield target [-]": results.target,
         "met": chosen.met,
         "yield [-]": chosen.achieved.estimate,
         "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.search import allocate, require_reachable
+from tolalloc.allocation.search import allocate_with_front, require_reachable
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.cycloid.assessment import Assessment, assess
@@ -112,24 +112,24 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
     SolveError
         Too many units failed.
     """
-    study, space, requirement = prepared.study, prepared.space, prepared.requirement
+    study, space = prepared.study, prepared.space
     seeds, kernel = SeedTree(study.seed), replace(prepared.kernel, observe=record.observe)
     shared = next(seeds.child("shared").uniform_chunks(study.effort.shared_units, len(space.errors.columns)))
     quantile = QuantileResponse(
         space=space, kernel=kernel, standard=space.errors.standard_values(shared), spread=_FIRST_SPREAD
     )
     with record.stage("is the limit in reach"):
-        require_reachable(quantile, requirement, f"study {study.name}")
+        require_reachable(quantile, study.limit_arcsec, study.yield_target, f"study {study.name}")
     with record.stage("allocation"):
         verifier = Verifier(
             space=space,
             kernel=kernel,
-            requirement=requirement,
+            requirements=prepared.requirements[:1],
             seeds=seeds.child("verification"),
             units=study.effort.verification_units,
             largest_failed_share=study.largest_failed_share,
         )
-        allocation = allocate(
+        allocation = allocate_with_front(
             quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
         )
     with record.stage("ranking"):
@@ -145,7 +145,8 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             identified=prepared.identified,
             torsional_stiffness=_torsional_stiffness(prepared),
             space=space,
-            requirement=requirement,
+            limit=study.limit_arcsec,
+            target=study.yield_target,
             sobol=sobol,
             classical=classical,
             stiffness=stiffness,

@@ -1,0 +1,38 @@
+"""What an engineer does with a few Monte Carlo runs: all zones scaled alike until the requirements are met."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.allocation.trust_region import SETTLED
+from tolalloc.allocation.verification import VerifiedDesign, Verifier
+from tolalloc.reducer.design import Modification
+
+
+def scale_by_hand(verifier: Verifier, modification: Modification, steps: int) -> tuple[VerifiedDesign, ...]:
+    """Return designs with all zones scaled alike, the first the tolerance table as it is.
+
+    Notes
+    -----
+    The scale follows the design's own gradient until a met design has next to nothing left to gain: what an
+    engineer does with a few Monte Carlo runs.
+    """
+    space, scale = verifier.space, 1.0
+    tried: list[VerifiedDesign] = []
+    for step in range(steps):
+        tried.append(verifier.verify(space.uniform(scale, modification), f"by hand {step + 1}"))
+        factor = _factor(tried[-1])
+        if tried[-1].met and factor < 1 + SETTLED:
+            break
+        scale *= factor
+    return tuple(tried)
+
+
+def _factor(tried: VerifiedDesign) -> float:
+    """Return the common factor of all scales that takes a design to its limits [-]."""
+    factors = []
+    for side in tried.sides:
+        rise = float(side.stack.load(tried.design[:-2], np.zeros(2)))
+        room = -float(side.predicted(tried.design)) - side.doubt
+        factors.append(1 + room / max(rise, 0.1 * abs(side.limit)))
+    return float(np.clip(min(factors), 0.4, 2.5))

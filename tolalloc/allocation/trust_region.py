@@ -1,0 +1,172 @@
+"""Verified steps towards the cheapest design: the convex program where the local models can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.program import process_choice
+from tolalloc.allocation.program.convex import ConvexProgram
+from tolalloc.allocation.program.problem import Solution, Stack
+from tolalloc.allocation.verification import VerifiedDesign, Verifier
+
+SETTLED = 0.01
+"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
+
+_SIMILAR = 0.1
+"""Relative difference of cost within which designs share their convex models [-]."""
+
+
+class Programs:
+    """The convex programs of a design space, one for each choice of processes, compiled once.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    stacks
+        Number of limited sides of all requirements [-].
+    """
+
+    def __init__(self, space: DesignSpace, stacks: int) -> None:
+        self.space, self.stacks = space, stacks
+        self._compiled: dict[tuple[int, ...], ConvexProgram] = {}
+
+    @cached_property
+    def _competing(self) -> bool:
+        return any(len(feature.processes) > 1 for feature in self.space.features)
+
+    def of(self, processes: Int[np.ndarray, " group"]) -> ConvexProgram:
+        """Return the program of the processes at the given positions."""
+        key = tuple(processes.tolist())
+        if key not in self._compiled:
+            self._compiled[key] = ConvexProgram(self.space.features, processes, self.stacks, self.space.shared)
+        return self._compiled[key]
+
+    def choose(self, stacks: tuple[Stack, ...], present: Int[np.ndarray, " group"]) -> Int[np.ndarray, " group"]:
+        """Return the processes that the models prefer; the present ones stay unless another choice clearly pays.
+
+        Parameters
+        ----------
+        stacks
+            Local models with the room that is aimed at.
+        present
+            Position of the present process of every group [-].
+        """
+        if not self._competing:
+            return present
+        best = process_choice.allocate(self.space.problem(stacks))
+        kept = self.of(present).solve(stacks)
+        if kept is not None and isinstance(best, Solution) and best.cost > (1 - SETTLED) * kept.cost:
+            return present
+        return best.processes
+
+    def step(
+        self,
+        stacks: tuple[Stack, ...],
+        processes: Int[np.ndarray, " group"],
+        around: Float[np.ndarray, " variable"],
+        reach: float,
+    ) -> Float[np.ndarray, " variable"]:
+        """Return the cheapest design near another one, or the one there that overloads the stacks least.
+
+        Parameters
+        ----------
+        stacks
+            Local models with the room that is aimed at.
+        processes
+            Position of the process of every group [-].
+        around
+            A design.
+        reach
+            Factor by which variables may change, as far as their ranges go [-].
+        """
+        program, groups, shared = self.of(processes), len(self.space.groups), self.space.shared
+        low, high = (np.clip(around[:groups] * by, program.lower, program.upper) for by in (1 / reach, reach))
+        bounds = (low, high, *_reached(around[groups:], reach, shared.lower, shared.upper))
+        found = program.solve(stacks, *bounds) or program.least_infeasible(stacks, *bounds)
+        return np.concatenate([found.zones, found.shared])
+
+
+def _reached(
+    around: Float[np.ndarray, " shared"],
+    reach: float,
+    lower: Float[np.ndarray, " shared"],
+    upper: Float[np.ndarray, " shared"],
+) -> tuple[Float[np.ndarray, " shared"], Float[np.ndarray, " shared"]]:
+    """Return the bounds within reach of clearances; near zero the reach is that of 1 µm [µm]."""
+    centre = np.clip(around, lower, upper)
+    size = np.maximum(np.abs(centre), 1.0)
+    return np.maximum(lower, centre - size * (1 - 1 / reach)), np.minimum(upper, centre + size * (reach - 1))
+
+
+def aimed(last: VerifiedDesign, tried: list[VerifiedDesign]) -> tuple[Stack, ...]:
+    """Return the local models of a design with the room to aim at.
+
+    Parameters
+    ----------
+    last
+        The design.
+    tried
+        It and all designs before it.
+
+    Notes
+    -----
+    The values of a few thousand units are uncertain by a percent or two; the aim is one standard error inside each
+    limit. Where the models of the last design also explain earlier ones of similar cost, their mean deviation from
+    them corrects them, so the noise averages out.
+    """
+    similar = [item for item in tried if abs(item.cost / last.cost - 1) < _SIMILAR]
+    stacks = []
+    for at, side in enumerate(last.sides):
+        found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
+        stacks.append(replace(side.stack, room=side.stack.room - side.doubt - float(np.mean(found))))
+    return tuple(stacks)
+
+
+def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...] = ()) -> tuple[Stack, ...]:
+    """Return the models of a design whose room is what the search aims at, or what the design itself takes of it.
+
+    Parameters
+    ----------
+    chosen
+        The design.
+    tried
+        All designs of its search, which tell how lucky its own sample was; without them that is not known.
+    """
+    loads = [float(side.stack.load(chosen.design[:-2], chosen.design[-2:])) for side in chosen.sides]
+    stacks = aimed(chosen, list(tried) or [chosen])
+    return tuple(replace(stack, room=max(stack.room, load)) for stack, load in zip(stacks, loads, strict=True))
+
+
+def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:
+    """Return the designs of a trust-region sequence; each is verified on fresh units before the next is made.
+
+    Parameters
+    ----------
+    verifier
+        Judges the designs and gives the convex models around each.
+    start
+        A verified design to start from.
+    steps
+        Largest number of verified designs [-].
+    reach
+        Factor by which a variable may change in the first step; later ones reach less [-].
+    """
+    space, tried = verifier.space, [start]
+    programs, processes = Programs(space, len(start.sides)), space.process_positions(start.design)
+    for step in range(steps):
+        last = tried[-1]
+        stacks = aimed(last, tried)
+        processes = programs.choose(stacks, processes)
+        found = programs.step(stacks, processes, last.design, reach)
+        settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
+        if step > 0 and settled:
+            break
+        tried.append(verifier.verify(found, f"convex {step + 1}"))
+        reach = max(1.25, float(np.sqrt(reach)))
+    return tuple(tried[1:])
