@@ -1,4 +1,4 @@
-"""The command line: ``run``, ``rank``, ``check``, ``te``, ``contact``, ``modify``, ``identify``, ``diagnose``."""
+"""The command line: ``run``, ``rank``, ``allocate``, ``check``, ``te``, ``contact``, ``modify`` and others."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from tolalloc.cli.allocate import allocate
 from tolalloc.cli.console import (
     AsJson,
     ReportFolder,
@@ -72,7 +73,7 @@ def _run(study: Study, quick: bool, out: Path | None, as_json: bool) -> None:
     if as_json:
         print_json({"folder": str(folder), **summary(results)})
         return
-    allocation, limit = results.allocation, results.requirement.limit
+    allocation, limit = results.allocation, results.limit
     chosen = allocation.chosen
     screen.print(
         f"{'Met' if chosen.met else 'NOT met'}: {chosen.achieved.estimate:.2%} of {chosen.achieved.units} fresh units "
@@ -232,6 +233,7 @@ def modify(
 
 
 app.command()(rank)
+app.command()(allocate)
 app.command()(identify)
 app.command()(diagnose)
 

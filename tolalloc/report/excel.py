@@ -32,7 +32,7 @@ def write_workbook(results: StudyResults, path: Path) -> None:
 
 
 def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
-    """Write one sheet per table, headers frozen, units in every header."""
+    """Write one sheet per table, headers frozen, units in every header; a text that begins with = is a formula."""
     with pd.ExcelWriter(path, engine="openpyxl") as writer:
         for name, frame in sheets.items():
             frame.to_excel(writer, sheet_name=name, index=False)

@@ -8,8 +8,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.allocation.cost.unit_price import UnitPrice
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
-from tolalloc.allocation.verification import Requirement
+from tolalloc.allocation.requirement import AtYield, Guarantee, Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.equivalent.columns import source_name
@@ -19,7 +21,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducer.stiffness import IdentifiedStiffness
-from tolalloc.response.kernel import KernelResponse
+from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.outputs import OTHER_OUTPUTS
 from tolalloc.response.stiffness import stiffness_source
 from tolalloc.study.effort import Effort
@@ -46,7 +48,7 @@ NEGLECTED = (
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 
-_FILES = ("reducer", "tolerances", "processes", "correlations", "unit", "stiffness")
+_FILES = ("reducer", "tolerances", "processes", "process_costs", "correlations", "unit", "stiffness")
 """Fields of a study that name files; what they hold counts, not where they stand."""
 
 
@@ -64,6 +66,9 @@ class Study:
         Process capability library that rows of the table may name, by shipped name or path.
     correlations
         Correlations between sources, by path; none if empty.
+    process_costs
+        Ways to make the features and what each costs, by shipped name or path; none if empty: every feature then costs
+        what the tolerance table says, falling as 1/zone.
     neglected
         Sources of the model that the tolerance table leaves out, taken as zero; ``*`` stands for anything.
     unit
@@ -73,9 +78,15 @@ class Study:
     limit_arcsec
         Largest peak-to-peak allowed, output side, one turn [arcsec].
     other_limits
-        Output with its unit, such as ``"lost motion [arcmin]"`` → its limits; for the ranking alone.
+        Output with its unit, such as ``"lost motion [arcmin]"`` → its limits; for ``rank`` and ``allocate``.
     yield_target
         Share of units that must keep a limit [-].
+    guarantees
+        Output with its unit → what ``allocate`` must show of its limits, where that is not the yield target.
+    grades
+        Whether ``allocate`` takes zones from ISO 286 grades and preferred numbers alone.
+    unit_price
+        What becomes of units beyond a limit; ``allocate`` then names the yield with the cheapest good unit.
     torque_nm
         Torque on the carrier, negative against the rotation; the reducer's test torque unless given [N·m].
     flank_clearance_um, radial_clearance_um
@@ -93,12 +104,16 @@ class Study:
     tolerances: str | Path = "rv20e_baseline"
     processes: str | Path = "generic"
     correlations: str | Path = ""
+    process_costs: str | Path = ""
     neglected: tuple[str, ...] = NEGLECTED
     unit: str | Path = ""
     stiffness: str | Path = ""
     limit_arcsec: float = 60.0
     other_limits: Mapping[str, Limits] = field(default_factory=dict)
     yield_target: float = 0.9973
+    guarantees: Mapping[str, Guarantee] = field(default_factory=dict)
+    grades: bool = False
+    unit_price: UnitPrice | None = None
     torque_nm: float | None = None
     flank_clearance_um: tuple[float, float] = (1.0, 5.0)
     radial_clearance_um: tuple[float, float] = (5.0, 20.0)
@@ -157,8 +172,8 @@ class Prepared:
         The reducer with the stiffness in use, and the identified values if any.
     unit
         Built unit to show, if any.
-    space, requirement
-        Design variables and the requirement.
+    space, requirements
+        Design variables, and what the allocation must keep, the peak-to-peak first.
     kernel
         The real model at the reducer's own modification.
     stiffness
@@ -172,7 +187,7 @@ class Prepared:
     identified: IdentifiedStiffness | None
     unit: BuiltUnit | None
     space: DesignSpace
-    requirement: Requirement
+    requirements: tuple[Requirement, ...]
     kernel: KernelResponse
     stiffness: CorrelatedSource | None
     neglected: tuple[str, ...]
@@ -214,6 +229,28 @@ def _correlation(study: Study, sources: tuple[Source, ...]) -> Correlation:
     return load_correlations(study.correlations, sources) if study.correlations else Correlation()
 
 
+def _requirements(study: Study) -> tuple[Requirement, ...]:
+    """Return what the study limits, the peak-to-peak first.
+
+    Raises
+    ------
+    UnknownNameError
+        Limits of no output, or a guarantee of no limit.
+    """
+    place = f"study {study.name}"
+    for name in study.other_limits:
+        if name not in OTHER_OUTPUTS:
+            raise UnknownNameError.among(place, "other_limits", name, OTHER_OUTPUTS)
+    limits = {PEAK_TO_PEAK: Limits(upper=study.limit_arcsec), **study.other_limits}
+    for name in study.guarantees:
+        if name not in limits:
+            raise UnknownNameError.among(place, "guarantees", name, limits)
+    return tuple(
+        Requirement(output=name, limits=own, guarantee=study.guarantees.get(name, AtYield(target=study.yield_target)))
+        for name, own in limits.items()
+    )
+
+
 def prepare(study: Study) -> Prepared:
     """Read and check everything a study needs; nothing is solved and nothing is written.
 
@@ -226,9 +263,6 @@ def prepare(study: Study) -> Prepared:
     identified = load_identified_stiffness(study.stiffness) if study.stiffness else None
     if identified:
         reducer = with_stiffness(reducer, identified)
-    for name in study.other_limits:
-        if name not in OTHER_OUTPUTS:
-            raise UnknownNameError.among(f"study {study.name}", "other_limits", name, OTHER_OUTPUTS)
     sources = load_tolerance_table(study.tolerances, study.processes)
     errors = ErrorModel(sources, correlation=_correlation(study, sources))
     unit = load_unit(study.unit) if study.unit else None
@@ -260,9 +294,12 @@ def prepare(study: Study) -> Prepared:
         identified=identified,
         unit=unit,
         space=DesignSpace(
-            errors=errors, stage=reducer.cycloid_stage, clearances=ClearanceRange(flank=flank, radial=radial)
+            errors=errors,
+            stage=reducer.cycloid_stage,
+            clearances=ClearanceRange(flank=flank, radial=radial),
+            processes=load_process_costs(study.process_costs, sources) if study.process_costs else {},
         ),
-        requirement=Requirement(limit=study.limit_arcsec, target=study.yield_target),
+        requirements=_requirements(study),
         kernel=kernel,
         stiffness=stiffness_source(identified, reducer) if identified else None,
         neglected=tuple(pattern for pattern, columns in left_out.items() if columns),

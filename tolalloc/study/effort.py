@@ -93,6 +93,39 @@ class RankingEffort:
 
 
 @dataclass(frozen=True, kw_only=True)
+class AllocationEffort:
+    """How much ``tolalloc allocate`` may compute besides its search.
+
+    Parameters
+    ----------
+    graded_steps
+        Largest number of verified choices of grades [-].
+    exact_points
+        Limits of the exact front of the local models [-].
+    flank_steps, radial_steps
+        Flank and radial clearances for which the cheapest zones are looked for [-].
+    changed_costs
+        Random changes of all costs [-].
+    changed_stiffnesses, stiffness_units
+        Stiffnesses drawn from what is not known of them, and fresh units for each [-].
+    share_blocks
+        Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
+    yields
+        Yield targets among which the cheapest good unit is looked for [-].
+    """
+
+    graded_steps: int = 8
+    exact_points: int = 50
+    flank_steps: int = 5
+    radial_steps: int = 6
+    changed_costs: int = 40
+    changed_stiffnesses: int = 6
+    stiffness_units: int = 2048
+    share_blocks: int = 256
+    yields: tuple[float, ...] = (0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Effort:
     """How much a study may compute.
 
@@ -108,6 +141,8 @@ class Effort:
         Effort of the search.
     ranking
         Effort of ``tolalloc rank``.
+    allocation
+        Effort of ``tolalloc allocate`` besides the search.
     """
 
     verification_units: int = 6144
@@ -115,6 +150,7 @@ class Effort:
     shared_units: int = 256
     search: SearchEffort = field(default_factory=SearchEffort)
     ranking: RankingEffort = field(default_factory=RankingEffort)
+    allocation: AllocationEffort = field(default_factory=AllocationEffort)
 
 
 QUICK = Effort(
@@ -137,6 +173,17 @@ QUICK = Effort(
         level_runs=3,
         widened_units=500,
         permutations=100,
+    ),
+    allocation=AllocationEffort(
+        graded_steps=3,
+        exact_points=20,
+        flank_steps=2,
+        radial_steps=3,
+        changed_costs=10,
+        changed_stiffnesses=2,
+        stiffness_units=1152,
+        share_blocks=32,
+        yields=(0.95, 0.99, 0.9973),
     ),
 )
 """Effort of a quick run: every stage is real, every interval wide."""

@@ -1,0 +1,175 @@
+"""Whether the drawing stays the same when costs, stiffness or processes are not what was assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.allocation.cost.model import Weighted
+from tolalloc.allocation.program import process_choice
+from tolalloc.allocation.program.problem import AllocationProblem, Feature, Solution
+from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.verification import VerifiedDesign, Verifier
+from tolalloc.response.kernel import KernelResponse
+from tolalloc.uncertainty.seeds import SeedTree
+
+COST_CHANGE = 0.2
+"""Largest relative change of a cost that is tried [-]."""
+SAME = 0.1
+"""Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """The answer under one changed assumption.
+
+    Parameters
+    ----------
+    name
+        What was changed.
+    scales
+        Scale of every group [-].
+    cost
+        Its cost under the changed assumption, without locked zones [cost units].
+    regret
+        What the chosen design costs more than this one under the changed assumption, as a share; not a number where
+        the chosen one no longer keeps a requirement [-].
+    kept
+        Whether the chosen design still keeps every requirement.
+    """
+
+    name: str
+    scales: Float[np.ndarray, " group"]
+    cost: float
+    regret: float
+    kept: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robustness:
+    """Answers under changed assumptions.
+
+    Parameters
+    ----------
+    groups
+        Names of the groups.
+    optimum
+        The undisturbed answer of the same local models [-].
+    costs
+        Under costs changed at random by up to `COST_CHANGE` each.
+    stiffness
+        With stiffnesses drawn from what is not known of them; none where a study names no identified stiffness.
+    second_best
+        With the second-best set of processes, none where there is no other.
+    """
+
+    groups: tuple[str, ...]
+    optimum: Float[np.ndarray, " group"]
+    costs: tuple[Variant, ...]
+    stiffness: tuple[Variant, ...]
+    second_best: Variant | None
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All of them."""
+        return (*self.costs, *self.stiffness, *((self.second_best,) if self.second_best else ()))
+
+    @property
+    def ratios(self) -> Float[np.ndarray, "variant group"]:
+        """Scale under the changed assumption over the undisturbed one [-]."""
+        return np.array([variant.scales / self.optimum for variant in self.variants]).reshape(-1, len(self.groups))
+
+    @property
+    def same(self) -> Bool[np.ndarray, " group"]:
+        """Which zones stay the same under all changes."""
+        return np.asarray((np.abs(np.log(self.ratios)) <= np.log(1 + SAME)).all(axis=0))
+
+
+def robustness(
+    verifier: Verifier, allocation: Allocation, kernels: Sequence[KernelResponse], seeds: SeedTree, draws: int
+) -> Robustness:
+    """Return the answers under changed costs, stiffnesses and processes.
+
+    Parameters
+    ----------
+    verifier
+        Judges the chosen design again with every changed stiffness.
+    allocation
+        What was found.
+    kernels
+        Kernels of reducers with changed stiffnesses.
+    seeds
+        Node of the seed tree.
+    draws
+        Random changes of the costs [-].
+
+    Notes
+    -----
+    Costs and processes are changed in the local models of the chosen design; a changed stiffness takes models of its
+    own around the same design, from fresh units.
+    """
+    problem, optimum = verifier.space.problem(allocation.stacks), allocation.optimum
+    factors = 1 + COST_CHANGE * (2 * seeds.child("costs").generator().random((draws, len(problem.features))) - 1)
+    return Robustness(
+        groups=verifier.space.groups,
+        optimum=optimum.zones,
+        costs=tuple(_with_costs(problem, optimum, own, f"costs {at}") for at, own in enumerate(factors, start=1)),
+        stiffness=tuple(
+            _with_kernel(replace(verifier, kernel=kernel), allocation.chosen, optimum, f"stiffness {at}")
+            for at, kernel in enumerate(kernels, start=1)
+        ),
+        second_best=_second_best(problem, optimum),
+    )
+
+
+def _with_costs(
+    problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarray, " group"], name: str
+) -> Variant:
+    """Return the answer where every cost is multiplied by a factor of its own."""
+    features = tuple(_priced(feature, float(factor)) for feature, factor in zip(problem.features, factors, strict=True))
+    changed = replace(problem, features=features)
+    found = process_choice.allocate(changed)
+    cost, before = (changed.cost(own.zones, own.processes) for own in (found, optimum))
+    return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1, kept=True)
+
+
+def _priced(feature: Feature, factor: float) -> Feature:
+    processes = tuple(
+        replace(made, cost=Weighted(model=made.cost, weight=factor), change=factor * made.change)
+        for made in feature.processes
+    )
+    return replace(feature, processes=processes)
+
+
+def _with_kernel(verifier: Verifier, chosen: VerifiedDesign, optimum: Solution, name: str) -> Variant:
+    """Return the answer of a reducer with changed stiffnesses."""
+    judged = verifier.verify(chosen.design, name)
+    stacks = tuple(replace(side.stack, room=side.stack.room - side.doubt) for side in judged.sides)
+    found = process_choice.allocate(verifier.space.problem(stacks))
+    cost = verifier.space.problem(stacks).cost(found.zones, found.processes)
+    regret = optimum.cost / cost - 1 if judged.met else np.nan
+    return Variant(name=name, scales=found.zones, cost=cost, regret=regret, kept=judged.met)
+
+
+def _second_best(problem: AllocationProblem, optimum: Solution) -> Variant | None:
+    """Return the answer made by the second-best set of processes, none if there is no other."""
+    if all(len(feature.processes) == 1 for feature in problem.features):
+        return None
+    found = process_choice.second_best(problem, optimum)
+    if found is None:
+        return None
+    changed = [
+        f"{feature.name} by {feature.processes[now].name}"
+        for feature, now, before in zip(problem.features, found.processes, optimum.processes, strict=True)
+        if now != before
+    ]
+    return Variant(
+        name=f"second-best processes: {', '.join(changed)}",
+        scales=found.zones,
+        cost=found.cost,
+        regret=optimum.cost / found.cost - 1,
+        kept=True,
+    )

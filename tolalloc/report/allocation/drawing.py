@@ -1,0 +1,100 @@
+"""What to write on the drawing: the allocated table, and a workbook that goes on calculating."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tolalloc.report.allocation.calculator import calculator_sheets
+from tolalloc.report.allocation.results import AllocationResults
+from tolalloc.report.excel import write_sheets
+from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.tolerance_table import HEADERS, table_frame
+from tolalloc.units import MICROMETRE
+
+
+def drawn_sources(results: AllocationResults) -> tuple[Source, ...]:
+    """Return all sources of the tolerance table at the zones of the drawing, with grade and cost."""
+    space, chosen = results.drawn, results.chosen
+    zones = dict(zip((source.name for source in space.errors.active), space.zones(chosen.design), strict=True))
+    made = space.made_by(chosen.design)
+    labels = dict(zip(space.groups, results.graded.labels, strict=True)) if results.graded else {}
+    found = []
+    for source in results.space.errors.sources:
+        if source.name not in made:
+            found.append(source)
+            continue
+        zone = float(zones[source.name])
+        found.append(
+            replace(
+                source,
+                zone=zone,
+                cost=float(made[source.name].total(np.array(zone))),
+                grade=labels.get(source.group, "") if source.grade or labels else "",
+            )
+        )
+    return tuple(found)
+
+
+def drawing_table(results: AllocationResults) -> pd.DataFrame:
+    """Return the drawing in short: zone, grade, process, share of the variance and cost of every source."""
+    made = results.drawn.made_by(results.chosen.design)
+    now = results.space.made_by(results.joint.baseline.design)
+    shares = _shares(results)
+    rows = []
+    for before, after in zip(results.space.errors.sources, drawn_sources(results), strict=True):
+        if before.zone == 0.0:
+            continue
+        changed = before.name in made
+        rows.append(
+            {
+                "source": before.name,
+                "callout": before.feature.value,
+                "zone before [µm]": before.zone / MICROMETRE,
+                "zone [µm]": after.zone / MICROMETRE,
+                "change [%]": (after.zone / before.zone - 1) * 100,
+                "grade": after.grade,
+                "process before": now[before.name].name if changed else before.process,
+                "process": made[before.name].name if changed else before.process,
+                "share of variance [%]": shares.get(before.name, float("nan")),
+                "cost before [cost units]": before.cost,
+                "cost [cost units]": after.cost,
+                "locked": "yes" if before.locked else "no",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _shares(results: AllocationResults) -> dict[str, float]:
+    """Return the share of every source in the sum of the total indices [%]."""
+    shares = results.shares
+    total = shares.total / shares.total.sum() * 100
+    return {name: float(share) for name, share in zip(shares.sources, total, strict=True)}
+
+
+def full_drawing_table(results: AllocationResults) -> pd.DataFrame:
+    """Return the tolerance table in the layout of the input, with process, share of the variance and change added."""
+    frame, short = table_frame(drawn_sources(results)), drawing_table(results).set_index("source")
+    names = frame[HEADERS["id"]]
+    frame[HEADERS["process"]] = names.map(short["process"]).fillna(frame[HEADERS["process"]])
+    for header in ("share of variance [%]", "change [%]", "cost before [cost units]"):
+        frame[header] = names.map(short[header])
+    return frame
+
+
+def write_drawing(results: AllocationResults, folder: Path) -> None:
+    """Write ``allocation.csv``, which ``tolalloc`` reads back, and ``drawing.xlsx``, which goes on calculating.
+
+    Parameters
+    ----------
+    results
+        The finished allocation.
+    folder
+        The written report.
+    """
+    table_frame(drawn_sources(results), folder).to_csv(folder / "allocation.csv", index=False)
+    sheets = {"drawing": full_drawing_table(results), **calculator_sheets(results)}
+    write_sheets(sheets, folder / "drawing.xlsx")

@@ -1,0 +1,122 @@
+"""The figures of an allocation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.report.allocation import tables
+from tolalloc.report.allocation.drawing import drawing_table
+from tolalloc.report.allocation.results import AllocationResults
+from tolalloc.report.figure import Figure, Series
+from tolalloc.report.heat_map import HeatMap
+
+
+def zones_figure(results: AllocationResults) -> Figure:
+    """Return the zones before and after."""
+    frame = drawing_table(results)
+    names = list(frame["source"])
+    return Figure(
+        name="zones",
+        title="Drawing zones before and after",
+        x_label="zone [µm]",
+        y_label="",
+        series=(
+            Series(label="before", kind="bars", x=names, y=list(frame["zone before [µm]"])),
+            Series(label="after", kind="bars", x=names, y=list(frame["zone [µm]"])),
+        ),
+    )
+
+
+def units_figure(results: AllocationResults) -> Figure:
+    """Return the peak-to-peak of random units before and after."""
+    limit = results.joint.limit
+    return Figure(
+        name="peak_to_peak",
+        title=f"Random units before and after; yield after {results.chosen.achieved.estimate:.2%}",
+        x_label="peak-to-peak transmission error, output side [arcsec]",
+        y_label="units [-]",
+        series=(
+            Series(label="tolerance table as it is", kind="histogram", x=list(results.joint.baseline.sample.values)),
+            Series(label="as drawn", kind="histogram", x=list(results.chosen.sample.values)),
+        ),
+        vertical=((limit, f"limit {limit:g}″"),),
+    )
+
+
+def front_figure(results: AllocationResults) -> Figure:
+    """Return cost against the peak-to-peak that is kept."""
+    fronts, limit = results.fronts, results.joint.limit
+    searched, exact = fronts.searched, fronts.exact
+    checked = ~np.isnan(searched.on_kernel)
+    compared = tables.designs(results)
+    return Figure(
+        name="front",
+        title="What a limit costs: the exact front of the local models, the search on the kernel, verified designs",
+        x_label=f"peak-to-peak kept by {results.target:.2%} of units [arcsec]",
+        y_label="cost [cost units]",
+        series=(
+            Series(label="exact front of the local models", kind="line", x=list(exact.limits), y=list(exact.cost)),
+            Series(label="NSGA-II, told", kind="line", x=list(searched.quantile), y=list(searched.cost)),
+            Series(
+                label="NSGA-II, on the kernel",
+                kind="points",
+                x=list(searched.on_kernel[checked]),
+                y=list(searched.cost[checked]),
+            ),
+            *(
+                Series(label=f"{label}, verified", kind="points", x=[design.quantile_bound], y=[design.cost])
+                for label, design in compared.items()
+            ),
+        ),
+        vertical=((limit, f"limit {limit:g}″"),),
+    )
+
+
+def trade_map(results: AllocationResults) -> HeatMap:
+    """Return the cost of the cheapest zones over both clearances."""
+    trade = results.trade
+    return HeatMap(
+        name="modification_cost",
+        title="Cost of the cheapest zones for every pair of clearances; an empty cell keeps no requirement",
+        columns=[f"{value:.3g}" for value in trade.radial],
+        rows=[f"flank {value:.3g} µm" for value in trade.flank],
+        x_label="radial clearance at tip and root [µm]",
+        label="cost [cost units]",
+        values=[[float(value) for value in row] for row in trade.cost],
+    )
+
+
+def trade_figure(results: AllocationResults) -> Figure:
+    """Return the cost of the cheapest zones over the radial clearance."""
+    trade, now = results.trade, results.reducer.modification
+    return Figure(
+        name="modification_trade",
+        title="What one micrometre of modification buys in zones",
+        x_label="radial clearance at tip and root [µm]",
+        y_label="cost of the cheapest zones [cost units]",
+        series=tuple(
+            Series(label=f"flank clearance {flank:.3g} µm", kind="line", x=list(trade.radial), y=list(cost))
+            for flank, cost in zip(trade.flank, trade.cost, strict=True)
+        ),
+        vertical=((now.radial_clearance * 1e6, "as it is"), (float(results.chosen.design[-1]), "chosen")),
+    )
+
+
+def robustness_figure(results: AllocationResults) -> Figure:
+    """Return how far every zone moves when an assumption is wrong."""
+    frame = tables.robustness_table(results)
+    bars = Series(
+        label="zone; between its smallest and largest under all changed assumptions",
+        kind="bars",
+        x=list(frame["group"]),
+        y=list(frame["zone [µm]"]),
+        low=list(np.minimum(frame["smallest under all changes [µm]"], frame["zone [µm]"])),
+        high=list(np.maximum(frame["largest under all changes [µm]"], frame["zone [µm]"])),
+    )
+    return Figure(
+        name="robustness",
+        title="Zones when costs, stiffness or processes are not what was assumed",
+        x_label="zone [µm]",
+        y_label="",
+        series=(bars,),
+    )
