@@ -4,7 +4,7 @@ tolalloc allocate studies/rv20e_allocation_full.py --quick
 """
 
 from tolalloc.allocation.cost.unit_price import UnitPrice
-from tolalloc.allocation.requirement import AtCpk
+from tolalloc.allocation.guarantee import AtCpk
 from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import run_script
 from tolalloc.study.definition import Study

@@ -12,9 +12,11 @@ from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.design_space import ClearanceRange
+from tolalloc.allocation.fronts import exact_front
+from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
 from tolalloc.allocation.local_model import adding_stack, spreading_stack
-from tolalloc.allocation.requirement import AtCpk, AtYield, Requirement, WorstCase
-from tolalloc.allocation.search import SearchEffort, allocate, exact_front
+from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.search import SearchEffort, allocate
 from tolalloc.allocation.trust_region import Programs, aimed, kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.allocation.cost.sampled import SumOfCosts
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
 from tolalloc.exceptions import InputError
@@ -18,9 +18,6 @@ from tolalloc.reducer.design import CycloidStage, Modification
 from tolalloc.uncertainty.error_model import ErrorModel
 from tolalloc.uncertainty.sources import Source
 from tolalloc.units import MICROMETRE
-
-AS_PRICED = "as priced in the tolerance table"
-"""Name of the process of a source that has no other: cost at its zone, falling as 1/zone."""
 
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
@@ -135,11 +132,10 @@ class DesignSpace:
         return AllocationProblem(features=self.features, stacks=stacks, shared=self.shared)
 
     def _processes(self, group: str) -> tuple[Process, ...]:
-        """Return the processes of a group; a member without an entry goes with whatever the others choose."""
+        """Return the processes that all members of a group have."""
         members = self._members(group)
-        named = [self.processes[source.name] for source in members if source.name in self.processes]
-        names = [made.name for made in named[0]] if named else [AS_PRICED]
-        common = [name for name in names if all(name in {made.name for made in other} for other in named)]
+        known = [{made.name for made in self._ways(source)} for source in members]
+        common = [made.name for made in self._ways(members[0]) if all(made.name in names for names in known)]
         if not common:
             raise InputError(f"group {group}: its members have no process in common; they are made alike.")
         found = [_joint(name, members, [self._made(source, name) for source in members]) for name in common]
@@ -148,16 +144,12 @@ class DesignSpace:
             raise InputError(f"group {group}: no process can hold the ratios of its members' zones.")
         return possible
 
+    def _ways(self, source: Source) -> tuple[Process, ...]:
+        return self.processes.get(source.name) or (today(source),)
+
     def _made(self, source: Source, name: str) -> Process:
         """Return the process of a source by name, over its zone [m]."""
-        if source.name in self.processes:
-            return next(made for made in self.processes[source.name] if made.name == name)
-        return Process(
-            name=AS_PRICED,
-            cost=Reciprocal(factor=source.cost * source.zone),
-            minimum=source.minimum,
-            maximum=source.maximum,
-        )
+        return next(made for made in self._ways(source) if made.name == name)
 
     def made_by(self, design: Float[np.ndarray, " variable"]) -> dict[str, Process]:
         """Return the process of every source whose zone may change, over its zone [m]."""

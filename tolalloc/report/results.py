@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.search import AllocationWithFront
+from tolalloc.allocation.fronts import AllocationWithFront
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.equivalent.answers import Equilibria

@@ -11,19 +11,14 @@ from jaxtyping import Float
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.unit_price import YieldLadder, best_yield
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
+from tolalloc.allocation.fronts import designs_around, exact_front
 from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_ladders, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE
 from tolalloc.allocation.pareto.front import pareto_front
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
 from tolalloc.allocation.robustness import Robustness, robustness
-from tolalloc.allocation.search import (
-    Allocation,
-    allocate,
-    designs_around,
-    exact_front,
-    require_groups,
-)
+from tolalloc.allocation.search import Allocation, allocate, require_groups
 from tolalloc.allocation.trade import ModificationTrade, modification_trade
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield

@@ -11,7 +11,8 @@ from pathlib import Path
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.unit_price import UnitPrice
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
-from tolalloc.allocation.requirement import AtYield, Guarantee, Requirement
+from tolalloc.allocation.guarantee import AtYield, Guarantee
+from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.equivalent.columns import source_name

@@ -12,8 +12,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from tolalloc.allocation.fronts import allocate_with_front
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.search import allocate_with_front, require_reachable
+from tolalloc.allocation.search import require_reachable
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.cycloid.assessment import Assessment, assess

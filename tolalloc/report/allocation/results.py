@@ -8,11 +8,12 @@ from functools import cached_property
 
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.fronts import ConvexFront
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.pareto.front import Front
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness
-from tolalloc.allocation.search import Allocation, ConvexFront
+from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.trade import ModificationTrade
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.reducer.design import Modification, Reducer

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.requirement import AtCpk, AtYield, Guarantee
+from tolalloc.allocation.guarantee import AtCpk, AtYield, Guarantee
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.units import MICROMETRE

@@ -1,0 +1,239 @@
+"""What must be shown of a limited output: a yield, a capability index, or the worst unit inside the zones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import beta, kurtosis, norm, skew
+
+from tolalloc.allocation.local_model import Side, adding_stack, spreading_stack
+from tolalloc.allocation.program.problem import Stack
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
+from tolalloc.exceptions import InputError
+
+_MISSED = 0.005
+"""Share of a worst case by which an ascent may have missed it [-]."""
+
+
+@runtime_checkable
+class Trial(Protocol):
+    """What is known of one output at one design."""
+
+    @property
+    def output(self) -> str:
+        """Name of the output with its unit."""
+        ...
+
+    @property
+    def design(self) -> Float[np.ndarray, " variable"]:
+        """Scales [-] and clearances [µm]."""
+        ...
+
+    @property
+    def values(self) -> Float[np.ndarray, " unit"]:
+        """The output of the fresh units that have one [unit of the output]."""
+        ...
+
+    @property
+    def failed(self) -> int:
+        """Number of fresh units without a usable answer [-]."""
+        ...
+
+    def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
+        """Return the output of some units and its derivative by every variable [unit of the output]."""
+        ...
+
+    def worst(self, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
+        """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""
+        ...
+
+
+@runtime_checkable
+class Guarantee(Protocol):
+    """What must be shown of an output for its limits to count as kept."""
+
+    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side; the requirement is met if no value lies beyond its limit."""
+        ...
+
+    def require_enough(self, units: int) -> None:
+        """Raise unless so many units can show it."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtYield:
+    """So many units lie within all limits of the output, shown with one-sided 95 % confidence.
+
+    Parameters
+    ----------
+    target
+        Share of units that must keep the limits [-].
+
+    Notes
+    -----
+    The values are order statistics: so many of the outermost units are left out as the sample may reject. Two limits
+    share them in the way that leaves the smaller excess, so both values are inside exactly where the Clopper–Pearson
+    bound of the yield reaches the target.
+    """
+
+    target: float
+
+    def __post_init__(self) -> None:
+        if not 0.5 <= self.target < 1:
+            raise InputError.at("requirement", "yield", self.target, "0.5 up to but not 1")
+
+    def require_enough(self, units: int) -> None:
+        """Raise unless so many units can show it.
+
+        Raises
+        ------
+        InputError
+            Too few units for the target, even if none is rejected.
+        """
+        if allowed_rejections(units, self.target) < 0:
+            needed = int(np.ceil(np.log(1 - CONFIDENCE) / np.log(self.target)))
+            raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
+
+    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        units = trial.values.size + trial.failed
+        allowed = allowed_rejections(units, self.target) - trial.failed
+        left_out = _shared_out(np.sort(trial.values), limits, max(allowed, 0))
+        return tuple(self._side(trial, sign, limit, left_out[sign], allowed >= 0) for sign, limit in _turned(limits))
+
+    def _side(self, trial: Trial, sign: int, limit: float, left_out: int, enough: bool) -> Side:
+        turned = np.sort(sign * trial.values)
+        value = float(turned[-1 - left_out])
+        return Side(
+            sign=sign,
+            limit=limit,
+            value=sign * (value if enough else np.inf),
+            doubt=_order_statistic_error(turned, turned.size - left_out),
+            stack=_spreading(trial, sign, limit, value),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtCpk:
+    """The capability index of the output reaches a target, shown with one-sided 95 % confidence.
+
+    Parameters
+    ----------
+    target
+        Smallest Cpk [-].
+
+    Notes
+    -----
+    The estimate is normal around Cpk with n·var = 1/9 + Cpk·γ/3 + Cpk²·(κ − 1)/4, skewness γ (towards the limit) and
+    kurtosis κ those of the sample: Bissell's interval where both are normal. The value is mean + 3·c·σ, with c the
+    estimate at which the lower bound is the target. Cpk is that of the whole sample; read as a yield, it still
+    assumes a normal output. Units without a usable answer are left out.
+
+    References
+    ----------
+    Bissell 1990, Appl. Statist. 39, 331–340; the delta method for other distributions.
+    """
+
+    target: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.target <= 10:
+            raise InputError.at("requirement", "Cpk", self.target, "above 0 up to 10")
+
+    def require_enough(self, units: int) -> None:
+        """Raise unless so many units can show it.
+
+        Raises
+        ------
+        InputError
+            Too few units for the normal approximation.
+        """
+        if units < 100:
+            raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
+
+    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
+
+    def _side(self, trial: Trial, sign: int, limit: float) -> Side:
+        turned = sign * trial.values
+        needed, error = self._needed(turned)
+        deviation = float(turned.std(ddof=1))
+        value = float(turned.mean()) + 3 * needed * deviation
+        return Side(
+            sign=sign,
+            limit=limit,
+            value=sign * value,
+            doubt=3 * error * deviation,
+            stack=_spreading(trial, sign, limit, value),
+        )
+
+    def _needed(self, turned: Float[np.ndarray, " unit"]) -> tuple[float, float]:
+        """Return the estimate whose lower bound is the target, and its standard error [-]."""
+        z, units = float(norm.ppf(CONFIDENCE)), turned.size
+        lean, tails = float(skew(turned)), float(kurtosis(turned, fisher=False)) - 1
+        # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root.
+        square, half = units - z**2 * tails / 4, units * self.target + z**2 * lean / 6
+        needed = (half + np.sqrt(half**2 - square * (units * self.target**2 - z**2 / 9))) / square
+        return float(needed), float(needed - self.target) / z
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstCase:
+    """No unit inside its zones lies beyond a limit, as far as an ascent from many starts can tell."""
+
+    def require_enough(self, units: int) -> None:
+        """Accept every number of units; none is asked."""
+
+    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
+
+    def _side(self, trial: Trial, sign: Literal[1, -1], limit: float) -> Side:
+        value, gradient = trial.worst(sign)
+        stack = adding_stack(_name(trial, sign), trial.design, sign * (value - limit), sign * gradient)
+        return Side(sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), stack=stack)
+
+
+def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
+    """Return the limited sides, the upper one first, each with the sign that makes larger worse."""
+    upper: tuple[tuple[Literal[1, -1], float], ...] = () if limits.upper is None else ((1, limits.upper),)
+    lower: tuple[tuple[Literal[1, -1], float], ...] = () if limits.lower is None else ((-1, limits.lower),)
+    return (*upper, *lower)
+
+
+def _name(trial: Trial, sign: int) -> str:
+    return f"{trial.output}, {'upper' if sign > 0 else 'lower'} limit"
+
+
+def _shared_out(ordered: Float[np.ndarray, " unit"], limits: Limits, allowed: int) -> dict[int, int]:
+    """Return how many units are left out above and below [-], so that the larger excess of both sides is smallest."""
+    if limits.lower is None or limits.upper is None:
+        return {1: allowed, -1: allowed}
+    above = np.arange(allowed + 1)
+    excess = np.maximum(ordered[-1 - above] - limits.upper, limits.lower - ordered[allowed - above])
+    return {1: int(excess.argmin()), -1: allowed - int(excess.argmin())}
+
+
+def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> float:
+    """Return the standard error of the value at a rank, counted from 1 [unit of the output].
+
+    Exact bootstrap: the rank's value of a resample is that of unit i with a probability of the incomplete beta function
+    (Maritz & Jarrett 1978).
+    """
+    weights = np.diff(beta.cdf(np.linspace(0, 1, ordered.size + 1), rank, ordered.size - rank + 1))
+    return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
+
+
+def _spreading(trial: Trial, sign: int, limit: float, value: float) -> Stack:
+    """Return the local model of mean + spread·σ, which is the turned value; theory page, equation (24)."""
+    turned, (known, derivative) = sign * trial.values, trial.derived()
+    spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
+    standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
+    gradient = sign * (1.0 + spread * standard) @ derivative / known.size
+    return spreading_stack(_name(trial, sign), trial.design, value - sign * limit, gradient)
