@@ -22,6 +22,7 @@ from tolalloc.cli.console import (
     screen,
 )
 from tolalloc.cli.contact import asked_reducer, contact_answer
+from tolalloc.cli.costs import costs
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
 from tolalloc.cli.rank import rank
@@ -234,6 +235,7 @@ def modify(
 
 app.command()(rank)
 app.command()(allocate)
+app.command()(costs)
 app.command()(identify)
 app.command()(diagnose)
 

@@ -1,0 +1,60 @@
+"""``tolalloc costs``: shop data in, cost models with their errors out."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+SHOP = "process,tolerance [unit],unit,cost [cost units]\n"
+
+
+def tolalloc(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tolalloc.cli.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def shop(tmp_path):
+    path = tmp_path / "shop.csv"
+    rows = [f"ground,{zone},µm,{0.5 + 40 / zone}\n" for zone in (5, 8, 12, 20, 40)]
+    path.write_text(SHOP + "".join(rows), encoding="utf-8")
+    return path
+
+
+def test_shop_data_become_the_form_that_made_them(shop):
+    done = tolalloc("costs", str(shop), "--json")
+    assert done.returncode == 0, done.stderr
+    taken = [fit for fit in json.loads(done.stdout)["fits"] if fit["taken"] == "yes"]
+    assert [fit["form, t in µm [cost units]"] for fit in taken] == ["0.5 + 40/t"]
+    assert taken[0]["largest error [%]"] < 1e-6
+    assert (taken[0]["valid from [µm]"], taken[0]["valid to [µm]"]) == (5, 40)
+
+
+def test_a_report_is_written_once(shop, tmp_path):
+    folder = tmp_path / "report"
+    assert tolalloc("costs", str(shop), "--out", str(folder)).returncode == 0
+    assert (folder / "report.html").is_file()
+    again = tolalloc("costs", str(shop), "--out", str(folder))
+    assert again.returncode == 2
+    assert "not empty" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("ground,5,µm,1\nground,8,µm,2\nground,12,µm,3\n", "fall"),
+        ("ground,5,µm,2\nground,8,µm,1\n", "number of points for a fit is 2"),
+        ("ground,5,inch,2\nground,8,µm,1\n", "inch"),
+        ("", "no rows"),
+    ],
+)
+def test_bad_shop_data_end_in_one_sentence(tmp_path, rows, said):
+    path = tmp_path / "bad.csv"
+    path.write_text(SHOP + rows, encoding="utf-8")
+    done = tolalloc("costs", str(path))
+    assert done.returncode == 2
+    assert said in done.stderr, done.stderr
+    assert "Traceback" not in done.stderr
