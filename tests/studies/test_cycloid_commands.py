@@ -125,7 +125,9 @@ def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
     assert "exact distances were taken" in exact["warnings"][0]
 
 
-@pytest.mark.parametrize("study", ["xi2015_contact", "song2019_modification", "li2018_modification"])
+@pytest.mark.parametrize(
+    "study", ["xi2015_contact", "song2019_modification", "li2018_modification", "published_benchmarks"]
+)
 def test_studies_of_the_cycloid_stage(study, tmp_path):
     script, folder = ROOT / "studies" / f"{study}.py", tmp_path / "run"
     command = [sys.executable, str(script), "--quick", "--out", str(folder)]

@@ -105,23 +105,23 @@ def test_a_size_climbs_its_grades_and_anything_else_the_preferred_zones():
     np.testing.assert_allclose(size.zones / UM, [1, 1.5, 2.5, 4, 5, 8, 12, 18])
     for other in (source(), source(feature=Feature.POSITION, nominal=4 * MM)):
         ladder = source_ladder(other)
-        assert ladder.labels[0] == "R10 1 µm"
-        assert ladder.labels[5] == "R10 3.2 µm"
-        np.testing.assert_allclose(ladder.zones[[0, -1]] / UM, [1, 20])
+        assert set(ladder.labels) == {"R10"}
+        assert len(ladder.labels) == len(ladder.zones)
+        np.testing.assert_allclose(ladder.zones[[0, 5, -1]] / UM, [1, 3.2, 20])
     assert len(source_ladder(source(), series=Series.R20).zones) > len(source_ladder(source()).zones)
 
 
 def test_zones_given_by_the_user_replace_every_other_ladder():
     ladder = source_ladder(source(nominal=4 * MM), given=(7 * UM, 3 * UM, 7 * UM, 50 * UM))
     np.testing.assert_allclose(ladder.zones / UM, [3, 7])
-    assert ladder.labels == ("3 µm", "7 µm")
+    assert ladder.labels == ("given", "given")
     for zones in ((), (0.0, 1 * UM), (float("nan"),)):
         with pytest.raises(InputError, match="zones"):
             Ladder.given(zones)
 
 
 def test_a_locked_source_keeps_its_zone():
-    assert source_ladder(source(locked=True, zone=5.3 * UM)).labels == ("5.3 µm",)
+    assert source_ladder(source(locked=True, zone=5.3 * UM)).labels == ("locked",)
     kept = source_ladder(source(locked=True, zone=5.3 * UM, grade="IT5"))
     assert kept.labels == ("IT5",)
     assert kept.zones[0] == 5.3 * UM
@@ -134,7 +134,7 @@ def test_a_range_without_a_step_names_the_nearest_steps():
         source_ladder(source(nominal=4 * MM, minimum=2.6 * UM, maximum=3.9 * UM, zone=3 * UM))
     with pytest.raises(InputError, match=r"nearest of which are IT01 \(0.4 µm\)\."):
         source_ladder(source(nominal=4 * MM, minimum=0.1 * UM, maximum=0.3 * UM, zone=0.2 * UM))
-    with pytest.raises(InputError, match=r"nearest of which are R10 1000 µm"):
+    with pytest.raises(InputError, match=r"nearest of which are R10 \(1000 µm\)"):
         source_ladder(source(minimum=1100 * UM, maximum=1200 * UM, zone=1150 * UM))
 
 
@@ -147,6 +147,6 @@ def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
     alike = [source("a", nominal=20 * MM, group="g"), source("b", nominal=29 * MM, group="g")]
     assert group_ladder(alike).labels[:2] == ("IT0", "IT1")
     mixed = [source("a", nominal=20 * MM, group="g"), source("b", nominal=31 * MM, group="g")]
-    assert group_ladder(mixed).labels[0] == "R10 1 µm"
+    assert group_ladder(mixed).labels[0] == "R10"
     with pytest.raises(InputError, match="group g"):
         group_ladder([source("a", maximum=4 * UM, group="g"), source("b", minimum=4.5 * UM, group="g")])

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from stack_front import LOWER, UPPER, StackProblem, stack_problem
 
+from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE, DesignProblem
 from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
@@ -22,6 +23,7 @@ from tolalloc.allocation.pareto.indicators import hypervolume_ratio, knee, nondo
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.program import process_choice
+from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.study.definition import Study, prepare
@@ -396,29 +398,27 @@ def test_genes_of_designs_and_back_are_the_designs_up_to_their_ladders(prepared,
     np.testing.assert_allclose(problem.genes_of(again), problem.genes_of(designs), atol=1e-12)
 
 
-def test_wrong_ladders_and_limits_are_refused(prepared, quantile):
+def test_wrong_ladders_are_refused(prepared, quantile):
     space = prepared.space
     with pytest.raises(UnknownNameError, match="ladders"):
         DesignProblem(space=space, quantile=quantile, ladders={"nobody": np.ones(1)})
     with pytest.raises(InputError, match="rising numbers"):
         DesignProblem(space=space, quantile=quantile, ladders={space.groups[0]: np.array([0.9, 0.8])})
-    with pytest.raises(UnknownNameError, match="limits"):
-        DesignProblem(space=space, quantile=quantile, limits={"noise [dB]": 60.0})
 
 
-def test_limits_are_violated_by_their_share(prepared, quantile):
-    problem = DesignProblem(
-        space=prepared.space,
-        quantile=quantile,
-        further=(RADIAL_CLEARANCE,),
-        limits={"cost [cost units]": 10.0, "radial clearance [µm]": 8.0},
+def test_other_requirements_are_violated_by_what_their_models_say(prepared, quantile):
+    space = prepared.space
+    groups, design = len(space.groups), space.uniform(1.0, prepared.reducer.modification)
+    stack = Stack(
+        name="lost motion", adding=np.zeros(groups), spreading=np.ones(groups), room=2.0, slopes=np.array([0.0, 0.1])
     )
-    design = prepared.space.uniform(1.0, prepared.reducer.modification)
+    side = Side(sign=1, limit=0.5, value=0.4, doubt=0.01, scale=0.5, stack=stack)
+    problem = DesignProblem(space=space, quantile=quantile, further=(RADIAL_CLEARANCE,), sides=(side,))
     answers = problem(problem.genes_of(design[np.newaxis]))
-    cost, radial = answers.values[0, 0], answers.values[0, 2]
-    assert cost == pytest.approx(prepared.space.cost(design[np.newaxis])[0])
-    assert radial == pytest.approx(8.0)
-    np.testing.assert_allclose(answers.violation[0], [cost / 10 - 1, 0.0], atol=1e-9)
+    assert problem.constraints == ("lost motion",)
+    assert answers.values[0, 0] == pytest.approx(space.cost(design[np.newaxis])[0])
+    assert answers.values[0, 2] == pytest.approx(8.0)
+    np.testing.assert_allclose(answers.violation, [[(groups**0.5 + 0.8 - 2.0) / 0.5]], rtol=1e-6)
 
 
 def rough(designs):

@@ -34,5 +34,5 @@ def _factor(tried: VerifiedDesign) -> float:
     for side in tried.sides:
         rise = float(side.stack.load(tried.design[:-2], np.zeros(2)))
         room = -float(side.predicted(tried.design)) - side.doubt
-        factors.append(1 + room / max(rise, 0.1 * abs(side.limit)))
+        factors.append(1 + room / max(rise, 0.1 * side.scale))
     return float(np.clip(min(factors), 0.4, 2.5))

@@ -104,6 +104,11 @@ class DesignSpace:
         """Every group with the processes that all of its members have, over its scale."""
         return tuple(Feature(name=group, processes=self._processes(group)) for group in self.groups)
 
+    @property
+    def has_choices(self) -> bool:
+        """Whether a feature may be made in more than one way."""
+        return any(len(feature.processes) > 1 for feature in self.features)
+
     @cached_property
     def shared(self) -> Shared:
         """The two clearances."""

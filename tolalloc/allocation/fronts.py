@@ -8,17 +8,23 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.pareto import Front, from_genes, pareto_front, to_genes
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.pareto import Front, FrontEffort, from_genes, pareto_front, to_genes
+from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.design_problem import Criterion, Ladders
+from tolalloc.allocation.pareto.indicators import spread_over
+from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.front import front
+from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
-from tolalloc.allocation.search import Allocation, SearchEffort, allocate, cheapest_by_models
-from tolalloc.allocation.trust_region import SETTLED, Programs
-from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
-from tolalloc.reducer.design import Modification
+from tolalloc.allocation.trust_region import Programs
+from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.surrogate.regression import Surrogate
 from tolalloc.uncertainty.seeds import SeedTree
+
+_SPAN = 2.5
+"""Factor around the scales of a design within which the surrogate learns [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +38,7 @@ class ConvexFront:
     designs
         Scales [-] and clearances [µm].
     cost, bound
-        Cost, and a lower bound on it that takes no solver's word [cost units].
+        Cost, and a lower bound on it over all processes that takes no solver's word [cost units].
     """
 
     limits: Float[np.ndarray, " limit"]
@@ -41,44 +47,35 @@ class ConvexFront:
     bound: Float[np.ndarray, " limit"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class AllocationWithFront(Allocation):
-    """The same with the Pareto front of cost against the quantile of the peak-to-peak.
-
-    Parameters
-    ----------
-    surrogate
-        Surrogate of the quantile over designs, with its Q².
-    front
-        Pareto front of cost against the quantile.
-    exact
-        Front of the convex program, the seed of NSGA-II.
-    """
-
-    surrogate: Surrogate
-    front: Front
-    exact: ConvexFront
-
-
-def exact_front(space: DesignSpace, best: VerifiedDesign, shares: Float[np.ndarray, " share"]) -> ConvexFront:
+def exact_front(
+    space: DesignSpace, stacks: tuple[Stack, ...], limit: float, shares: Float[np.ndarray, " share"]
+) -> ConvexFront:
     """Return the cheapest designs for several limits of the peak-to-peak, leaving out those that cannot be kept.
 
     Parameters
     ----------
     space
         The design variables.
-    best
-        The verified design whose models count; its processes stay.
+    stacks
+        Convex models with the room of the limits, that of the peak-to-peak first.
+    limit
+        Largest peak-to-peak allowed [arcsec].
     shares
-        The limits over the one asked for [-].
+        The limits over that one [-].
     """
-    program = Programs(space, len(best.sides)).of(space.process_positions(best.design))
-    first, stacks = best.sides[0], [side.stack for side in best.sides]
-    solved = front(program, stacks, 0, first.stack.room + (shares - 1) * first.limit)
+    rooms = stacks[0].room + (shares - 1) * limit
+    if space.has_choices:
+        chosen = [
+            process_choice.allocate(space.problem((replace(stacks[0], room=room), *stacks[1:]))) for room in rooms
+        ]
+        solved = [found if isinstance(found, Solution) else None for found in chosen]
+    else:
+        program = Programs(space, len(stacks)).of(np.zeros(len(space.groups), dtype=int))
+        solved = [*front(program, stacks, 0, rooms)]
     known = [(share, found) for share, found in zip(shares.tolist(), solved, strict=True) if found]
     designs = [np.concatenate([found.zones, found.shared]) for _, found in known]
     return ConvexFront(
-        limits=np.array([share * first.limit for share, _ in known]),
+        limits=np.array([share * limit for share, _ in known]),
         designs=np.array(designs).reshape(-1, space.lower.size),
         cost=np.array([found.cost + space.locked_cost for _, found in known]),
         bound=np.array([found.bound + space.locked_cost for _, found in known]),
@@ -97,56 +94,53 @@ def designs_around(
     return from_genes(lower + unit * (upper - lower))
 
 
-def allocate_with_front(
+def _as_kept(side: Side, best: VerifiedDesign) -> Side:
+    """Return a limited side with at least the room that a design takes of it, where that one misses the limit."""
+    load = float(side.stack.load(best.design[:-2], best.design[-2:]))
+    return replace(side, stack=replace(side.stack, room=max(side.stack.room, load)))
+
+
+def searched_front(
     response: QuantileResponse,
-    verifier: Verifier,
-    modification: Modification,
+    best: VerifiedDesign,
+    exact: ConvexFront,
     seeds: SeedTree,
-    effort: SearchEffort,
-) -> AllocationWithFront:
-    """Return the cheapest verified allocation, and the front of cost against the quantile of the peak-to-peak.
+    effort: FrontEffort,
+    ladders: Ladders | None = None,
+    further: tuple[Criterion, ...] = (),
+    checkpoint: Checkpoint | None = None,
+) -> tuple[Front, Surrogate]:
+    """Return the front of cost against the quantile of the peak-to-peak around a verified design, and its surrogate.
 
     Parameters
     ----------
     response
         Quantile of a design on the real kernel, common random numbers.
-    verifier
-        Judges designs on fresh units.
-    modification
-        The reducer's own modification, kept by the scaling by hand.
+    best
+        The verified design; the limits of its other requirements, as far as it keeps them, must be kept by their local
+        models.
+    exact
+        Exact front of its models, from which the search starts.
     seeds
         Node of the seed tree.
     effort
         How much may be spent.
+    ladders
+        Group → the scales that it may have, rising [-].
+    further
+        Further objectives.
+    checkpoint
+        Where the kernel's answers are kept.
     """
-    space = verifier.space
-    found = allocate(verifier, scale_by_hand(verifier, modification, effort.steps), effort)
-    best = found.chosen
-    exact = exact_front(space, best, np.linspace(0.6, 1.5, effort.front.points))
-    pareto, surrogate = pareto_front(
+    return pareto_front(
         replace(response, spread=best.spread),
         LocalQuantile(side=best.sides[0]),
-        designs_around(space, best.design, 2.5, effort.front.designs, seeds.child("designs")),
-        exact.designs,
+        designs_around(response.space, best.design, _SPAN, effort.designs, seeds.child("designs")),
+        exact.designs[spread_over(len(exact.designs), effort.points)],
         seeds.child("pareto"),
-        effort.front,
-    )
-    # The front may have found something cheaper; it counts only if fresh units say so.
-    cheaper = (pareto.quantile <= best.quantile_bound) & (pareto.cost < (1 - SETTLED) * best.cost)
-    tried, chosen, optimum = found.tried, found.chosen, found.optimum
-    if cheaper.any():
-        tried += (verifier.verify(pareto.designs[cheaper][np.argmin(pareto.cost[cheaper])], "front"),)
-        chosen = answer(tried)
-        optimum = cheapest_by_models(space, chosen, tried)
-    return AllocationWithFront(
-        limit=found.limit,
-        groups=found.groups,
-        chosen=chosen,
-        tried=tried,
-        hand_tried=found.hand_tried,
-        optimum=optimum,
-        locked_cost=found.locked_cost,
-        surrogate=surrogate,
-        front=pareto,
-        exact=exact,
+        effort,
+        ladders=ladders,
+        further=further,
+        sides=tuple(_as_kept(side, best) for side in best.sides[1:]),
+        checkpoint=checkpoint,
     )

@@ -9,10 +9,11 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.grade.ladder import Ladder, group_ladder
-from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSolution, feature_options
+from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSolution, Option, feature_options
 from tolalloc.allocation.program.problem import AllocationProblem, Shared, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
+from tolalloc.exceptions import SolveError
 from tolalloc.uncertainty.tolerance_table import with_zones
 
 AMOUNT_STEP = 0.5
@@ -24,6 +25,8 @@ _SECONDS = 20.0
 """Longest time for one proof [s]."""
 _SETTLED = 0.2
 """Distance of a kept from a missed margin that ends the search [standard errors]."""
+_ROUNDING = 1e-9
+"""Distance of a clearance from its range up to which it is rounding [µm]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +44,8 @@ class GradedAllocation:
     labels
         Name of the zone of every group on the drawing.
     solution
-        Cheapest choice that the chosen design's local models let keep the limits as the chosen one does, with its
-        proven bound; without locked zones.
+        Cheapest choice that the chosen design's local models let keep the limits, with its proven bound; without
+        locked zones.
     """
 
     space: DesignSpace
@@ -55,6 +58,15 @@ class GradedAllocation:
     def bound(self) -> float:
         """Lower bound on the cost of every such choice [cost units]."""
         return self.solution.bound + self.space.locked_cost
+
+    @property
+    def scales(self) -> dict[str, Float[np.ndarray, " position"]]:
+        """Scales of every group's ladder that a process can hold [-]."""
+        space, found = self.space, {}
+        for at, (group, ladder) in enumerate(zip(space.groups, group_ladders(space), strict=True)):
+            scales = ladder.zones / space.first_zones[at]
+            found[group] = scales[(scales >= space.lower[at]) & (scales <= space.upper[at])]
+        return found
 
 
 def with_shared_zones(space: DesignSpace) -> DesignSpace:
@@ -75,6 +87,23 @@ def with_shared_zones(space: DesignSpace) -> DesignSpace:
     return replace(space, errors=replace(space.errors, sources=with_zones(sources, zones)))
 
 
+def group_options(space: DesignSpace) -> tuple[tuple[Option, ...], ...]:
+    """Return the steps of every group's ladder with the processes that hold them, over its scale.
+
+    Parameters
+    ----------
+    space
+        Groups whose members share one zone.
+
+    Raises
+    ------
+    InputError
+        No step lies in the range of every member, or no process holds one.
+    """
+    ladders = zip(space.features, group_ladders(space), space.first_zones, strict=True)
+    return tuple(feature_options(feature, ladder.zones / first, ladder.labels) for feature, ladder, first in ladders)
+
+
 def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
     """Return the ladder of every group [m].
 
@@ -90,47 +119,53 @@ def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
 class _Grid:
     """The choices of a design space: steps of the ladders, and modification amounts around those of a design."""
 
-    def __init__(self, space: DesignSpace, ladders: tuple[Ladder, ...], around: Float[np.ndarray, " variable"]) -> None:
-        self.space = space
-        first = {group: next(s.zone for s in space.errors.active if s.group == group) for group in space.groups}
-        self.options = tuple(
-            feature_options(feature, ladder.zones / first[feature.name], ladder.labels)
-            for feature, ladder in zip(space.features, ladders, strict=True)
-        )
+    def __init__(self, space: DesignSpace, around: Float[np.ndarray, " variable"]) -> None:
+        self.space, self.options = space, group_options(space)
         self._by_clearance = space.modification_by_clearance
-        free = self._amounts(around[-2:])
-        # A locked modification stays as the reducer has it, however round it is.
-        held = np.all(space.shared.lower == space.shared.upper)
-        steps = np.zeros(1) if held else AMOUNT_STEP * np.arange(-_STEPS_AROUND, _STEPS_AROUND + 1)
-        round_free = free if held else AMOUNT_STEP * np.round(free / AMOUNT_STEP)
-        self.amounts = tuple(amount + steps for amount in round_free)
+        self._to_clearance = np.linalg.inv(self._by_clearance)
+        free = self._by_clearance @ around[-2:]  # both in micrometres
+        steps = AMOUNT_STEP * np.arange(-_STEPS_AROUND, _STEPS_AROUND + 1)
+        self.amounts = tuple(AMOUNT_STEP * np.round(amount / AMOUNT_STEP) + steps for amount in free)
+        if not self._clearances.size:
+            # A clearance that is locked, or whose range is narrow, may leave no round amounts: they stay as they are.
+            self.amounts = tuple(np.array([amount]) for amount in free)
 
-    def _amounts(self, clearances: Float[np.ndarray, " 2"]) -> Float[np.ndarray, " 2"]:
-        """Return the modification amounts of clearances, both in micrometres."""
-        return np.asarray(self._by_clearance @ clearances)
+    @property
+    def _clearances(self) -> Float[np.ndarray, "pair 2"]:
+        """Clearances of all pairs of amounts, those outside their range left out [µm]."""
+        pairs = np.array(np.meshgrid(*self.amounts)).reshape(2, -1).T @ self._to_clearance.T
+        low, high = self.space.shared.lower, self.space.shared.upper
+        return np.asarray(pairs[np.all((pairs >= low - _ROUNDING) & (pairs <= high + _ROUNDING), axis=1)])
 
     def problem(self, stacks: tuple[Stack, ...]) -> DiscreteProblem:
         """Return the choice that keeps the stacks and the range of the clearances."""
-        to_clearance = np.linalg.inv(self._by_clearance)
         shared, still = self.space.shared, np.zeros(len(self.options))
-        ranges = [
-            Stack(name=f"{name}, range", adding=still, spreading=still, room=sign * bound, slopes=sign * row)
-            for name, row, low, high in zip(shared.names, to_clearance, shared.lower, shared.upper, strict=True)
+        ranges = tuple(
+            Stack(
+                name=f"{name}, range", adding=still, spreading=still, room=sign * bound + _ROUNDING, slopes=sign * row
+            )
+            for name, row, low, high in zip(shared.names, self._to_clearance, shared.lower, shared.upper, strict=True)
             for sign, bound in ((1.0, float(high)), (-1.0, float(low)))
-        ]
-        held = [replace(stack, room=stack.room + 1e-9) for stack in ranges]
-        by_amount = [replace(stack, slopes=stack.slopes @ to_clearance) for stack in stacks]
+        )
+        by_amount = tuple(replace(stack, slopes=stack.slopes @ self._to_clearance) for stack in stacks)
         around = Shared(
             names=_AMOUNTS,
             lower=np.array([amounts[0] for amounts in self.amounts]),
             upper=np.array([amounts[-1] for amounts in self.amounts]),
         )
-        problem = AllocationProblem(features=self.space.features, stacks=(*by_amount, *held), shared=around)
+        problem = AllocationProblem(features=self.space.features, stacks=(*by_amount, *ranges), shared=around)
         return DiscreteProblem(problem=problem, options=self.options, grids=self.amounts)
 
     def design(self, found: DiscreteSolution) -> Float[np.ndarray, " variable"]:
         """Return the design of a choice."""
-        return np.concatenate([found.zones, np.linalg.inv(self._by_clearance) @ found.shared])
+        return np.concatenate([found.zones, self._to_clearance @ found.shared])
+
+    def least_overloaded(self, stacks: tuple[Stack, ...]) -> Float[np.ndarray, " variable"]:
+        """Return the tightest zones with the clearances, inside their range, whose largest overload is least."""
+        tightest = np.array([min(own.zone for own in options) for options in self.options])
+        problem = self.space.problem(stacks)
+        largest = [(problem.overload(tightest, pair) / problem.scales).max() for pair in self._clearances]
+        return np.append(tightest, self._clearances[int(np.argmin(largest))])
 
 
 def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> GradedAllocation:
@@ -143,30 +178,35 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     start
         The best of these, around which choices are looked for.
     steps
-        Largest number of verified choices [-].
+        Largest number of verified choices, 1 or more [-].
 
     Raises
     ------
     InputError
-        A zone that has no step of its ladder between min and max.
+        A zone that has no step of its ladder between min and max, or none that a process holds.
+    SolveError
+        Too many units failed, or no choice was found in the time allowed.
 
     Notes
     -----
     Every choice is the proven best one of the local models; fresh units judge it, and the next one is made on the
     models around it. How far inside the limits the models must aim is found by bisection, in standard errors: further
-    after a choice that missed a limit, less far after one that kept them all.
+    after a choice that missed a limit, less far after one that kept them all. Where the models let no choice keep the
+    limits, the one that overloads them least is tried, and where that misses them again, it is the answer. A scale is
+    the same factor on the shared zone as on the zones of the members, so the start keeps its scales.
     """
     space = with_shared_zones(verifier.space)
-    own, ladders = replace(verifier, space=space), group_ladders(space)
-    design = np.append(np.clip(start.design[:-2], space.lower[:-2], space.upper[:-2]), start.design[-2:])
-    grid, tried = _Grid(space, ladders, design), [own.verify(design, "graded start")]
+    own, design = replace(verifier, space=space), np.clip(start.design, space.lower, space.upper)
+    grid, tried = _Grid(space, design), [own.verify(design, "graded start")]
     missed, kept = -1.0, np.inf
     while len(tried) <= steps and kept - missed > _SETTLED:
         margin = missed + 1.0 if kept == np.inf else (missed + kept) / 2
-        problem = grid.problem(_inside(tried[-1], tried, margin))
-        found = problem.solve(_SECONDS) or problem.least_overloaded()
-        choice = grid.design(found)
+        stacks = _inside(tried[-1], tried, margin)
+        found = grid.problem(stacks).solve(_SECONDS)
+        choice = grid.design(found) if found else grid.least_overloaded(stacks)
         judged = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
+        if judged and not judged.met and found is None:
+            break  # no margin makes any other choice
         if judged is None:
             judged = own.verify(choice, f"graded {len(tried)}")
             tried.append(judged)
@@ -193,13 +233,17 @@ def _labels(grid: _Grid, chosen: VerifiedDesign) -> tuple[str, ...]:
     """Return the name of every zone of a choice."""
     return tuple(
         min(options, key=lambda option: abs(option.zone - scale)).label
-        for options, scale in zip(grid.options, chosen.design, strict=False)
+        for options, scale in zip(grid.options, chosen.design[:-2], strict=True)
     )
 
 
 def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteSolution:
-    """Return the cheapest choice that keeps the limits as the chosen one does, by its own models."""
-    problem = grid.problem(
-        tuple(replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried))
+    """Return the cheapest choice that keeps the limits, by the models of the chosen one."""
+    # A load that is its own room may lie beyond it by rounding.
+    stacks = tuple(
+        replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried, margin=0.0)
     )
-    return problem.solve(_SECONDS) or problem.least_overloaded()
+    found = grid.problem(stacks).solve(_SECONDS)
+    if found is None:
+        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
+    return found

@@ -114,6 +114,7 @@ class AtYield:
             limit=limit,
             value=sign * (value if enough else np.inf),
             doubt=_order_statistic_error(turned, turned.size - left_out),
+            scale=_scale(trial, limit),
             stack=_spreading(trial, sign, limit, value),
         )
 
@@ -170,6 +171,7 @@ class AtCpk:
             limit=limit,
             value=sign * value,
             doubt=3 * error * deviation,
+            scale=_scale(trial, limit),
             stack=_spreading(trial, sign, limit, value),
         )
 
@@ -197,7 +199,9 @@ class WorstCase:
     def _side(self, trial: Trial, sign: Literal[1, -1], limit: float) -> Side:
         value, gradient = trial.worst(sign)
         stack = adding_stack(_name(trial, sign), trial.design, sign * (value - limit), sign * gradient)
-        return Side(sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), stack=stack)
+        return Side(
+            sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), scale=_scale(trial, limit), stack=stack
+        )
 
 
 def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
@@ -205,6 +209,11 @@ def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
     upper: tuple[tuple[Literal[1, -1], float], ...] = () if limits.upper is None else ((1, limits.upper),)
     lower: tuple[tuple[Literal[1, -1], float], ...] = () if limits.lower is None else ((-1, limits.lower),)
     return (*upper, *lower)
+
+
+def _scale(trial: Trial, limit: float) -> float:
+    """Return what an excess is compared with; a limit of zero says nothing of its size [unit of the output]."""
+    return max(abs(limit), float(trial.values.std())) or 1.0
 
 
 def _name(trial: Trial, sign: int) -> str:

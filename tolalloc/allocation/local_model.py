@@ -24,6 +24,9 @@ class Side:
         What the guarantee compares with the limit [unit of the output].
     doubt
         Standard error of the value, the margin that the next step keeps [unit of the output].
+    scale
+        What makes requirements comparable: the limit, or the deviation of the units where that is larger
+        [unit of the output].
     stack
         Convex model around the design; its load less its room is the predicted `excess`.
     """
@@ -32,6 +35,7 @@ class Side:
     limit: float
     value: float
     doubt: float
+    scale: float
     stack: Stack
 
     @property
@@ -41,8 +45,8 @@ class Side:
 
     @property
     def relative_excess(self) -> float:
-        """The same over the limit, or over the value where that is larger [-]."""
-        return self.excess / max(abs(self.limit), abs(self.value)) if np.isfinite(self.value) else np.inf
+        """The same over the scale [-]."""
+        return self.excess / self.scale
 
     def predicted(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the excess that the model predicts, negative inside the limit [unit of the output]."""

@@ -57,18 +57,19 @@ class Allocation:
     hand_tried
         Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself.
     optimum
-        Cheapest design of all that the chosen one's convex models let keep the limits as the chosen one does; without
-        locked zones.
+        Cheapest design of all that the chosen one's convex models let keep the limits; without locked zones.
+    inside
+        The same one standard error inside the limits, which is where the search aims.
     locked_cost
         Cost of the locked zones [cost units].
     """
 
     limit: float
-    groups: tuple[str, ...]
     chosen: VerifiedDesign
     tried: tuple[VerifiedDesign, ...]
     hand_tried: tuple[VerifiedDesign, ...]
     optimum: Solution
+    inside: Solution
     locked_cost: float
 
     @property
@@ -84,11 +85,16 @@ class Allocation:
     @cached_property
     def stacks(self) -> tuple[Stack, ...]:
         """The chosen design's local models with the room that the search aims at, or that the design takes of it."""
-        return kept_stacks(self.chosen, self.tried)
+        return kept_stacks(self.chosen, self.tried, margin=1.0)
+
+    @cached_property
+    def limit_stacks(self) -> tuple[Stack, ...]:
+        """The same with the room of the limits themselves."""
+        return kept_stacks(self.chosen, self.tried, margin=0.0)
 
     @property
     def bound(self) -> float:
-        """Lower bound on the cost of every such design, computed without the solver [cost units]."""
+        """Lower bound on the cost of every design that the models let keep the limits, without the solver's word."""
         return self.optimum.bound + self.locked_cost
 
     @property
@@ -102,12 +108,6 @@ class Allocation:
         return {
             side.stack.name: float(price) for side, price in zip(self.chosen.sides, self.optimum.prices, strict=True)
         }
-
-    @property
-    def bound_prices(self) -> dict[str, tuple[float, float]]:
-        """Group → cost saved by moving its smallest and its largest scale outwards [cost units per unit of scale]."""
-        prices = zip(self.groups, self.optimum.bound_prices.tolist(), strict=True)
-        return {group: (low, high) for group, (low, high) in prices}
 
     @property
     def blocking(self) -> Check | None:
@@ -171,8 +171,10 @@ def require_groups(space: DesignSpace, place: str) -> None:
         raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
 
 
-def cheapest_by_models(space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> Solution:
-    """Return the cheapest design that the models of a verified one let keep the limits as it does.
+def cheapest_by_models(
+    space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
+) -> Solution:
+    """Return the cheapest design that the models of a verified one let keep the limits.
 
     Parameters
     ----------
@@ -182,6 +184,8 @@ def cheapest_by_models(space: DesignSpace, chosen: VerifiedDesign, tried: tuple[
         The verified design.
     tried
         All designs of its search.
+    margin
+        How far inside the limits, as far as the verified design itself is [standard errors].
 
     Raises
     ------
@@ -189,7 +193,8 @@ def cheapest_by_models(space: DesignSpace, chosen: VerifiedDesign, tried: tuple[
         The program does not even find the design itself.
     """
     # A load that is its own room may lie beyond it by rounding.
-    stacks = tuple(replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried))
+    kept = kept_stacks(chosen, tried, margin)
+    stacks = tuple(replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept)
     found = process_choice.allocate(space.problem(stacks))
     if not isinstance(found, Solution):
         raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")
@@ -218,15 +223,17 @@ def allocate(
     """
     first, space = start or answer(hand_tried), verifier.space
     # By hand no bounds are asked for; a start that keeps them is an answer like any other.
-    inside = np.all((first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING)))
-    tried = ((first,) if inside else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
+    is_allowed = np.all(
+        (first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING))
+    )
+    tried = ((first,) if is_allowed else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
     chosen = answer(tried)
     return Allocation(
         limit=verifier.limit,
-        groups=space.groups,
         chosen=chosen,
         tried=tried,
         hand_tried=hand_tried,
-        optimum=cheapest_by_models(space, chosen, tried),
+        optimum=cheapest_by_models(space, chosen, tried, margin=0.0),
+        inside=cheapest_by_models(space, chosen, tried, margin=1.0),
         locked_cost=space.locked_cost,
     )

@@ -11,11 +11,13 @@ from tolalloc.allocation.program.convex import ConvexProgram
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import Allocation
-from tolalloc.allocation.trust_region import Programs
+from tolalloc.allocation.trust_region import Programs, aimed
 from tolalloc.allocation.verification import VerifiedDesign
 
-_CORRECTIONS = 3
-"""Times that the model of the peak-to-peak is corrected on the kernel for every pair of clearances [-]."""
+_CORRECTIONS = 6
+"""Largest number of corrections of the model of the peak-to-peak, on the kernel, for every pair of clearances [-]."""
+_SETTLED = 0.05
+"""What the corrected model may still miss [arcsec]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,9 +29,11 @@ class ModificationTrade:
     flank, radial
         Clearances [µm].
     cost
-        Cost of the cheapest zones that keep the requirements there, not a number where none do [cost units].
+        Cost of the cheapest zones that keep the requirements there, not a number where none do, or where a unit of
+        the kernel run has no equilibrium [cost units].
     error
-        Root-mean-square of what is left between model and kernel after the last correction [arcsec].
+        Root-mean-square of what is left between model and kernel after the last correction, not a number where no
+        pair of clearances has a cost [arcsec].
     """
 
     flank: Float[np.ndarray, " flank"]
@@ -39,7 +43,9 @@ class ModificationTrade:
 
     @property
     def cheapest(self) -> tuple[float, float]:
-        """Flank and radial clearance with the cheapest zones [µm]."""
+        """Flank and radial clearance with the cheapest zones, not numbers where no pair has a cost [µm]."""
+        if np.isnan(self.cost).all():
+            return np.nan, np.nan
         at = np.unravel_index(int(np.nanargmin(self.cost)), self.cost.shape)
         return float(self.flank[at[0]]), float(self.radial[at[1]])
 
@@ -56,6 +62,12 @@ class ModificationTrade:
 
 def _slope(cost: Float[np.ndarray, "flank radial"], along: Float[np.ndarray, " step"], axis: int) -> object:
     return np.gradient(cost, along, axis=axis) if along.size > 1 else np.full(cost.shape, np.nan)
+
+
+def asked_stacks(allocation: Allocation) -> tuple[Stack, ...]:
+    """Return the chosen design's local models with the room that the limits leave, however far it lies beyond them."""
+    chosen = allocation.chosen
+    return allocation.stacks if chosen.met else aimed(chosen, list(allocation.tried))
 
 
 def modification_trade(
@@ -78,18 +90,21 @@ def modification_trade(
     Notes
     -----
     Far from the chosen design its models are off, so for every pair the program is solved, the kernel runs the found
-    design, and the room of the peak-to-peak is corrected by what the model missed; then again. Other requirements
-    keep their models.
+    design, and the room of the peak-to-peak is corrected by what the model missed; then again, until it misses
+    little. Other requirements keep their models.
     """
-    space, chosen, stacks = response.space, allocation.chosen, allocation.stacks
+    space, chosen, stacks = response.space, allocation.chosen, asked_stacks(allocation)
     program = Programs(space, len(stacks)).of(space.process_positions(chosen.design))
     known = float(response(chosen.design[np.newaxis]).values[0, 0])
     pairs = [np.array([first, second]) for first in flank for second in radial]
     found = [_corrected(program, stacks, pair, response, chosen, known) for pair in pairs]
-    cost = np.array([cost for cost, _ in found]).reshape(flank.size, radial.size)
-    missed = np.array([missed for _, missed in found])
+    cost, missed = np.array(found).T
+    known_misses = missed[np.isfinite(missed)]
     return ModificationTrade(
-        flank=flank, radial=radial, cost=cost + space.locked_cost, error=float(np.sqrt(np.nanmean(missed**2)))
+        flank=flank,
+        radial=radial,
+        cost=cost.reshape(flank.size, radial.size) + space.locked_cost,
+        error=float(np.sqrt(np.mean(known_misses**2))) if known_misses.size else np.nan,
     )
 
 
@@ -102,15 +117,21 @@ def _corrected(
     known: float,
 ) -> tuple[float, float]:
     """Return the least cost at given clearances, and what the model last missed there [arcsec]."""
-    first, missed, cost = stacks[0], 0.0, np.nan
+    first, model, missed, cost, error = stacks[0], chosen.sides[0], 0.0, np.nan, np.inf
     for _ in range(_CORRECTIONS):
-        corrected = replace(first, room=first.room - missed)
-        solution = program.solve((corrected, *stacks[1:]), shared_lower=clearances, shared_upper=clearances)
-        if solution is None:
+        corrected = (replace(first, room=first.room - missed), *stacks[1:])
+        bounds = {"shared_lower": clearances, "shared_upper": clearances}
+        solution = program.solve(corrected, **bounds)
+        # Where the model lets nothing keep the limits, it may still be the model that is wrong.
+        found = solution or program.least_infeasible(corrected, **bounds)
+        design = np.concatenate([found.zones, found.shared])
+        answered = response(design[np.newaxis])
+        if not answered.good[0]:
             return np.nan, np.nan
-        design = np.concatenate([solution.zones, solution.shared])
-        model = chosen.sides[0]
         rise = float(model.predicted(design) - model.predicted(chosen.design))
-        before, cost = missed, solution.cost
-        missed = float(response(design[np.newaxis]).values[0, 0]) - known - rise
-    return cost, missed - before
+        cost, before = solution.cost if solution else np.nan, error
+        error = float(answered.values[0, 0]) - known - rise - missed
+        if abs(error) <= _SETTLED:
+            break
+        missed += error / (1 - min(error / before, 0.0))  # the secant where corrections swing to and fro
+    return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,8 +16,10 @@ from tolalloc.allocation.verification import VerifiedDesign, Verifier
 SETTLED = 0.01
 """Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
 
-_SIMILAR = 0.1
-"""Relative difference of cost within which designs share their convex models [-]."""
+_SIMILAR = (1.25, 1.0)
+"""Ratio of scales [-] and difference of clearances [µm] up to which designs share their convex models."""
+_EXPLAINED = 2.0
+"""Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
 
 class Programs:
@@ -35,10 +36,6 @@ class Programs:
     def __init__(self, space: DesignSpace, stacks: int) -> None:
         self.space, self.stacks = space, stacks
         self._compiled: dict[tuple[int, ...], ConvexProgram] = {}
-
-    @cached_property
-    def _competing(self) -> bool:
-        return any(len(feature.processes) > 1 for feature in self.space.features)
 
     def of(self, processes: Int[np.ndarray, " group"]) -> ConvexProgram:
         """Return the program of the processes at the given positions."""
@@ -57,7 +54,7 @@ class Programs:
         present
             Position of the present process of every group [-].
         """
-        if not self._competing:
+        if not self.space.has_choices:
             return present
         best = process_choice.allocate(self.space.problem(stacks))
         kept = self.of(present).solve(stacks)
@@ -104,7 +101,7 @@ def _reached(
     return np.maximum(lower, centre - size * (1 - 1 / reach)), np.minimum(upper, centre + size * (reach - 1))
 
 
-def aimed(last: VerifiedDesign, tried: list[VerifiedDesign]) -> tuple[Stack, ...]:
+def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0) -> tuple[Stack, ...]:
     """Return the local models of a design with the room to aim at.
 
     Parameters
@@ -113,33 +110,43 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign]) -> tuple[Stack, ...
         The design.
     tried
         It and all designs before it.
+    margin
+        How far inside each limit the aim is [standard errors].
 
     Notes
     -----
-    The values of a few thousand units are uncertain by a percent or two; the aim is one standard error inside each
-    limit. Where the models of the last design also explain earlier ones of similar cost, their mean deviation from
-    them corrects them, so the noise averages out.
+    The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
+    each limit. Where the models of the last design also explain earlier ones near by, their mean deviation from them
+    corrects them, so the noise averages out.
     """
-    similar = [item for item in tried if abs(item.cost / last.cost - 1) < _SIMILAR]
+    similar = [item for item in tried if _is_similar(item.design, last.design)]
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        stacks.append(replace(side.stack, room=side.stack.room - side.doubt - float(np.mean(found))))
+        stacks.append(replace(side.stack, room=side.stack.room - margin * side.doubt - float(np.mean(found))))
     return tuple(stacks)
 
 
-def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...] = ()) -> tuple[Stack, ...]:
-    """Return the models of a design whose room is what the search aims at, or what the design itself takes of it.
+def _is_similar(first: Float[np.ndarray, " variable"], second: Float[np.ndarray, " variable"]) -> bool:
+    ratio, distance = _SIMILAR
+    scales = np.abs(np.log(first[:-2] / second[:-2])).max(initial=0.0)
+    return bool(scales <= np.log(ratio) and np.abs(first[-2:] - second[-2:]).max() <= distance)
+
+
+def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:
+    """Return the models of a design whose room is what is aimed at, or what the design itself takes of it.
 
     Parameters
     ----------
     chosen
         The design.
     tried
-        All designs of its search, which tell how lucky its own sample was; without them that is not known.
+        All designs of its search, which tell how lucky its own sample was.
+    margin
+        How far inside each limit the aim is; 0 for the limits themselves [standard errors].
     """
     loads = [float(side.stack.load(chosen.design[:-2], chosen.design[-2:])) for side in chosen.sides]
-    stacks = aimed(chosen, list(tried) or [chosen])
+    stacks = aimed(chosen, list(tried), margin)
     return tuple(replace(stack, room=max(stack.room, load)) for stack, load in zip(stacks, loads, strict=True))
 
 
@@ -155,7 +162,11 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     steps
         Largest number of verified designs [-].
     reach
-        Factor by which a variable may change in the first step; later ones reach less [-].
+        Factor by which a variable may change in the first step [-].
+
+    Notes
+    -----
+    Where fresh units are further from the prediction than chance explains, the next step reaches less.
     """
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.sides)), space.process_positions(start.design)
@@ -168,5 +179,14 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
         if step > 0 and settled:
             break
         tried.append(verifier.verify(found, f"convex {step + 1}"))
-        reach = max(1.25, float(np.sqrt(reach)))
+        if not _explains(last, tried[-1]):
+            reach = max(1.25, float(np.sqrt(reach)))
     return tuple(tried[1:])
+
+
+def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
+    """Return whether the models of a design predicted what fresh units said of the next one."""
+    return all(
+        abs(now.excess - before.predicted(new.design)) <= _EXPLAINED * np.hypot(before.doubt, now.doubt)
+        for before, now in zip(last.sides, new.sides, strict=True)
+    )

@@ -10,10 +10,11 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution
 from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.trade import asked_stacks
 
 
 def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> float:
-    """Return the cost of the cheapest design that keeps another yield, not a number where none does [cost units].
+    """Return the cost of the cheapest design that keeps another yield [cost units].
 
     Parameters
     ----------
@@ -24,15 +25,23 @@ def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> 
     target
         Share of units that must keep the limit of the peak-to-peak [-].
 
+    Returns
+    -------
+    float
+        The cost, not a number where no design keeps the yield, or where the verified units are too few to show it.
+
     Notes
     -----
-    The quantile of the verified units at the other yield takes the place of the one that was compared with the limit.
-    What the zones spread is in proportion to it, so the weights of the model are, too. Other requirements stay.
+    The smallest limit that the verified units show kept at the other yield, with one-sided 95 % confidence, takes the
+    place of what was compared with the limit; at the yield asked for they are the same. What the zones spread is in
+    proportion to it, so the weights of the model are, too. Other requirements stay.
     """
-    chosen, (first, *others) = allocation.chosen, allocation.stacks
+    chosen, (first, *others) = allocation.chosen, asked_stacks(allocation)
+    shown = chosen.sample.quantile_bound(target)
+    if not np.isfinite(shown):
+        return np.nan
     spread = float(first.load(chosen.design[:-2], np.zeros(2)))
-    change = chosen.sample.quantile(target) - chosen.quantile_bound
-    factor = max(spread + change, 0.0) / spread
+    factor = max(spread + shown - chosen.quantile_bound, 0.0) / spread
     changed = replace(first, adding=factor * first.adding, spreading=factor * first.spreading)
     found = process_choice.allocate(space.problem((changed, *others)))
     return found.cost + space.locked_cost if isinstance(found, Solution) else np.nan

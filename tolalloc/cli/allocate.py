@@ -62,14 +62,7 @@ def allocate(
     if as_json:
         print_json(document.summary)
         return
-    columns = [
-        "source",
-        "zone before [µm]",
-        "zone [µm]",
-        "grade",
-        "process",
-        "share of variance [%]",
-        "cost [cost units]",
-    ]
+    columns = ["source", "zone before [µm]", "zone [µm]"]
+    columns += [*(["grade"] if asked.grades else []), "process", "share of variance [%]", "cost [cost units]"]
     print_table(drawing_table(made[0])[columns], f"{study.name}: what to write on the drawing")
     say(document)

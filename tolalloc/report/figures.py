@@ -73,7 +73,7 @@ def _peak_to_peak(results: StudyResults) -> Figure:
 
 
 def _pareto(results: StudyResults) -> Figure:
-    allocation, front = results.allocation, results.allocation.front
+    allocation, front = results.allocation, results.front
     checked = ~np.isnan(front.on_kernel)
     chosen, by_hand, baseline = allocation.chosen, allocation.by_hand, allocation.baseline
     return Figure(

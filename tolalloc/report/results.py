@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.fronts import AllocationWithFront
+from tolalloc.allocation.pareto import Front
+from tolalloc.allocation.search import Allocation
 from tolalloc.cycloid.assessment import Assessment
 from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.equivalent.answers import Equilibria
@@ -15,6 +16,7 @@ from tolalloc.reducer.stiffness import IdentifiedStiffness
 from tolalloc.response.stiffness import StiffnessEffect
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.surrogate.regression import Surrogate
 from tolalloc.uncertainty.unit_file import BuiltUnit
 
 _COMMON = (
@@ -71,6 +73,8 @@ class StudyResults:
         What not knowing the identified stiffnesses does to the peak-to-peak, if there are any.
     allocation
         What the search found.
+    front, surrogate
+        Pareto front of cost against the quantile of the peak-to-peak, and what it was searched on.
     unit
         The built unit that is shown, if any.
     neglected
@@ -96,7 +100,9 @@ class StudyResults:
     sobol: SobolIndices
     classical: ClassicalEstimate
     stiffness: StiffnessEffect | None
-    allocation: AllocationWithFront
+    allocation: Allocation
+    front: Front
+    surrogate: Surrogate
     unit: BuiltUnit | None
     neglected: tuple[str, ...]
     contacts: tuple[Assessment | None, Assessment | None]

@@ -180,7 +180,7 @@ def verified(results: StudyResults) -> pd.DataFrame:
 
 def pareto(results: StudyResults) -> pd.DataFrame:
     """Return the Pareto front: cost, quantile told and checked, and the design."""
-    front = results.allocation.front
+    front = results.front
     frame = pd.DataFrame(front.designs, columns=list(results.space.columns))
     frame.insert(0, "quantile on the kernel [arcsec]", front.on_kernel)
     frame.insert(0, "quantile on the surrogate [arcsec]", front.quantile)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,18 +12,19 @@ from jaxtyping import Float
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.unit_price import YieldLadder, best_yield
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
-from tolalloc.allocation.fronts import designs_around, exact_front
+from tolalloc.allocation.fronts import exact_front, searched_front
 from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_ladders, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE
-from tolalloc.allocation.pareto.front import pareto_front
-from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
+from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.robustness import Robustness, robustness
 from tolalloc.allocation.search import Allocation, allocate, require_groups
 from tolalloc.allocation.trade import ModificationTrade, modification_trade
+from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.report.allocation.results import AllocationResults, Fronts
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.stiffness import StiffnessResponse
@@ -33,7 +35,9 @@ from tolalloc.study.effort import QUICK, AllocationEffort
 from tolalloc.study.stages import Progress, Record
 from tolalloc.uncertainty.seeds import SeedTree
 
-_EXACT = (0.7, 1.4)
+Ladders = Mapping[str, Float[np.ndarray, " position"]]
+
+_EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
 
@@ -60,6 +64,25 @@ class Searches:
     def _seeds(self, name: str) -> SeedTree:
         return SeedTree(self.prepared.study.seed).child("allocate", name)
 
+    def require_enough_units(self) -> None:
+        """Raise unless the fresh units of every stage can show what is asked of them.
+
+        Raises
+        ------
+        InputError
+            Too few units for a guarantee.
+        """
+        study = self.prepared.study
+        asked = {"verification_units": study.effort.verification_units}
+        if self.prepared.stiffness is not None:
+            asked["allocation.stiffness_units"] = self.effort.stiffness_units
+        for requirement in self.prepared.requirements:
+            for name, units in asked.items():
+                try:
+                    requirement.guarantee.require_enough(units)
+                except InputError as error:
+                    raise InputError(f"study {study.name}, effort.{name} for {requirement.output}, {error}") from None
+
     @property
     def as_it_is(self) -> DesignSpace:
         """Design variables with the modification locked."""
@@ -67,14 +90,14 @@ class Searches:
         flank, radial = now.flank_clearance(stage), now.radial_clearance
         return replace(space, clearances=ClearanceRange(flank=(flank, flank), radial=(radial, radial)))
 
-    def verifier(self, space: DesignSpace) -> Verifier:
-        """Return what judges designs on fresh units, the same units for the same name."""
+    def verifier(self, search: str, space: DesignSpace) -> Verifier:
+        """Return what judges the designs of one search on fresh units, other ones than those of any other search."""
         study = self.prepared.study
         return Verifier(
             space=space,
             kernel=self.kernel,
             requirements=self.prepared.requirements,
-            seeds=self._seeds("verification"),
+            seeds=self._seeds("verification").child(search),
             units=study.effort.verification_units,
             largest_failed_share=study.largest_failed_share,
         )
@@ -89,19 +112,18 @@ class Searches:
 
     def alone(self) -> Allocation:
         """Return the allocation of tolerances with the modification as it is, and by hand."""
-        search, verifier = self.prepared.study.effort.search, self.verifier(self.as_it_is)
+        search, verifier = self.prepared.study.effort.search, self.verifier("alone", self.as_it_is)
         by_hand = scale_by_hand(verifier, self.prepared.reducer.modification, search.steps)
         return allocate(verifier, by_hand, search)
 
     def joint(self, alone: Allocation) -> Allocation:
         """Return the allocation of tolerances and modification together, from where the tolerances alone ended."""
-        return allocate(
-            self.verifier(self.prepared.space), alone.hand_tried, self.prepared.study.effort.search, alone.chosen
-        )
+        verifier = self.verifier("joint", self.prepared.space)
+        return allocate(verifier, alone.hand_tried, self.prepared.study.effort.search, alone.chosen)
 
     def graded(self, joint: Allocation) -> GradedAllocation:
         """Return the allocation on ladders of zones."""
-        return allocate_grades(self.verifier(self.prepared.space), joint.chosen, self.effort.graded_steps)
+        return allocate_grades(self.verifier("graded", self.prepared.space), joint.chosen, self.effort.graded_steps)
 
     def trade(self, joint: Allocation) -> ModificationTrade:
         """Return the cost of the cheapest zones over the two clearances."""
@@ -116,29 +138,33 @@ class Searches:
         )
         return modification_trade(self.quantile(joint.chosen.spread), joint, flank, radial)
 
-    def fronts(self, joint: Allocation, checkpoint: Path | None) -> Fronts:
-        """Return what can be had at which cost."""
-        space, best, effort = self.prepared.space, joint.chosen, self.prepared.study.effort.search.front
-        exact = exact_front(space, best, np.linspace(*_EXACT, self.effort.exact_points))
-        few = exact.designs[np.unique(np.linspace(0, len(exact.designs) - 1, effort.points).astype(int))]
-        found = [
-            pareto_front(
-                self.quantile(best.spread),
-                LocalQuantile(side=best.sides[0]),
-                designs_around(space, best.design, 2.5, effort.designs, self._seeds("designs")),
-                few,
-                self._seeds("pareto"),
-                effort,
-                further=further,
-                checkpoint=Checkpoint(path=checkpoint, every=4) if checkpoint else None,
-            )
+    def fronts(self, found: Allocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
+        """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any.
+
+        Parameters
+        ----------
+        found
+            What is drawn.
+        checkpoint
+            Keeps the kernel's answers.
+        """
+        drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
+        space, ladders = (graded.space, graded.scales) if graded else (self.prepared.space, {})
+        effort = self.prepared.study.effort.search.front
+        # Where the limit is out of reach, the front lies around what is kept instead.
+        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
+        stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
+        exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
+        response = replace(self.quantile(drawn.spread), space=space)
+        searched, with_clearance = (
+            searched_front(response, drawn, exact, self._seeds("front"), effort, ladders, further, checkpoint)
             for further in ((), (RADIAL_CLEARANCE,))
-        ]
-        return Fronts(exact=exact, searched=found[0][0], with_clearance=found[1][0], surrogate=found[0][1])
+        )
+        return Fronts(exact=exact, searched=searched[0], with_clearance=with_clearance[0], surrogate=searched[1])
 
     def robustness(self, joint: Allocation) -> Robustness:
         """Return the answers under changed assumptions."""
-        verifier = replace(self.verifier(self.prepared.space), units=self.effort.stiffness_units)
+        verifier = replace(self.verifier("robustness", self.prepared.space), units=self.effort.stiffness_units)
         seeds = self._seeds("robustness")
         return robustness(verifier, joint, self._kernels(seeds), seeds, self.effort.changed_costs)
 
@@ -153,11 +179,18 @@ class Searches:
         return tuple(response.changed(change) for change in draws)
 
     def prices(self, joint: Allocation) -> YieldLadder | None:
-        """Return the price of a good unit over yield targets, if the study states what becomes of the others."""
+        """Return the price of a good unit over yield targets, if the study prices the others and one is in reach."""
         price = self.prepared.study.unit_price
         if price is None:
             return None
-        return best_yield(lambda target: cost_at_yield(self.prepared.space, joint, target), price, self.effort.yields)
+        try:
+            return best_yield(
+                lambda target: cost_at_yield(self.prepared.space, joint, target), price, self.effort.yields
+            )
+        except SolveError:
+            if joint.chosen.met:
+                raise
+            return None  # the limits are out of reach at any yield, and the answer says which and by how much
 
     def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SobolIndices:
         """Return the indices of the peak-to-peak at the zones and the modification of a design."""
@@ -205,6 +238,8 @@ def allocate_study(
     if study.grades:
         group_ladders(with_shared_zones(prepared.space))  # before anything long runs
     searches = Searches(prepared=prepared, kernel=replace(prepared.kernel, observe=record.observe))
+    searches.require_enough_units()
+    kept = Checkpoint(path=checkpoint, every=4, question=prepared.hash) if checkpoint else None
     with one_blas_thread():
         with record.stage("tolerances alone"):
             alone = searches.alone()
@@ -216,8 +251,11 @@ def allocate_study(
                 graded = searches.graded(joint)
         with record.stage("modification trade"):
             trade = searches.trade(joint)
+        before = record.counts
         with record.stage("fronts"):
-            fronts = searches.fronts(joint, checkpoint)
+            fronts = searches.fronts(graded or joint, kept)
+        # What a checkpoint knew is not solved again: these units tell how the run went and not what was found.
+        searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
         with record.stage("robustness"):
             robust, prices = searches.robustness(joint), searches.prices(joint)
         with record.stage("shares of variance"):
@@ -240,7 +278,8 @@ def allocate_study(
         fronts=fronts,
         robustness=robust,
         prices=prices,
+        loss=study.quality_loss,
         neglected=prepared.neglected,
-        statuses=record.counts,
+        statuses={outcome: count - searched[outcome] for outcome, count in record.counts.items()},
         stages=record.stages,
     )

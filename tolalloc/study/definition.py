@@ -8,13 +8,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
-from tolalloc.allocation.cost.unit_price import UnitPrice
+from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
 from tolalloc.allocation.guarantee import AtYield, Guarantee
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import allowed_rejections
+from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.kinematics import HARMONICS
 from tolalloc.equivalent.model import EquivalentModel
@@ -88,6 +90,9 @@ class Study:
         Whether ``allocate`` takes zones from ISO 286 grades and preferred numbers alone.
     unit_price
         What becomes of units beyond a limit; ``allocate`` then names the yield with the cheapest good unit.
+    quality_loss
+        What a peak-to-peak costs a user although it keeps its limit (Taguchi); ``allocate`` states the mean of every
+        design.
     torque_nm
         Torque on the carrier, negative against the rotation; the reducer's test torque unless given [N·m].
     flank_clearance_um, radial_clearance_um
@@ -115,6 +120,7 @@ class Study:
     guarantees: Mapping[str, Guarantee] = field(default_factory=dict)
     grades: bool = False
     unit_price: UnitPrice | None = None
+    quality_loss: QualityLoss | None = None
     torque_nm: float | None = None
     flank_clearance_um: tuple[float, float] = (1.0, 5.0)
     radial_clearance_um: tuple[float, float] = (5.0, 20.0)
@@ -139,6 +145,7 @@ class Study:
         ):
             if not -50 <= low <= high <= 50:
                 raise InputError.at(place, name, (low, high), "two numbers from -50 to 50, the smaller one first")
+        self._require_kinds(place)
         blocks = self.effort.sobol_blocks
         if blocks < 2 or blocks & (blocks - 1):
             raise InputError.at(place, "effort.sobol_blocks", blocks, "a power of two, 2 or more")
@@ -152,13 +159,29 @@ class Study:
                 f"{_units_needed(self.yield_target)} or more",
             )
 
+    def _require_kinds(self, place: str) -> None:
+        """Raise unless limits, guarantees and prices are what their fields ask for, and limits are numbers."""
+        kinds: tuple[tuple[str, object, type, str], ...] = (
+            ("grades", self.grades, bool, "True or False"),
+            ("unit_price", self.unit_price or UnitPrice(), UnitPrice, "UnitPrice(...) or None"),
+            *((f"other_limits[{name!r}]", own, Limits, "Limits(...)") for name, own in self.other_limits.items()),
+            *(
+                (f"guarantees[{name!r}]", own, Guarantee, "AtYield(...), AtCpk(...) or WorstCase()")
+                for name, own in self.guarantees.items()
+            ),
+        )
+        for name, value, kind, allowed in kinds:
+            if not isinstance(value, kind):
+                raise InputError.at(place, name, value, allowed)
+        for name, own in self.other_limits.items():
+            ends = [end for end in (own.lower, own.upper) if end is not None]
+            if not np.isfinite(ends).all():
+                raise InputError.at(place, f"other_limits[{name!r}]", own, "finite numbers; an open side is None")
+
 
 def _units_needed(target: float) -> int:
     """Return the smallest sample without a rejection that shows the target with 95 % confidence."""
-    units = 1
-    while allowed_rejections(units, target) < 0:
-        units *= 2
-    return units
+    return int(np.ceil(np.log(1 - CONFIDENCE) / np.log(target)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,7 +223,8 @@ class Prepared:
         errors = self.space.errors
         sources, correlation = errors.sources, errors.correlation
         asked = {name: value for name, value in asdict(self.study).items() if name not in _FILES}
-        content = (asked, self.reducer, known, sources, correlation, self.unit, self.kernel.torque)
+        priced = self.space.processes
+        content = (asked, self.reducer, known, sources, correlation, priced, self.unit, self.kernel.torque)
         return hashlib.sha256(repr(content).encode()).hexdigest()
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
 from tolalloc.capability import yield_at_limit
@@ -27,6 +29,30 @@ _FEWEST = {
     "permutations": 2,
 }
 """Smallest numbers that the estimators take [-]."""
+_FEWEST_ALLOCATING = {
+    "allocation.": {
+        "graded_steps": 1,
+        "exact_points": 2,
+        "flank_steps": 1,
+        "radial_steps": 1,
+        "changed_costs": 1,
+        "changed_stiffnesses": 1,
+        "stiffness_units": 100,
+    },
+    "": {"shared_units": 2},
+    "search.": {"steps": 1},
+    "search.front.": {
+        # Three objectives need four designs, and both fronts have the same effort.
+        "population": 4,
+        "generations": 1,
+        "population_on_kernel": 4,
+        "generations_on_kernel": 1,
+        "designs": validation.FEWEST_OF_FOLD * validation.FOLDS,
+        "rounds": 1,
+        "points": 2,
+    },
+}
+"""Smallest numbers with which an allocation has an answer in every stage [-]."""
 _CHAIN = 10
 """Units of a level come in chains of so many [-]."""
 
@@ -92,6 +118,20 @@ class RankingEffort:
         return InputError.at("study", f"effort.ranking.{field_name}", value, allowed)
 
 
+def _require_enough(effort: object, prefix: str) -> None:
+    """Raise unless the numbers of an effort are whole and no stage of an allocation would stop with them.
+
+    Raises
+    ------
+    InputError
+        A number that is too small or not whole.
+    """
+    for name, fewest in _FEWEST_ALLOCATING[prefix].items():
+        value = getattr(effort, name)
+        if not isinstance(value, int) or value < fewest:
+            raise InputError.at("study", f"effort.{prefix}{name}", value, f"a whole number, {fewest} or more")
+
+
 @dataclass(frozen=True, kw_only=True)
 class AllocationEffort:
     """How much ``tolalloc allocate`` may compute besides its search.
@@ -112,6 +152,11 @@ class AllocationEffort:
         Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
     yields
         Yield targets among which the cheapest good unit is looked for [-].
+
+    Raises
+    ------
+    InputError
+        A number with which a stage would stop, often after long work of others.
     """
 
     graded_steps: int = 8
@@ -123,6 +168,14 @@ class AllocationEffort:
     stiffness_units: int = 2048
     share_blocks: int = 256
     yields: tuple[float, ...] = (0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
+
+    def __post_init__(self) -> None:
+        _require_enough(self, "allocation.")
+        blocks = self.share_blocks
+        if blocks < 2 or blocks & (blocks - 1):
+            raise InputError.at("study", "effort.allocation.share_blocks", blocks, "a power of two, 2 or more")
+        if not self.yields or not all(0 < target < 1 for target in self.yields):
+            raise InputError.at("study", "effort.allocation.yields", self.yields, "one share or more between 0 and 1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,6 +204,13 @@ class Effort:
     search: SearchEffort = field(default_factory=SearchEffort)
     ranking: RankingEffort = field(default_factory=RankingEffort)
     allocation: AllocationEffort = field(default_factory=AllocationEffort)
+
+    def __post_init__(self) -> None:
+        _require_enough(self, "")
+        _require_enough(self.search, "search.")
+        _require_enough(self.search.front, "search.front.")
+        if not 1.0 < self.search.reach < np.inf:
+            raise InputError.at("study", "effort.search.reach", self.search.reach, "a number above 1")
 
 
 QUICK = Effort(

@@ -103,7 +103,7 @@ def manifest(prepared: Prepared, results: StudyResults, record: Record) -> dict[
 def summary(results: StudyResults) -> dict[str, Any]:
     """Return the answer in a few numbers."""
     allocation, ranked = results.allocation, tables.ranking(results)
-    chosen, surrogate = allocation.chosen, allocation.surrogate
+    chosen, surrogate = allocation.chosen, results.surrogate
     return {
         "reducer": results.reducer.name,
         "torque [N·m]": results.torque,

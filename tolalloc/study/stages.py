@@ -12,9 +12,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.allocation.fronts import allocate_with_front
+from tolalloc.allocation.by_hand import scale_by_hand
+from tolalloc.allocation.fronts import exact_front, searched_front
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.search import require_reachable
+from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.cycloid.assessment import Assessment, assess
@@ -37,6 +38,8 @@ _FIRST_SPREAD = 3.1
 """Distance of the 99.73 % quantile from the mean over σ, until a large sample has said better [-]."""
 
 
+_FRONT = (0.6, 1.5)
+"""Ends of the front over the limit asked for [-]."""
 _EFFECT_UNITS = 256
 """Units over which the effect of the stiffness is averaged [-]."""
 _DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
@@ -130,9 +133,13 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             units=study.effort.verification_units,
             largest_failed_share=study.largest_failed_share,
         )
-        allocation = allocate_with_front(
-            quantile, verifier, prepared.reducer.modification, seeds.child("allocation"), study.effort.search
-        )
+        search = study.effort.search
+        by_hand = scale_by_hand(verifier, prepared.reducer.modification, search.steps)
+        allocation = allocate(verifier, by_hand, search)
+    with record.stage("front"):
+        shares = np.linspace(*_FRONT, search.front.points)
+        exact = exact_front(space, allocation.limit_stacks, allocation.limit, shares)
+        front, surrogate = searched_front(quantile, allocation.chosen, exact, seeds.child("front"), search.front)
     with record.stage("ranking"):
         sobol, stiffness = _ranking(prepared, kernel, allocation.baseline.sample, seeds)
         classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
@@ -152,6 +159,8 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
             classical=classical,
             stiffness=stiffness,
             allocation=allocation,
+            front=front,
+            surrogate=surrogate,
             unit=prepared.unit,
             neglected=prepared.neglected,
             contacts=(

@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.rows import read_rows
+from tolalloc.allocation.cost.rows import TableRow, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record
 from tolalloc.uncertainty.tolerance_row import LARGEST_ZONE, UNITS
 from tolalloc.uncertainty.zones import Feature
 
 
-class ShopPrice(Record):
+class LengthUnit(StrEnum):
+    """Unit of a tolerance."""
+
+    MICROMETRE = "µm"
+    MICROMETRE_TYPED = "um"
+    MILLIMETRE = "mm"
+
+
+class ShopPrice(TableRow):
     """One row; the fields are the column headers without their unit."""
+
+    units: ClassVar[Mapping[str, str]] = {"cost": "cost units"}
 
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
     tolerance: Annotated[float, Field(gt=0)]
-    unit: Annotated[str, Field(pattern="^(µm|um|mm)$")]
+    unit: LengthUnit
     cost: Annotated[float, Field(gt=0, le=1e9)]
     note: str = ""
 

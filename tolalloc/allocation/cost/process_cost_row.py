@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,9 +20,9 @@ from tolalloc.allocation.cost.closed_forms import (
 from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel
 from tolalloc.allocation.cost.points import Points
+from tolalloc.allocation.cost.rows import TableRow
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.exceptions import InputError
-from tolalloc.files import Record
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_row import LARGEST_ZONE
 from tolalloc.units import MICROMETRE
@@ -66,8 +67,13 @@ class CostCurve(StrEnum):
         return self.needs if self.is_through_points else self.needs | {"fixed", "factor"}
 
 
-class ProcessCostRow(Record):
+class ProcessCostRow(TableRow):
     """One row; the fields are the column headers without their unit, zones in micrometres."""
+
+    units: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("scale", "min", "max"), "µm"),
+        **dict.fromkeys(("fixed", "change", "inspection"), "cost units"),
+    }
 
     sources: Annotated[str, Field(min_length=1)]
     process: Annotated[str, Field(min_length=1)]

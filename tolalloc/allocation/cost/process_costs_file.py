@@ -58,6 +58,9 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     for place, row in rows:
         if not any(fnmatchcase(source.name, row.sources) for source in sources):
             raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
+        if row.points and not (path.parent / row.points).is_file():
+            folder = path.absolute().parent
+            raise InputError(f"{place}: points {row.points}: no such file; allowed is a CSV file in {folder}.")
     shops = {row.points: load_shop_points(path.parent / row.points) for _, row in rows if row.points}
     found = {}
     for source in sources:

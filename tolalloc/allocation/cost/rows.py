@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, validated
 from tolalloc.uncertainty.table_file import read_text_table, split_header
 from tolalloc.uncertainty.tolerance_cells import typed_cells
 
-Row = TypeVar("Row", bound=Record)
+
+class TableRow(Record):
+    """Base of the rows of this room."""
+
+    units: ClassVar[Mapping[str, str]] = {}
+    """Field → unit that its header may state; numbers are never converted, so every other unit is refused."""
+
+
+Row = TypeVar("Row", bound=TableRow)
 
 
 def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Row], ...]:
@@ -31,10 +40,16 @@ def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Ro
         The file, row, field and value that are not allowed.
     """
     table = read_text_table(path)
-    headers = tuple(split_header(header)[0] for header in table.headers)
-    for header in headers:
-        if header not in kind.model_fields:
-            raise UnknownNameError.among(path, "column", header, kind.model_fields)
+    stated = [split_header(header) for header in table.headers]
+    headers = tuple(name for name, _ in stated)
+    for name, unit in stated:
+        if name not in kind.model_fields:
+            raise UnknownNameError.among(path, "column", name, kind.model_fields)
+        if headers.count(name) > 1:
+            raise InputError(f"{path}: the column {name!r} is there twice; each has one.")
+        known = kind.units.get(name, unit)
+        if unit and unit != known:
+            raise InputError.at(path, f"the unit of column {name}", unit, f"{known}; numbers are not converted")
     required = [name for name, field in kind.model_fields.items() if field.is_required()]
     for name in required:
         if name not in headers:

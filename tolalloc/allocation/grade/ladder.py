@@ -21,14 +21,14 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Increasing zones with the names that a drawing gives them.
+    """Increasing zones with the grade or the series of each.
 
     Parameters
     ----------
     zones
         The zones, tightest first [m].
     labels
-        Their names.
+        Where each comes from: a grade, a series of preferred numbers, ``given``, or ``locked``.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class Ladder:
             The zones in any order [m].
         """
         ordered = np.unique(np.array(zones, dtype=float))
-        return cls(zones=ordered, labels=tuple(f"{zone / MICROMETRE:g} µm" for zone in ordered))
+        return cls(zones=ordered, labels=("given",) * ordered.size)
 
     @classmethod
     def grades(cls, nominal: float) -> Ladder:
@@ -66,8 +66,7 @@ class Ladder:
     @classmethod
     def preferred(cls, series: Series) -> Ladder:
         """Return the zones of a series of preferred numbers."""
-        labels = tuple(f"{series.name} {zone / MICROMETRE:g} µm" for zone in series.zones)
-        return cls(zones=series.zones, labels=labels)
+        return cls(zones=series.zones, labels=(series.name,) * series.zones.size)
 
     def within(self, minimum: float, maximum: float, place: str) -> Ladder:
         """Return the steps inside a range.
@@ -114,7 +113,7 @@ def source_ladder(source: Source, given: Sequence[float] = (), series: Series = 
         The source's range holds no step.
     """
     if source.locked:
-        return Ladder(zones=np.array([source.zone]), labels=(source.grade or f"{source.zone / MICROMETRE:g} µm",))
+        return Ladder(zones=np.array([source.zone]), labels=(source.grade or "locked",))
     return group_ladder((source,), given, series)
 
 

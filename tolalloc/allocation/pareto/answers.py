@@ -34,21 +34,56 @@ class Checkpoint:
         The file, new or written by the same search before.
     every
         New answers after which it is written [-].
+    question
+        Text that tells what is asked from everything else that has the same names and bounds.
 
     Raises
     ------
     InputError
-        The number is below 1, or there is no folder to write to.
+        The number is below 1, there is no folder to write to, or the file is no complete checkpoint of this question.
     """
 
     path: Path
     every: int
+    question: str = ""
 
     def __post_init__(self) -> None:
         if self.every < 1:
             raise InputError.at("checkpoint", "every", self.every, "1 or more")
         if not self.path.absolute().parent.is_dir():
             raise InputError(f"{self.path}: there is no folder {self.path.absolute().parent} for the checkpoint.")
+        if not os.access(self.path.absolute().parent, os.W_OK):
+            raise InputError(f"{self.path}: the folder of the checkpoint cannot be written; name a file elsewhere.")
+        if self.path.exists():  # found out now, and not when the search begins
+            self.read()
+
+    def read(self) -> tuple[str, Float[np.ndarray, "design gene"], Float[np.ndarray, "design number"]]:
+        """Return the identity of the problem, designs and their numbers.
+
+        Raises
+        ------
+        InputError
+            The file is no complete checkpoint, or one of another question.
+        """
+        try:
+            with np.load(self.path, allow_pickle=False) as file:
+                identity, question, digest = (str(file[name]) for name in ("identity", "question", "digest"))
+                designs, numbers = file["designs"], file["numbers"]
+        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile):
+            raise InputError(
+                f"{self.path}: this is no complete checkpoint, or it is truncated; allowed is a new file or one "
+                "that the same search wrote."
+            ) from None
+        if digest != _digest(identity, designs, numbers):
+            raise InputError(f"{self.path}: the checkpoint is damaged; remove it to start anew.")
+        if question != _hashed(self.question):
+            raise self.other_problem
+        return identity, designs, numbers
+
+    @property
+    def other_problem(self) -> InputError:
+        """What is said of a file that answers something else."""
+        return InputError(f"{self.path}: the checkpoint is of another problem; remove it or name another file.")
 
 
 class Answers:
@@ -76,11 +111,11 @@ class Answers:
         checkpoint: Checkpoint | None = None,
     ) -> None:
         self._ask, self._checkpoint = ask, checkpoint
-        self._identity = hashlib.sha256(identity.encode()).hexdigest()
+        self._identity = _hashed(identity)
         self._known: dict[bytes, Float[np.ndarray, " number"]] = {}
         self._unsaved = 0
         if checkpoint is not None and checkpoint.path.exists():
-            self._read(checkpoint.path)
+            self._read(checkpoint)
 
     def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
         """Return the numbers of every design; only new designs are asked for, in pieces as the checkpoint wants them.
@@ -113,6 +148,7 @@ class Answers:
                 np.savez(
                     file,
                     identity=np.array(self._identity),
+                    question=np.array(_hashed(self._checkpoint.question)),
                     designs=designs,
                     numbers=numbers,
                     digest=np.array(_digest(self._identity, designs, numbers)),
@@ -122,21 +158,19 @@ class Answers:
             written.unlink(missing_ok=True)
         self._unsaved = 0
 
-    def _read(self, path: Path) -> None:
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                identity, digest = str(file["identity"]), str(file["digest"])
-                designs, numbers = file["designs"], file["numbers"]
-        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
-            raise InputError(f"{path}: this is no complete checkpoint; is the file truncated?") from None
-        if digest != _digest(identity, designs, numbers):
-            raise InputError(f"{path}: the checkpoint is damaged; remove it to start anew.")
+    def _read(self, checkpoint: Checkpoint) -> None:
+        identity, designs, numbers = checkpoint.read()
         # Two problems may have the same names and bounds; what they answer tells them apart.
         if identity != self._identity or not np.allclose(
             self._ask(designs[:1]), numbers[:1], rtol=_PROBED, atol=0.0, equal_nan=True
         ):
-            raise InputError(f"{path}: the checkpoint is of another problem; remove it or name another file.")
+            raise checkpoint.other_problem
         self._known = {design.tobytes(): row for design, row in zip(designs, numbers, strict=True)}
+
+
+def _hashed(text: str) -> str:
+    """Return the digest of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _digest(

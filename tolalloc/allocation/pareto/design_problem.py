@@ -10,11 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.response.interface import Response
 
 COST = Objective(name="cost [cost units]")
+
+Ladders = Mapping[str, Float[np.ndarray, " position"]]
+"""Group → the scales that it may have, rising [-]."""
 
 
 def to_genes(designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
@@ -62,22 +66,22 @@ class DesignProblem:
         Group → the scales that it may have, rising; other groups have every scale within their bounds [-].
     further
         Further objectives.
-    limits
-        Name of an objective → what it must not exceed, or not fall below if it is made large.
+    sides
+        Limited sides of other requirements, kept by their local models.
 
     Raises
     ------
     InputError
-        A ladder that does not rise or leaves the bounds of its group, or a limit of zero.
+        A ladder that does not rise or leaves the bounds of its group.
     UnknownNameError
-        A ladder of no group, or a limit of no objective.
+        A ladder of no group.
     """
 
     space: DesignSpace
     quantile: Response
-    ladders: Mapping[str, Float[np.ndarray, " position"]] = field(default_factory=dict)
+    ladders: Ladders = field(default_factory=dict)
     further: tuple[Criterion, ...] = ()
-    limits: Mapping[str, float] = field(default_factory=dict)
+    sides: tuple[Side, ...] = ()
 
     def __post_init__(self) -> None:
         for group, ladder in self.ladders.items():
@@ -89,12 +93,6 @@ class DesignProblem:
                 raise InputError.at(
                     f"ladder of {group}", "scales", ladder.tolist(), f"rising numbers from {lower:.4g} to {upper:.4g}"
                 )
-        names = [objective.name for objective in self.objectives]
-        for name, limit in self.limits.items():
-            if name not in names:
-                raise UnknownNameError.among("limits", "objective", name, names)
-            if limit == 0:
-                raise InputError.at("limits", name, limit, "any other number, as violations are shares of it")
 
     @cached_property
     def objectives(self) -> tuple[Objective, ...]:
@@ -103,8 +101,8 @@ class DesignProblem:
 
     @property
     def constraints(self) -> tuple[str, ...]:
-        """The limits."""
-        return tuple(f"{name} at {limit:g}" for name, limit in self.limits.items())
+        """Names of the other limits."""
+        return tuple(side.stack.name for side in self.sides)
 
     @cached_property
     def genes(self) -> Genes:
@@ -140,9 +138,5 @@ class DesignProblem:
         evaluation = self.quantile(designs)
         others = [criterion.value(designs) for criterion in self.further]
         values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *others])
-        violation = np.empty((len(designs), len(self.limits)))
-        names = [objective.name for objective in self.objectives]
-        for at, (name, limit) in enumerate(self.limits.items()):
-            number = names.index(name)
-            violation[:, at] = self.objectives[number].sign * (values[:, number] - limit) / abs(limit)
-        return Objectives(values=values, violation=violation, status=evaluation.status)
+        violation = np.array([side.predicted(designs) / side.scale for side in self.sides]).T
+        return Objectives(values=values, violation=violation.reshape(len(designs), -1), status=evaluation.status)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint
-from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem
+from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem, Ladders
 from tolalloc.allocation.pareto.found import Found
 from tolalloc.allocation.pareto.genetic import search
 from tolalloc.allocation.pareto.indicators import knee, spread_over
@@ -119,8 +119,9 @@ def pareto_front(
     convex_front: Float[np.ndarray, "known variable"],
     seeds: SeedTree,
     effort: FrontEffort,
-    ladders: Mapping[str, Float[np.ndarray, " position"]] | None = None,
+    ladders: Ladders | None = None,
     further: tuple[Criterion, ...] = (),
+    sides: tuple[Side, ...] = (),
     checkpoint: Checkpoint | None = None,
     largest_failed_share: float = 0.05,
 ) -> tuple[Front, Surrogate]:
@@ -144,6 +145,8 @@ def pareto_front(
         Group → the scales that it may have, rising [-].
     further
         Further objectives.
+    sides
+        Limited sides of other requirements, kept by their local models.
     checkpoint
         Where the kernel's answers are kept, so that an interrupted search goes on with the same bits.
     largest_failed_share
@@ -155,7 +158,7 @@ def pareto_front(
         More designs failed, or none is allowed.
     """
     kernel = RememberedResponse(response, checkpoint)
-    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further)
+    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further, sides=sides)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
     candidate = _Corrected(columns=response.columns, outputs=response.outputs, baseline=baseline)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,10 +17,13 @@ from tolalloc.allocation.program.priced_cost import convex_cost
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Solution, Stack
 from tolalloc.exceptions import SolveError
 
-_PRECISE = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-10}
-"""What the solver aims at first, on the scaled program: zones to about 1e-6 [-]."""
-_USUAL = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9}
-"""What it aims at where rounding keeps it from that [-]."""
+_ATTEMPTS: tuple[dict[str, float | bool], ...] = (
+    {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-10, "equilibrate_enable": True},
+    {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "equilibrate_enable": True},
+    {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "equilibrate_enable": False},
+    {"tol_gap_abs": 1e-8, "tol_gap_rel": 1e-8, "tol_feas": 1e-8, "equilibrate_enable": True},
+)
+"""What the solver aims at first, on the scaled program, and then where rounding keeps it from that [-]."""
 _REDUCED = {"reduced_tol_gap_abs": 1e-8, "reduced_tol_gap_rel": 1e-8, "reduced_tol_feas": 1e-8}
 """What it may stop with [-]."""
 _ENOUGH = 1e-10
@@ -178,13 +180,20 @@ class ConvexProgram:
 
     def _run(self) -> None:
         """Solve the compiled program, less precisely where it must be; how precisely shows in the gap."""
-        for settings in (_PRECISE, _USUAL):
-            with warnings.catch_warnings(), suppress(cp.SolverError):
-                warnings.simplefilter("ignore")
-                self._problem.solve(solver=cp.CLARABEL, **settings, **_REDUCED)
-                if self._problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-                    return
-        raise SolveError(f"The convex program of the allocation ended as {self._problem.status}.")
+        said = ""
+        for settings in _ATTEMPTS:
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    # Warm, the solver would keep state of earlier solves, and an answer would depend on them.
+                    self._problem.solve(solver=cp.CLARABEL, warm_start=False, **settings, **_REDUCED)
+            except cp.SolverError as error:
+                said = str(error).split(".")[0]
+                continue
+            if self._problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+                return
+            said = f"it ended as {self._problem.status}"
+        raise SolveError(f"The convex program of the allocation was not solved: {said}.")
 
     def _solution(
         self, problem: AllocationProblem, low: Float[np.ndarray, " feature"], high: Float[np.ndarray, " feature"]

@@ -7,9 +7,13 @@ more: small changes of zones are judged well, large ones by ``tolalloc`` on fres
 from __future__ import annotations
 
 from functools import singledispatch
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
+from openpyxl import load_workbook
+from openpyxl.styles import Border, Font, PatternFill, Side
 from openpyxl.utils import get_column_letter
 
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
@@ -23,6 +27,18 @@ _FIRST = 2
 """Row of the first entry below the header."""
 _WEIGHTS = 10
 """Column of the first weight."""
+_INPUT = PatternFill("solid", fgColor="FFF2CC")
+_RESULT = PatternFill("solid", fgColor="E2EFDA")
+_EDGE = Side(style="thin", color="7F7F7F")
+_NOTES = {
+    "zones": (
+        "Change a yellow zone: cost here and the sheet 'requirements' follow.",
+        "A group in several places has the zone of its first member here; the others keep their ratios to it.",
+    ),
+    "requirements": (
+        "Predicted by models around the drawing: good for small changes, to be verified by tolalloc for large ones.",
+    ),
+}
 
 
 @singledispatch
@@ -41,22 +57,23 @@ def cost_formula(model: object, zone: str) -> str:
 
 @cost_formula.register
 def _(model: Reciprocal, zone: str) -> str:
-    return f"({model.fixed!r}+{model.factor!r}/{zone})"
+    return f"({_number(model.fixed)}+{_number(model.factor)}/{zone})"
 
 
 @cost_formula.register
 def _(model: ReciprocalPower, zone: str) -> str:
-    return f"({model.fixed!r}+{model.factor!r}/{zone}^{model.exponent!r})"
+    return f"({_number(model.fixed)}+{_number(model.factor)}/{zone}^{_number(model.exponent)})"
 
 
 @cost_formula.register
 def _(model: Exponential, zone: str) -> str:
-    return f"({model.fixed!r}+{model.factor!r}*EXP(-{zone}/{model.scale!r}))"
+    return f"({_number(model.fixed)}+{_number(model.factor)}*EXP(-{zone}/{_number(model.scale)}))"
 
 
 @cost_formula.register
 def _(model: Combined, zone: str) -> str:
-    return f"({model.fixed!r}+{model.factor!r}*EXP(-{zone}/{model.scale!r})/{zone}^{model.exponent!r})"
+    falling = f"EXP(-{zone}/{_number(model.scale)})/{zone}^{_number(model.exponent)}"
+    return f"({_number(model.fixed)}+{_number(model.factor)}*{falling})"
 
 
 @cost_formula.register
@@ -67,18 +84,47 @@ def _(model: SumOfCosts, zone: str) -> str:
 
 @cost_formula.register
 def _(model: Weighted, zone: str) -> str:
-    return f"({model.weight!r}*{cost_formula(model.model, zone)})"
+    return f"({_number(model.weight)}*{cost_formula(model.model, zone)})"
 
 
-@cost_formula.register(Tabulated)
-@cost_formula.register(Spline)
-def _(model: Tabulated | Spline, zone: str) -> str:
-    zones, costs = np.array(model.points.zones), model.points.costs
-    lines = [
-        f"IF({zone}<={float(end)!r},{cost!r}+{float(after - cost) / float(end - start)!r}*({zone}-{float(start)!r}),"
-        for start, end, cost, after in zip(zones[:-1], zones[1:], costs[:-1], costs[1:], strict=True)
+@cost_formula.register
+def _(model: Tabulated, zone: str) -> str:
+    zones, slopes = np.array(model.points.zones), np.diff(model.points.costs) / np.diff(model.points.zones)
+    return _piecewise(zone, model.points.costs[0], slopes[0], zones[:-1], np.diff(slopes, prepend=slopes[0])[:, None])
+
+
+@cost_formula.register
+def _(model: Spline, zone: str) -> str:
+    zones, costs = np.array(model.points.zones), np.array(model.points.costs)
+    slopes, lengths = model.slope(zones), np.diff(zones)
+    secants, ends = np.diff(costs) / lengths, slopes[:-1] + slopes[1:]
+    # Square and cubic coefficients of every piece, none before the first point and behind the last.
+    square = np.concatenate([[0.0], (3 * secants - slopes[:-1] - ends) / lengths, [0.0]])
+    cubic = np.concatenate([[0.0], (ends - 2 * secants) / lengths**2, [0.0]])
+    bent = np.diff(square) - 3 * cubic[:-1] * np.concatenate([[0.0], lengths])
+    return _piecewise(zone, costs[0], slopes[0], zones, np.stack([np.zeros(zones.size), bent, np.diff(cubic)], axis=1))
+
+
+def _piecewise(
+    zone: str,
+    cost: float,
+    slope: float,
+    zones: Float[np.ndarray, " point"],
+    changes: Float[np.ndarray, "point power"],
+) -> str:
+    """Return a line that gets terms of first, second, … power behind every point: no IF in an IF, however many."""
+    terms = [
+        f"{_number(change)}*MAX({zone}-{_number(point)},0)^{power}"
+        for point, own in zip(zones, changes, strict=True)
+        for power, change in enumerate(own, start=1)
+        if change
     ]
-    return f"{''.join(lines)}{costs[-1]!r}{')' * len(lines)}"
+    return f"({'+'.join([_number(cost), f'{_number(slope)}*({zone}-{_number(zones[0])})', *terms])})"
+
+
+def _number(value: float) -> str:
+    """Return a number with all its digits, as a workbook stores it whatever the language of its reader."""
+    return repr(float(value)).upper()
 
 
 def calculator_sheets(results: AllocationResults) -> dict[str, pd.DataFrame]:
@@ -106,7 +152,7 @@ def _zones(results: AllocationResults) -> pd.DataFrame:
             "inside": [f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")' for row in rows],
             "process": chosen.processes,
             "cost [cost units]": [
-                f"={cost_formula(process.cost, f'D{row}')}+{process.change!r}"
+                f"={cost_formula(process.cost, f'D{row}')}+{_number(process.change)}"
                 for process, row in zip(made, rows, strict=True)
             ],
         }
@@ -135,9 +181,34 @@ def _requirements(results: AllocationResults) -> pd.DataFrame:
                 "what": side.stack.name,
                 "limit": side.limit,
                 "verified on fresh units": side.value,
-                "predicted for the zones": f"=B{row}{'+' if upper else '-'}({load}+({rest!r}))",
-                "kept": f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")',
+                "predicted for the zones": f"=B{row}{'+' if upper else '-'}({load}+({_number(rest)}))",
+                "kept by the model": f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")',
             }
         )
-    total = f"=SUM(zones!I{first}:I{last})+{space.locked_cost!r}"
+    total = f"=SUM(zones!I{first}:I{last})+{_number(space.locked_cost)}"
     return pd.DataFrame([*watched, {"what": "cost [cost units]", "predicted for the zones": total}])
+
+
+def style_calculator(path: Path) -> None:
+    """Mark what to change and what to read in the sheets of a written workbook, and say so below them.
+
+    Parameters
+    ----------
+    path
+        Workbook with the sheets of `calculator_sheets`.
+    """
+    workbook = load_workbook(path)
+    zones, requirements = (workbook[name] for name in _NOTES)
+    for row in range(_FIRST, zones.max_row + 1):
+        zones.cell(row, 2).fill, zones.cell(row, 2).border = _INPUT, Border(*[_EDGE] * 4)
+        zones.cell(row, 4).number_format = zones.cell(row, 9).number_format = "0.000"
+    for row in range(_FIRST, requirements.max_row + 1):
+        requirements.cell(row, 4).number_format, requirements.cell(row, 4).fill = "0.000", _RESULT
+    zones.freeze_panes = "C2"
+    for name, notes in _NOTES.items():
+        sheet = workbook[name]
+        for number, text in enumerate(notes, start=sheet.max_row + 2):
+            sheet.cell(number, 1, text).font = Font(italic=True)
+        for column in range(2, sheet.max_column + 1):
+            sheet.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
+    workbook.save(path)

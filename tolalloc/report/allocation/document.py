@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.robustness import COST_CHANGE
+from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.cycloid.clearance import linear_model_warnings
 from tolalloc.report.allocation import figures, tables
 from tolalloc.report.allocation.drawing import drawing_table, full_drawing_table
@@ -17,6 +17,8 @@ from tolalloc.units import MICROMETRE
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
+_SAME = 5e-4
+"""Relative difference of costs below which they are printed alike [-]."""
 
 
 def answer(results: AllocationResults) -> tuple[str, ...]:
@@ -30,24 +32,35 @@ def answer(results: AllocationResults) -> tuple[str, ...]:
     if len(results.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
     found.append(
-        f"Cost {chosen.cost:.2f} cost units, {1 - chosen.cost / hand.cost:.1%} below all zones scaled alike "
+        f"Cost {chosen.cost:.2f} cost units, {_against(chosen.cost, hand.cost)} all zones scaled alike "
         f"({hand.cost:.2f}){'' if hand.met else ', which missed a limit'}."
     )
     return (*found, *_certificate(results), *_modification(results), *_price(results), *_settled(results))
+
+
+def _against(cost: float, other: float) -> str:
+    """Return how a cost stands against another one, in words."""
+    change = cost / other - 1
+    if abs(change) < _SAME:
+        return "as much as"
+    return f"{abs(change):.1%} {'below' if change < 0 else 'above'}"
 
 
 def _certificate(results: AllocationResults) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
     joint, graded = results.joint, results.graded
     said = [
-        f"No design that the local models let keep the limits as the verified one does costs less than "
-        f"{joint.bound:.2f}; the verified one costs {joint.gap:.2%} more."
+        f"No design with free zones that the local models let keep the limits as the verified one does costs less than "
+        f"{joint.bound:.2f}; the verified one with free zones costs {max(joint.gap, 0.0):.2%} more."
     ]
+    if not joint.chosen.met:
+        said = []
     if graded:
         said.append(
             f"On grades and preferred numbers the cost is {graded.chosen.cost:.2f}, "
-            f"{graded.chosen.cost / joint.chosen.cost - 1:+.1%} against free zones; by its local models no other "
-            f"choice of grades, processes and rounded amounts near by costs less than {graded.bound:.2f}."
+            f"{_against(graded.chosen.cost, joint.chosen.cost)} free zones ({joint.chosen.cost:.2f}); by its local "
+            f"models no other choice of grades, processes and rounded amounts near by costs less than "
+            f"{graded.bound:.2f}."
         )
     return tuple(said)
 
@@ -56,31 +69,31 @@ def _modification(results: AllocationResults) -> tuple[str, ...]:
     """Return what the modification buys."""
     alone, joint = results.alone.chosen, results.joint.chosen
     saving = 1 - joint.cost / alone.cost
+    if not joint.met:
+        return ()
     if not alone.met:
         return ("Tolerances alone keep no verified design within the limits; the modification makes the difference.",)
-    if joint.met and saving > 0:
+    if saving >= _SAME:
         return (
             f"The modification saves {alone.cost - joint.cost:.2f} cost units ({saving:.1%}) against tolerances alone "
             f"({alone.cost:.2f}).",
         )
-    return (
-        f"The modification saves nothing: with it as it is the zones cost {alone.cost:.2f}; the cheapest clearances "
-        f"found are {results.trade.cheapest[0]:.3g} µm on the flank and {results.trade.cheapest[1]:.3g} µm at tip and root.",
-    )
+    return (f"The modification saves nothing: with it as it is the zones cost {alone.cost:.2f}.",)
 
 
 def _price(results: AllocationResults) -> tuple[str, ...]:
     """Return what the limits cost."""
     prices = results.joint.prices
     said = []
-    for side in results.joint.chosen.sides:
+    for side in results.joint.chosen.sides if results.joint.chosen.met else ():
         price, unit = prices[side.stack.name], tables.unit_of(side.stack.name)
         if price * abs(side.limit) > _NOTHING * results.joint.chosen.cost:
             said.append(f"{side.stack.name}: one {unit} more room would save {price:.3g} cost units.")
-    if results.prices:
+    if results.prices and not np.isnan(results.prices.prices).all():
         best = results.prices
         said.append(
-            f"The cheapest good unit is made to a yield of {best.best:.3%}: {np.nanmin(best.prices):.2f} cost units."
+            f"The cheapest good unit is made to a yield of {best.best * 100:g}%: {np.nanmin(best.prices):.2f} cost "
+            "units."
         )
     return tuple(said)
 
@@ -91,11 +104,12 @@ def _settled(results: AllocationResults) -> tuple[str, ...]:
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
     regrets = [variant.regret for variant in found.costs]
     said = [
-        f"{len(same)} of {len(found.groups)} zones stay within 10 % under all changed assumptions"
-        f"{': ' + ', '.join(same) if same else ''}.",
+        f"{len(same)} of {len(found.groups)} zones {'stays' if len(same) == 1 else 'stay'} within {SAME:.0%} under all "
+        f"changed assumptions{': ' + ', '.join(same) if same else ''}.",
     ]
     if regrets:
-        said.append(f"Costs off by up to {COST_CHANGE:.0%} each make the drawing at most {max(regrets):.2%} too dear.")
+        dearest = max(*regrets, 0.0)
+        said.append(f"Costs off by up to {COST_CHANGE:.0%} each make the drawing at most {dearest:.2%} too dear.")
     return tuple(said)
 
 
@@ -107,26 +121,30 @@ def warnings(results: AllocationResults) -> tuple[str, ...]:
     if not chosen.met:
         check = chosen.blocking
         side = check.tightest
-        unit = tables.unit_of(check.requirement.output)
+        name, unit = check.requirement.output.split(" [")[0], tables.unit_of(check.requirement.output)
         found.append(
-            f"No design was verified to meet all limits. This is the least violating one; what blocks is "
-            f"{check.requirement.output.split(' [')[0]}, limit {side.limit:g} {unit}: it keeps {side.value:.4g} "
-            f"{unit}, {side.excess:.3g} {unit} beyond."
+            f"No design was verified to meet all limits. This is the least violating one; what blocks is {name}, limit "
+            f"{side.limit:g} {unit}: it keeps {side.value:.4g} {unit} (shown for "
+            f"{tables.guarantee_text(check.requirement.guarantee)}), {side.excess:.3g} {unit} beyond."
         )
     if not results.joint.by_hand.met:
         found.append("Uniform scaling was not verified to meet the limits, so the saving is against a miss.")
-    lost = sum(not variant.kept for variant in results.robustness.stiffness)
-    if lost:
-        found.append(
-            f"With {lost} of {len(results.robustness.stiffness)} drawn stiffnesses the drawing is no longer verified "
-            "to keep every limit."
-        )
+    lost, drawn = sum(not variant.kept for variant in results.robustness.stiffness), len(results.robustness.stiffness)
+    if lost and chosen.met:
+        found.append(f"With {lost} of {drawn} drawn stiffnesses the drawing is no longer verified to keep every limit.")
     found += linear_model_warnings(results.reducer.cycloid_stage, results.modification)
     if not results.fronts.surrogate.earns_its_place:
         found.append("The corrected model of the front has not earned its place; its search ran on the kernel, short.")
+    lost = results.fronts.searched.failed
+    if lost:
+        found.append(
+            f"{lost} design{'' if lost == 1 else 's'} of the search for the front failed on the kernel; the front is "
+            "without them."
+        )
     failed = sum(count for outcome, count in results.statuses.items() if outcome != "equilibrium found")
     if failed:
-        found.append(f"{failed} units have no equilibrium; they count as outside the limits.")
+        has, counts = ("unit has", "it counts") if failed == 1 else ("units have", "they count")
+        found.append(f"{failed} {has} no equilibrium; {counts} as outside the limits.")
     return tuple(found)
 
 
@@ -156,7 +174,7 @@ def assumptions(results: AllocationResults) -> tuple[str, ...]:
 def summary(results: AllocationResults) -> dict[str, Any]:
     """Return the whole answer for a program, units in the names."""
     chosen, joint, amounts = results.chosen, results.joint, results.modification
-    return {
+    answered = {
         "study": results.name,
         "study hash": results.digest,
         "reducer": results.reducer.name,
@@ -190,12 +208,17 @@ def summary(results: AllocationResults) -> dict[str, Any]:
         "statuses": dict(results.statuses),
         "warnings": list(warnings(results)),
     }
+    return {name: _known(value) for name, value in answered.items()}
+
+
+def _known(value: object) -> object:
+    """Return a number, or null where it is none; JSON knows neither NaN nor infinity."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return a table for JSON, which knows no NaN."""
-    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-    return [{str(name): value for name, value in row.items()} for row in rows]
+    """Return a table for JSON."""
+    return [{str(name): _known(value) for name, value in row.items()} for row in frame.to_dict("records")]
 
 
 def sections(results: AllocationResults) -> tuple[Section, ...]:
@@ -229,6 +252,8 @@ def sections(results: AllocationResults) -> tuple[Section, ...]:
             tables=(
                 ("certificate", tables.certificate_table(results)),
                 ("front", tables.front_table(results)),
+                ("searched front", tables.searched_table(results)),
+                ("front with clearance", tables.clearance_front_table(results)),
                 ("bounds of zones", tables.bounds_table(results)),
             ),
         ),
@@ -249,7 +274,12 @@ def sections(results: AllocationResults) -> tuple[Section, ...]:
         Section(
             heading="Work done",
             paragraphs=(
-                ", ".join(f"{count} units: {outcome}" for outcome, count in results.statuses.items() if count),
+                ", ".join(
+                    f"{count} unit{'' if count == 1 else 's'}: {outcome}"
+                    for outcome, count in results.statuses.items()
+                    if count
+                )
+                + ".",
             ),
             tables=(
                 ("verified designs", tables.verified_table(results)),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tolalloc.report.allocation.calculator import calculator_sheets
+from tolalloc.report.allocation.calculator import calculator_sheets, style_calculator
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.excel import write_sheets
 from tolalloc.uncertainty.sources import Source
@@ -33,7 +33,7 @@ def drawn_sources(results: AllocationResults) -> tuple[Source, ...]:
                 source,
                 zone=zone,
                 cost=float(made[source.name].total(np.array(zone))),
-                grade=labels.get(source.group, "") if source.grade or labels else "",
+                grade=labels.get(source.group, ""),
             )
         )
     return tuple(found)
@@ -98,3 +98,4 @@ def write_drawing(results: AllocationResults, folder: Path) -> None:
     table_frame(drawn_sources(results), folder).to_csv(folder / "allocation.csv", index=False)
     sheets = {"drawing": full_drawing_table(results), **calculator_sheets(results)}
     write_sheets(sheets, folder / "drawing.xlsx")
+    style_calculator(folder / "drawing.xlsx")

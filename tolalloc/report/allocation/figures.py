@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.report.allocation import tables
 from tolalloc.report.allocation.drawing import drawing_table
@@ -51,7 +52,7 @@ def front_figure(results: AllocationResults) -> Figure:
     compared = tables.designs(results)
     return Figure(
         name="front",
-        title="What a limit costs: the exact front of the local models, the search on the kernel, verified designs",
+        title=f"What a limit costs: fronts and verified designs; dashed is the limit of {limit:g}″",
         x_label=f"peak-to-peak kept by {results.target:.2%} of units [arcsec]",
         y_label="cost [cost units]",
         series=(
@@ -64,11 +65,11 @@ def front_figure(results: AllocationResults) -> Figure:
                 y=list(searched.cost[checked]),
             ),
             *(
-                Series(label=f"{label}, verified", kind="points", x=[design.quantile_bound], y=[design.cost])
+                Series(label=label, kind="points", x=[design.quantile_bound], y=[design.cost])
                 for label, design in compared.items()
             ),
         ),
-        vertical=((limit, f"limit {limit:g}″"),),
+        vertical=((limit, ""),),  # a label would stand among the legend's
     )
 
 
@@ -77,7 +78,7 @@ def trade_map(results: AllocationResults) -> HeatMap:
     trade = results.trade
     return HeatMap(
         name="modification_cost",
-        title="Cost of the cheapest zones for every pair of clearances; an empty cell keeps no requirement",
+        title="Cost of the cheapest zones for every pair of clearances; empty where none keep the requirements",
         columns=[f"{value:.3g}" for value in trade.radial],
         rows=[f"flank {value:.3g} µm" for value in trade.flank],
         x_label="radial clearance at tip and root [µm]",
@@ -95,11 +96,18 @@ def trade_figure(results: AllocationResults) -> Figure:
         x_label="radial clearance at tip and root [µm]",
         y_label="cost of the cheapest zones [cost units]",
         series=tuple(
-            Series(label=f"flank clearance {flank:.3g} µm", kind="line", x=list(trade.radial), y=list(cost))
+            _where_known(f"flank clearance {flank:.3g} µm", trade.radial, cost)
             for flank, cost in zip(trade.flank, trade.cost, strict=True)
+            if np.isfinite(cost).any()
         ),
         vertical=((now.radial_clearance * 1e6, "as it is"), (float(results.chosen.design[-1]), "chosen")),
     )
+
+
+def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray, " step"]) -> Series:
+    """Return a line through what is known, a point where that is one value."""
+    known = np.isfinite(y)
+    return Series(label=label, kind="line" if known.sum() > 1 else "points", x=list(x[known]), y=list(y[known]))
 
 
 def robustness_figure(results: AllocationResults) -> Figure:

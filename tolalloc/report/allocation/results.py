@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.fronts import ConvexFront
 from tolalloc.allocation.graded import GradedAllocation
@@ -78,11 +78,13 @@ class AllocationResults:
     robustness
         Answers under changed assumptions.
     prices
-        Price of a good unit over yield targets, if the study states what becomes of the others.
+        Price of a good unit over yield targets, if the study states what becomes of the others and one is in reach.
+    loss
+        What a peak-to-peak costs a user, if the study states it.
     neglected
         Patterns of the sources that are taken as zero.
     statuses
-        Outcome → number of units, over the whole study [-].
+        Outcome → number of units, over all stages but the fronts, which count their failed designs [-].
     stages
         Seconds and units of each stage.
     """
@@ -104,6 +106,7 @@ class AllocationResults:
     fronts: Fronts
     robustness: Robustness
     prices: YieldLadder | None
+    loss: QualityLoss | None
     neglected: tuple[str, ...]
     statuses: Mapping[str, int]
     stages: Mapping[str, Mapping[str, float]]

@@ -10,6 +10,9 @@ from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.units import MICROMETRE
 
+_ROUNDING = 1e-6
+"""Price of a micrometre, over the cost, below which it is the solver's rounding [1/µm]."""
+
 
 def unit_of(name: str) -> str:
     """Return the unit in the name of an output."""
@@ -54,11 +57,21 @@ def designs_table(results: AllocationResults) -> pd.DataFrame:
                 "radial clearance [µm]": float(design.design[-1]),
                 "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
                 "shift Δr_p [µm]": amounts.shift / MICROMETRE,
+                **_loss(results, design),
                 "units [-]": design.achieved.units,
                 "OK": "yes" if design.met else "no",
             }
         )
     return pd.DataFrame(rows)
+
+
+def _loss(results: AllocationResults, design: VerifiedDesign) -> dict[str, float]:
+    """Return the mean quality loss of a design, if the study states what a peak-to-peak costs its user."""
+    if results.loss is None:
+        return {}
+    values = design.sample.values
+    lost = results.loss.smaller_is_better(float(values.mean()), float(values.std(ddof=1)))
+    return {"mean quality loss [cost units]": lost}
 
 
 def requirements_table(results: AllocationResults) -> pd.DataFrame:
@@ -73,12 +86,12 @@ def requirements_table(results: AllocationResults) -> pd.DataFrame:
             "limit": f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit}",
             "shown for": guarantee_text(check.requirement.guarantee),
         }
-        row |= {f"kept: {label}": design.sides[number].value for label, design in compared.items()}
+        row |= {f"kept: {label} [unit of the output]": design.sides[number].value for label, design in compared.items()}
         rows.append(
             {
                 **row,
-                "slack": -side.excess,
-                "standard error of it": side.doubt,
+                "slack [unit of the output]": -side.excess,
+                "standard error of it [unit of the output]": side.doubt,
                 "one unit of the limit costs [cost units]": prices[side.stack.name],
                 "OK": "yes" if side.excess <= 0 else "no",
             }
@@ -123,6 +136,8 @@ def bounds_table(results: AllocationResults) -> pd.DataFrame:
     space, found = results.space, results.joint
     zones, scales = space.first_zones / MICROMETRE, found.optimum.zones
     made = [feature.processes[at] for feature, at in zip(space.features, found.optimum.processes, strict=True)]
+    prices = found.optimum.bound_prices / zones[:, np.newaxis]
+    prices = np.where(prices > _ROUNDING * found.optimum.cost, prices, 0.0)
     return pd.DataFrame(
         {
             "group": space.groups,
@@ -130,8 +145,8 @@ def bounds_table(results: AllocationResults) -> pd.DataFrame:
             "smallest zone [µm]": [process.minimum for process in made] * zones,
             "zone [µm]": scales * zones,
             "largest zone [µm]": [process.maximum for process in made] * zones,
-            "1 µm less of the smallest saves [cost units]": found.optimum.bound_prices[:, 0] / zones,
-            "1 µm more of the largest saves [cost units]": found.optimum.bound_prices[:, 1] / zones,
+            "1 µm less of the smallest saves [cost units]": prices[:, 0],
+            "1 µm more of the largest saves [cost units]": prices[:, 1],
         }
     )
 
@@ -214,6 +229,35 @@ def prices_table(results: AllocationResults) -> pd.DataFrame:
             "yield target [%]": found.targets * 100,
             "cheapest unit made to it [cost units]": found.manufacturing,
             "price of a good unit [cost units]": found.prices,
+        }
+    )
+
+
+def searched_table(results: AllocationResults) -> pd.DataFrame:
+    """Return the front of the search with what the kernel says of it, its knee marked."""
+    front = results.fronts.searched
+    return pd.DataFrame(
+        {
+            "peak-to-peak kept, told [arcsec]": front.quantile,
+            "on the kernel [arcsec]": front.on_kernel,
+            "cost [cost units]": front.cost,
+            "flank clearance [µm]": front.designs[:, -2],
+            "radial clearance [µm]": front.designs[:, -1],
+            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
+        }
+    )
+
+
+def clearance_front_table(results: AllocationResults) -> pd.DataFrame:
+    """Return the front of cost, peak-to-peak and radial clearance, its knee marked."""
+    front = results.fronts.with_clearance
+    return pd.DataFrame(
+        {
+            "cost [cost units]": front.cost,
+            "peak-to-peak kept, told [arcsec]": front.quantile,
+            "on the kernel [arcsec]": front.on_kernel,
+            "radial clearance [µm]": front.further[:, 0],
+            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
         }
     )
 

@@ -1,0 +1,376 @@
+"""``tolalloc allocate`` as a user meets it: drawing, files, limits out of reach, interruption, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.cli.allocate import allocate
+from tolalloc.exceptions import TolallocError
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+
+ROOT = Path(__file__).parents[2]
+KEPT = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
+PROCESSES = """sources,process,model,fixed [cost units],factor,min [µm],max [µm],note
+housing.pitch,ground,reciprocal,,,,,today
+housing.pitch,broached,reciprocal,0.8,25,22,,wide zones only
+"""
+SMALL = """effort=Effort(verification_units=128, shared_units=16,
+    search=SearchEffort(steps=2, front=FrontEffort(
+        population=8, generations=4, population_on_kernel=8, generations_on_kernel=2, designs=10, rounds=1, points=3)),
+    allocation=AllocationEffort(graded_steps=2, exact_points=8, flank_steps=2, radial_steps=2, changed_costs=4,
+        changed_stiffnesses=1, stiffness_units=128, share_blocks=8, yields=(0.9, 0.95)))"""
+IMPORTS = """from tolalloc.allocation.cost.unit_price import UnitPrice
+from tolalloc.allocation.guarantee import AtCpk, AtYield
+from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.search import SearchEffort
+from tolalloc.capability.indices import Limits
+from tolalloc.study.definition import Study
+from tolalloc.study.effort import AllocationEffort, Effort
+"""
+LOST = "'lost motion [arcmin]'"
+
+
+def tolalloc(*arguments: object, threads: int = 2) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, cwd=ROOT, check=False, env=environment(threads)
+    )
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "tolalloc.cli.main", "allocate", *(str(argument) for argument in arguments)]
+
+
+def environment(threads: int) -> dict[str, str]:
+    return {**os.environ, "NUMBA_NUM_THREADS": str(threads), "COLUMNS": "100"}
+
+
+def script_with(path: Path, fields: str = "", effort: str = SMALL) -> Path:
+    """Write a study of few sources, one of which can be made in two ways."""
+    few_sources(path)
+    (path / "costs.csv").write_text(PROCESSES, encoding="utf-8")
+    values = {
+        "name": "'drawn'",
+        "tolerances": repr(str(path / "few.csv")),
+        "neglected": "('*',)",
+        "yield_target": "0.95",
+        "limit_arcsec": "50.0",
+    }
+    given = ", ".join(f"{name}={value}" for name, value in values.items() if f"{name}=" not in fields)
+    script = path / "study.py"
+    script.write_text(f"{IMPORTS}study = Study({', '.join(filter(None, (given, fields, effort)))})\n", encoding="utf-8")
+    return script
+
+
+def few_sources(path: Path, **columns: str) -> Path:
+    table = pd.read_csv(
+        ROOT / "tolalloc/uncertainty/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False
+    )
+    kept = table[table["id"].isin(KEPT)].assign(**columns)
+    kept.to_csv(path / "few.csv", index=False)
+    return path / "few.csv"
+
+
+def numbers(value: object) -> list[float]:
+    """Return every number of an answer."""
+    if isinstance(value, dict):
+        return [number for own in value.values() for number in numbers(own)]
+    if isinstance(value, list):
+        return [number for own in value for number in numbers(own)]
+    return [float(value)] if isinstance(value, int | float) else []
+
+
+@pytest.fixture(scope="module")
+def allocated(tmp_path_factory) -> tuple[Path, str]:
+    path = tmp_path_factory.mktemp("allocate")
+    fields = (
+        f"process_costs={str(path / 'costs.csv')!r}, unit_price=UnitPrice(inspection=0.1, scrap=5.0), "
+        "stiffness='rv20e_table6'"
+    )
+    script = script_with(path, fields, effort="")
+    result = tolalloc(script, "--quick", "--grades", "--seed", 0, "--out", path / "report")
+    assert result.returncode == 0, result.stderr
+    return path / "report", result.stdout + result.stderr
+
+
+def test_the_report_is_complete(allocated):
+    folder, said = allocated
+    assert {path.name for path in folder.iterdir()} == {
+        "report.html",
+        "results.xlsx",
+        "summary.json",
+        "manifest.json",
+        "figures",
+        "tables",
+        "allocation.csv",
+        "drawing.xlsx",
+    }
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for heading in (
+        "What to write on the drawing",
+        "Requirements",
+        "How far from optimal",
+        "Modification against tolerances",
+        "What a good unit costs",
+        "When an assumption is wrong",
+        "Work done",
+    ):
+        assert heading in page
+    assert "<script src" not in page
+    for stage in ("tolerances alone", "with modification", "grades", "modification trade", "fronts", "robustness"):
+        assert stage in said
+    assert "units/s" in said
+
+
+def test_the_answer_reads_well(allocated):
+    _, said = allocated
+    assert "Met: " in said
+    assert "one arcsec more room would save" in said
+    assert "-0.0" not in said
+    assert "nan" not in said
+    table = [line for line in said.splitlines() if line.startswith(("┏", "┃", "│"))]
+    assert all(len(line) <= 100 for line in table)
+    assert "housing.runout" in said
+
+
+def test_the_answer_for_programs_is_finite(allocated):
+    folder, _ = allocated
+    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert answer["seed"] == 0
+    assert answer["met"] is True
+    assert answer["blocking requirement"] is None
+    assert all(math.isfinite(number) for number in numbers(answer))
+    assert answer["certified bound [cost units]"] <= answer["cost [cost units]"]
+    assert {row["source"] for row in answer["drawing"]} == set(KEPT)
+    with_unit = [name for name, value in answer.items() if isinstance(value, float)]
+    assert all(name.endswith("]") for name in with_unit)
+
+
+def test_the_drawing_is_read_back_and_carries_grades(allocated):
+    folder, _ = allocated
+    sources = {source.name: source for source in load_tolerance_table(folder / "allocation.csv")}
+    assert set(sources) == set(KEPT)
+    assert sources["pin.diameter"].grade.startswith("IT")
+    assert sources["disc1.pitch"].zone == sources["disc2.pitch"].zone
+
+
+def test_every_header_of_the_tables_has_a_unit(allocated):
+    folder, _ = allocated
+    for path in (folder / "tables").iterdir():
+        frame = pd.read_csv(path)
+        missing = [name for name in frame.select_dtypes("number") if "[" not in name]
+        assert missing == [] or path.stem == "tolerances", (path.stem, missing)
+
+
+def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path):
+    script = script_with(tmp_path)
+    answers, kept = [], tmp_path / "kept.npz"
+    whole = tolalloc(script, "--json", "--out", tmp_path / "whole", "--checkpoint", tmp_path / "other.npz", threads=1)
+    assert whole.returncode == 0, whole.stderr
+    with subprocess.Popen(
+        command(script, "--json", "--out", tmp_path / "cut", "--checkpoint", kept),
+        env=environment(2),
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        while not kept.exists() and process.poll() is None:
+            time.sleep(0.005)
+        process.kill()
+    assert kept.exists()
+    again = tolalloc(script, "--json", "--out", tmp_path / "again", "--checkpoint", kept, threads=2)
+    plain = tolalloc(script, "--json", "--out", tmp_path / "plain", threads=2)
+    for result in (whole, again, plain):
+        assert result.returncode == 0, result.stderr
+        answers.append(json.loads(result.stdout))
+    assert answers[0] == answers[1] == answers[2]
+    before = kept.read_bytes()
+    other = tolalloc(script, "--limit", 40, "--out", tmp_path / "limit", "--checkpoint", kept)
+    assert other.returncode == 2
+    assert "kept.npz: the checkpoint is of another problem" in other.stderr
+    assert "units/s" not in other.stderr  # said before anything long runs
+    assert kept.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("fields", "blocking", "unit"),
+    [
+        ("limit_arcsec=5.0, unit_price=UnitPrice(scrap=5.0)", "peak-to-peak transmission error [arcsec]", "arcsec"),
+        (
+            f"other_limits={{{LOST}: Limits(upper=0.01)}}, grades=True, unit_price=UnitPrice(scrap=5.0)",
+            "lost motion [arcmin]",
+            "arcmin",
+        ),
+    ],
+)
+def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp_path, fields, blocking, unit):
+    result = tolalloc(script_with(tmp_path, fields), "--json", "--out", tmp_path / "report")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert answer["met"] is False
+    assert answer["blocking requirement"] == blocking
+    beyond = answer["beyond its limit by [unit of the output]"]
+    assert beyond > 0
+    (said,) = [warning for warning in answer["warnings"] if warning.startswith("No design was verified")]
+    assert f"{beyond:.3g} {unit} beyond" in said
+    assert all(math.isfinite(number) for number in numbers(answer))
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "would save" not in page
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"yield_target": 2.0}, ["yield_target is 2.0", "0.5 up to but not 1"]),
+        ({"limit": -3.0}, ["limit_arcsec is -3.0", "above 0"]),
+        ({"limit": math.nan}, ["limit_arcsec is nan", "above 0"]),
+        ({"seed": -1}, ["seed is -1", "0 or a positive integer"]),
+        ({"checkpoint": Path("nowhere/kept.npz")}, ["no folder", "nowhere"]),
+        ({"checkpoint": ROOT / "README.md"}, ["README.md", "no complete checkpoint"]),
+        ({"checkpoint": ROOT / "docs"}, ["docs", "no complete checkpoint"]),
+        ({"out": ROOT / "docs"}, ["docs", "not empty", "nothing is overwritten"]),
+    ],
+)
+def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
+    refused({"script": script_with(tmp_path), "out": tmp_path / "report", **options}, *words)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ("other_limits={'lost motoin [arcmin]': Limits(upper=1.0)}", ["other_limits", "lost motion [arcmin]"]),
+        (f"guarantees={{{LOST}: AtCpk(target=1.33)}}", ["guarantees", "peak-to-peak"]),
+        (
+            f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: AtCpk(target=0.0)}}",
+            ["Cpk is 0.0", "above 0"],
+        ),
+        (f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: 1.33}}", ["guarantees", "1.33", "AtCpk"]),
+        (f"other_limits={{{LOST}: 1.0}}", ["other_limits", "1.0", "Limits(...)"]),
+        (f"other_limits={{{LOST}: Limits(upper=float('inf'))}}", ["other_limits", "inf", "finite"]),
+        (f"other_limits={{{LOST}: Limits(lower=2.0, upper=1.0)}}", ["upper limit is 1.0", "above the lower one"]),
+        (
+            f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: AtYield(target=0.999)}}",
+            ["effort.verification_units for lost motion", "128", "2995 or more"],
+        ),
+        ("yield_target=0.999", ["effort.verification_units is 128", "2995 or more"]),
+        ("unit_price=UnitPrice(inspection=-1.0)", ["inspection is -1.0", "0 or above"]),
+        ("unit_price=5.0", ["unit_price is 5.0", "UnitPrice"]),
+        ("process_costs='rv20f'", ["rv20f", "rv20e"]),
+    ],
+)
+def test_bad_fields_are_refused_in_one_sentence(tmp_path, fields, words):
+    refused({"script": script_with(tmp_path, fields), "out": tmp_path / "report"}, *words)
+
+
+@pytest.mark.parametrize(
+    ("effort", "words"),
+    [
+        ("allocation=AllocationEffort(graded_steps=0)", ["allocation.graded_steps is 0", "1 or more"]),
+        ("allocation=AllocationEffort(exact_points=1)", ["allocation.exact_points is 1", "2 or more"]),
+        ("allocation=AllocationEffort(exact_points=2.5)", ["allocation.exact_points is 2.5", "whole number"]),
+        ("allocation=AllocationEffort(share_blocks=100)", ["allocation.share_blocks is 100", "power of two"]),
+        ("allocation=AllocationEffort(yields=())", ["allocation.yields is ()", "between 0 and 1"]),
+        ("allocation=AllocationEffort(yields=(0.9, 1.0))", ["allocation.yields is (0.9, 1.0)"]),
+        ("shared_units=0", ["effort.shared_units is 0", "2 or more"]),
+        ("search=SearchEffort(steps=0)", ["search.steps is 0", "1 or more"]),
+        ("search=SearchEffort(reach=1.0)", ["search.reach is 1.0", "above 1"]),
+        ("search=SearchEffort(front=FrontEffort(designs=0))", ["search.front.designs is 0", "10 or more"]),
+        ("search=SearchEffort(front=FrontEffort(population=1))", ["search.front.population is 1", "4 or more"]),
+    ],
+)
+def test_an_effort_that_makes_no_sense_is_refused(tmp_path, effort, words):
+    refused({"script": script_with(tmp_path, effort=f"effort=Effort({effort})"), "out": tmp_path / "report"}, *words)
+
+
+@pytest.mark.parametrize(
+    ("columns", "options", "words"),
+    [
+        ({"locked": "yes"}, {}, ["every zone is locked"]),
+        ({"min [unit]": "30", "max [unit]": "20"}, {}, ["row 2", "min 30", "max 20"]),
+        (
+            {"min [unit]": "0.1", "max [unit]": "0.2", "plus [unit]": "0.15", "minus [unit]": "0"},
+            {"grades": True},
+            ["pin.diameter", "(0.1, 0.2)", "IT01"],
+        ),
+    ],
+)
+def test_zones_that_cannot_be_had_are_refused(tmp_path, columns, options, words):
+    script = script_with(tmp_path)
+    few_sources(tmp_path, **columns)
+    refused({"script": script, "out": tmp_path / "report", **options}, *words)
+
+
+def refused(options: dict[str, object], *words: str) -> None:
+    """Nothing is made, and the reason is one sentence with these words."""
+    defaults = {"limit": None, "yield_target": None, "grades": False, "seed": None, "checkpoint": None}
+    with pytest.raises(TolallocError) as caught:
+        allocate(**{**defaults, **options})
+    said = str(caught.value)
+    assert "\n" not in said and said.endswith(".")
+    for word in words:
+        assert word in said
+    assert not (Path(str(options["script"])).parent / "report").exists()
+
+
+ROW = "housing.pitch,ground,reciprocal,0,,,,x\n"
+HEAD = PROCESSES.splitlines()[0] + "\n"
+POINTED = "sources,process,model,points,note\nhousing.pitch,ground,tabulated,shop.csv,x\n"
+SHOP = "process,tolerance,unit,cost\n"
+
+
+@pytest.mark.parametrize(
+    ("table", "shop", "words"),
+    [
+        (HEAD, None, ["no rows"]),
+        ("", None, ["no rows"]),
+        (HEAD + ROW.replace("housing.pitch", "gear*"), None, ["row 2", "gear*", "carrier", "known"]),
+        (HEAD + ROW.replace(",x", ","), None, ["row 2", "note is missing"]),
+        (HEAD + ROW + ROW, None, ["row 3", "'ground'", "second time"]),
+        (HEAD.replace("min [µm]", "min [mm]") + ROW, None, ["column min is 'mm'", "µm"]),
+        (HEAD.replace("factor", "fixed") + ROW, None, ["'fixed' is there twice"]),
+        (HEAD.replace("process,model", "model,process") + ROW, None, ["model is 'ground'", "reciprocal"]),
+        (HEAD + "housing.pitch,ground,reciprocal,0,,9,5,x\n", None, ["min must not be above max", "9, 5"]),
+        (HEAD + "housing.pitch,ground,reciprocal,0,,150,190,x\n", None, ["no process can hold", "housing.pitch"]),
+        (HEAD + "housing.pitch,ground,reciprocal,0,-3,,,x\n", None, ["factor is -3.0", "greater than 0"]),
+        ((HEAD + ROW).replace(",", ";").replace(";0;", ";0,5;"), None, ["fixed is '0,5'", "decimal point"]),
+        (POINTED, None, ["row 2", "points shop.csv", "CSV file in"]),
+        (POINTED, SHOP + "ground,10,µm,2\nground,20,µm,3\n", ["shop.csv", "costs that fall"]),
+        (POINTED, SHOP + "ground,10,inch,3\nground,20,µm,2\n", ["unit is 'inch'", "mm"]),
+        (POINTED, SHOP + "ground,10,µm,3\n", ["two zones or more"]),
+        (POINTED, SHOP + "milled,10,µm,3\nmilled,20,µm,2\n", ["row 2", "'ground'", "milled"]),
+    ],
+)
+def test_process_cost_tables_are_refused_in_one_sentence(tmp_path, table, shop, words):
+    sources = load_tolerance_table("rv20e_baseline")
+    (tmp_path / "costs.csv").write_text(table, encoding="utf-8")
+    if shop:
+        (tmp_path / "shop.csv").write_text(shop, encoding="utf-8")
+    with pytest.raises(TolallocError) as caught:
+        load_process_costs(tmp_path / "costs.csv", sources)
+    said = str(caught.value)
+    assert "\n" not in said and said.endswith(".")
+    for word in words:
+        assert word in said
+
+
+def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
+    text = (HEAD + ROW).replace(",", ";")
+    (tmp_path / "costs.csv").write_text(text, encoding="utf-8-sig")
+    found = load_process_costs(tmp_path / "costs.csv", load_tolerance_table("rv20e_baseline"))
+    assert [process.name for process in found["housing.pitch"]] == ["ground"]
+
+
+def test_the_shell_sees_one_sentence_and_exit_code_2(tmp_path):
+    result = tolalloc(script_with(tmp_path), "--yield", 2, "--out", tmp_path / "report")
+    assert result.returncode == 2
+    assert result.stderr == "Error: study drawn: yield_target is 2.0; allowed is 0.5 up to but not 1.\n"
+    assert result.stdout == ""

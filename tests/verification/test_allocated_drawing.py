@@ -1,0 +1,272 @@
+"""The drawing as a file: the table reads back, and the formulas of the workbook say what tolalloc says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from math import exp, sqrt
+
+import numpy as np
+import pytest
+from openpyxl import load_workbook
+from typer.testing import CliRunner
+
+from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
+from tolalloc.allocation.cost.model import Weighted
+from tolalloc.allocation.cost.points import Points
+from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
+from tolalloc.capability.indices import Limits
+from tolalloc.cli.main import app
+from tolalloc.report.allocation.calculator import cost_formula
+from tolalloc.report.allocation.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
+from tolalloc.study.allocation import allocate_study
+from tolalloc.study.definition import Study
+from tolalloc.study.effort import QUICK
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame
+
+UM, RADIAL = 1e-6, "radial clearance at tip and root [µm]"
+SMALL = replace(
+    QUICK,
+    search=replace(
+        QUICK.search,
+        steps=2,
+        front=replace(
+            QUICK.search.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3
+        ),
+    ),
+    allocation=replace(
+        QUICK.allocation, graded_steps=2, exact_points=4, flank_steps=1, radial_steps=2, changed_costs=1, share_blocks=8
+    ),
+)
+
+
+class Silence:
+    """Progress that nobody watches."""
+
+    def begin(self, stage):
+        pass
+
+    def advance(self, units):
+        pass
+
+
+class Workbook:
+    """A workbook whose formulas are calculated: references, sums, products, roots, exponentials and conditions."""
+
+    def __init__(self, path):
+        self.sheets = load_workbook(path)
+
+    def value(self, sheet, cell):
+        held = self.sheets[sheet][cell].value
+        return self.calculated(held[1:], sheet) if isinstance(held, str) and held.startswith("=") else held
+
+    def calculated(self, formula, sheet="zones"):
+        def looked_up(found):
+            if found["text"]:
+                return found["text"]
+            place, cells = found["sheet"] or sheet, found["cells"].replace("$", "")
+            return f"cells({place!r}, {cells!r})" if ":" in cells else f"value({place!r}, {cells!r})"
+
+        cells = (
+            r'(?P<text>"[^"]*")|(?:(?P<sheet>[a-z]+)!)?(?P<cells>\$?[A-Z]{1,2}\$?\d+(?::\$?[A-Z]{1,2}\$?\d+)?)(?![\d(])'
+        )
+        python = re.sub(cells, looked_up, formula).replace("^", "**")
+        known = {
+            "EXP": exp,
+            "SQRT": sqrt,
+            "MAX": max,
+            "SUM": np.sum,
+            "SUMPRODUCT": lambda *arrays: float(np.sum(np.prod(arrays, axis=0))),
+            "AND": lambda *asked: all(asked),
+            "IF": lambda asked, then, other: then if asked else other,
+            "value": self.value,
+            "cells": lambda place, area: np.array(
+                [self.value(place, cell.coordinate) for row in self.sheets[place][area] for cell in row], dtype=float
+            ),
+        }
+        return eval(python, {"__builtins__": {}}, known)
+
+
+CURVE = Points(zones=(1.0, 2.0, 3.5, 6.0, 11.0), costs=(9.0, 5.0, 3.0, 2.2, 2.0))
+MODELS = (
+    Reciprocal(fixed=0.3, factor=4e-6),
+    ReciprocalPower(fixed=0.1, factor=2.5, exponent=1.7),
+    Exponential(fixed=0.2, factor=8.0, scale=2.3),
+    Combined(factor=6.0, exponent=0.4, scale=3.0),
+    Tabulated(CURVE),
+    Spline(CURVE),
+    Weighted(model=Reciprocal(factor=2.0), weight=1.25),
+    SumOfCosts(models=(Spline(CURVE), Reciprocal(factor=3.0), Tabulated(CURVE)), ratios=(1.3, 2.0, 0.8)),
+    Weighted(model=SumOfCosts(models=(Exponential(factor=2.0, scale=1.0),), ratios=(2.0,)), weight=0.8),
+)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_a_formula_costs_what_its_model_costs(model):
+    formula = cost_formula(model, "Z")
+    calculator = Workbook.__new__(Workbook)
+    for zone in (0.7, 1.0, 1.6, 2.0, 3.1, 5.0, 6.0, 9.0, 14.0):
+        told = calculator.calculated(formula.replace("Z", repr(zone)))
+        assert told == pytest.approx(float(model.value(np.array(zone))), rel=1e-11)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_a_formula_is_one_that_every_workbook_reads(model):
+    formula = cost_formula(model.rescaled(4e-6), "D2")
+    assert "np." not in formula
+    assert "e" not in formula
+    assert len(formula) < 8192
+    assert formula.count("(") == formula.count(")")
+
+
+def test_many_points_need_no_nested_conditions():
+    zones = np.linspace(1, 40, 100)
+    points = Points(zones=tuple(zones.tolist()), costs=tuple((50 / zones).tolist()))
+    formula = cost_formula(Tabulated(points), "D2")
+    assert len(formula) < 8192
+    assert "IF" not in formula
+
+
+@pytest.fixture(scope="module")
+def graded():
+    return allocate_study(Study(name="graded", grades=True, effort=SMALL), Silence())
+
+
+@pytest.fixture(scope="module")
+def priced(tmp_path_factory):
+    """Four groups that may change, each by several processes, and a lower limit whose stack adds, too."""
+    free = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}
+    sources = [replace(own, locked=own.group not in free) for own in load_tolerance_table("rv20e_baseline")]
+    table = tmp_path_factory.mktemp("table") / "locked.csv"
+    table_frame(sources).to_csv(table, index=False)
+    study = Study(
+        name="priced",
+        tolerances=table,
+        limit_arcsec=70.0,
+        process_costs="rv20e",
+        other_limits={RADIAL: Limits(lower=-20.0)},
+        effort=SMALL,
+    )
+    results = allocate_study(study, Silence())
+    chosen = results.joint.chosen
+    first, (side,) = chosen.checks[0], chosen.checks[1].sides
+    spreading = side.stack.spreading
+    more = float(spreading @ chosen.design[:-2])
+    stack = replace(side.stack, adding=spreading, room=side.stack.room + more)
+    checks = (first, replace(chosen.checks[1], sides=(replace(side, stack=stack),)))
+    return replace(results, joint=replace(results.joint, chosen=replace(chosen, checks=checks)))
+
+
+@pytest.fixture(scope="module", params=["graded", "priced"])
+def drawn(request, tmp_path_factory):
+    results, folder = request.getfixturevalue(request.param), tmp_path_factory.mktemp(request.param)
+    write_drawing(results, folder)
+    return results, folder
+
+
+def cost_cell(results):
+    return f"D{2 + len(results.chosen.sides)}"
+
+
+def scaled(results, workbook, position, factor):
+    """Return the design whose zone at a position is another one, and change it in the workbook."""
+    design = results.chosen.design.copy()
+    design[position] *= factor
+    workbook.sheets["zones"].cell(2 + position, 2).value *= factor
+    return design
+
+
+def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
+    results, folder = drawn
+    workbook = Workbook(folder / "drawing.xlsx")
+    assert workbook.value("requirements", cost_cell(results)) == pytest.approx(results.chosen.cost)
+    for row, side in enumerate(results.chosen.sides, start=2):
+        assert workbook.value("requirements", f"A{row}") == side.stack.name
+        told = workbook.value("requirements", f"D{row}")
+        assert told == pytest.approx(side.limit + side.sign * side.predicted(results.chosen.design))
+        assert workbook.value("requirements", f"E{row}") == ("yes" if side.excess <= 0 else "no")
+    for row in range(2, 2 + len(results.drawn.groups)):
+        assert workbook.value("zones", f"G{row}") == "yes"
+
+
+@pytest.mark.parametrize("factor", [0.93, 1.1])
+def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
+    results, folder = drawn
+    space = results.drawn
+    made = space.process_positions(results.chosen.design)
+    for position, (feature, process) in enumerate(zip(space.features, made, strict=True)):
+        workbook = Workbook(folder / "drawing.xlsx")
+        design = scaled(results, workbook, position, factor)
+        cost = space.problem(()).cost(design[:-2], made) + space.locked_cost
+        assert workbook.value("requirements", cost_cell(results)) == pytest.approx(cost)
+        for row, side in enumerate(results.chosen.sides, start=2):
+            told = workbook.value("requirements", f"D{row}")
+            assert told == pytest.approx(side.limit + side.sign * side.predicted(design))
+        held = feature.processes[process]
+        inside = held.minimum * (1 - 1e-6) <= design[position] <= held.maximum * (1 + 1e-6)
+        assert workbook.value("zones", f"G{2 + position}") == ("yes" if inside else "no")
+
+
+def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
+    results, folder = drawn
+    sheets = load_workbook(folder / "drawing.xlsx")
+    assert sheets.sheetnames == ["drawing", "zones", "requirements"]
+    formulas = [
+        cell.value
+        for name in ("zones", "requirements")
+        for row in sheets[name].iter_rows()
+        for cell in row
+        if isinstance(cell.value, str) and cell.value.startswith("=")
+    ]
+    assert len(formulas) == 3 * len(results.drawn.groups) + 2 * len(results.chosen.sides) + 1
+    assert not any("np." in formula or "e-" in formula or "nan" in formula for formula in formulas)
+    zones = sheets["zones"]
+    marked = {zones.cell(2 + at, 2).fill.fgColor.rgb for at in range(len(results.drawn.groups))}
+    assert marked == {"00FFF2CC"}
+    assert zones["C2"].fill.fgColor.rgb not in marked
+    assert "yellow" in zones.cell(3 + len(results.drawn.groups), 1).value
+
+
+def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
+    results, folder = drawn
+    read = load_tolerance_table(folder / "allocation.csv")
+    meant = dict(
+        zip((own.name for own in results.drawn.errors.active), results.drawn.zones(results.chosen.design), strict=True)
+    )
+    assert [own.name for own in read] == [own.name for own in results.space.errors.sources]
+    for own, before, after in zip(read, results.space.errors.sources, drawn_sources(results), strict=True):
+        # The file has four decimals of a micrometre; both limits of a size are rounded.
+        assert own.zone == pytest.approx(meant.get(own.name, 0.0), abs=1.01e-4 * UM)
+        assert own.locked == before.locked
+        assert own.grade == after.grade
+        assert own.group == before.group
+        assert (own.minimum, own.maximum) == pytest.approx((before.minimum, before.maximum))
+    assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost, rel=1e-5)
+    if results.graded:
+        np.testing.assert_allclose([own.zone for own in read], [own.zone for own in drawn_sources(results)], rtol=1e-12)
+        assert {own.grade for own in read if own.zone} == set(results.graded.labels)
+
+
+def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
+    _, folder = drawn
+    script = folder / "again.py"
+    script.write_text(
+        "from tolalloc.study.definition import Study\n"
+        f'study = Study(name="again", tolerances={str(folder / "allocation.csv")!r})\n'
+    )
+    answered = CliRunner().invoke(app, ["check", str(script)])
+    assert answered.exit_code == 0, answered.output
+
+
+def test_the_tables_of_the_drawing_add_up(drawn):
+    results, _ = drawn
+    short, full = drawing_table(results), full_drawing_table(results)
+    assert short["cost [cost units]"].sum() == pytest.approx(results.chosen.cost)
+    assert short["cost before [cost units]"].sum() == pytest.approx(results.joint.baseline.cost)
+    assert short["share of variance [%]"].sum() == pytest.approx(100)
+    assert len(full) == len(results.space.errors.sources)
+    if not results.graded:
+        made = dict(zip(results.space.groups, results.chosen.processes, strict=True))
+        groups = {own.name: own.group for own in results.space.errors.active}
+        changed = short[short["locked"] == "no"]
+        assert all(row["process"] == made[groups[row["source"]]] for _, row in changed.iterrows())
