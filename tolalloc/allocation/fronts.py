@@ -9,7 +9,6 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto import Front, FrontEffort, from_genes, pareto_front, to_genes
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import Criterion, Ladders
@@ -94,15 +93,10 @@ def designs_around(
     return from_genes(lower + unit * (upper - lower))
 
 
-def _as_kept(side: Side, best: VerifiedDesign) -> Side:
-    """Return a limited side with at least the room that a design takes of it, where that one misses the limit."""
-    load = float(side.stack.load(best.design[:-2], best.design[-2:]))
-    return replace(side, stack=replace(side.stack, room=max(side.stack.room, load)))
-
-
 def searched_front(
     response: QuantileResponse,
     best: VerifiedDesign,
+    stacks: tuple[Stack, ...],
     exact: ConvexFront,
     seeds: SeedTree,
     effort: FrontEffort,
@@ -117,8 +111,9 @@ def searched_front(
     response
         Quantile of a design on the real kernel, common random numbers.
     best
-        The verified design; the limits of its other requirements, as far as it keeps them, must be kept by their local
-        models.
+        The verified design.
+    stacks
+        Its local models with at least the room that it takes; designs must keep those of the other requirements.
     exact
         Exact front of its models, from which the search starts.
     seeds
@@ -132,15 +127,18 @@ def searched_front(
     checkpoint
         Where the kernel's answers are kept.
     """
+    # A load that is its own room may lie beyond it by rounding.
+    others = zip(best.sides[1:], stacks[1:], strict=True)
+    sides = tuple(replace(side, stack=replace(own, room=own.room + 1e-9 * side.scale)) for side, own in others)
     return pareto_front(
         replace(response, spread=best.spread),
         LocalQuantile(side=best.sides[0]),
         designs_around(response.space, best.design, _SPAN, effort.designs, seeds.child("designs")),
-        exact.designs[spread_over(len(exact.designs), effort.points)],
+        np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),
         seeds.child("pareto"),
         effort,
         ladders=ladders,
         further=further,
-        sides=tuple(_as_kept(side, best) for side in best.sides[1:]),
+        sides=sides,
         checkpoint=checkpoint,
     )

@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from tolalloc.allocation.program.convex import ConvexProgram
+from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.trust_region import Programs, aimed
-from tolalloc.allocation.verification import VerifiedDesign
 
 _CORRECTIONS = 6
 """Largest number of corrections of the model of the peak-to-peak, on the kernel, for every pair of clearances [-]."""
+_CHOSEN_AGAIN = 2
+"""Corrections after which processes are chosen again [-]."""
 _SETTLED = 0.05
 """What the corrected model may still miss [arcsec]."""
 
@@ -83,7 +84,7 @@ def modification_trade(
     response
         Quantile of the peak-to-peak of a design on the real kernel, common random numbers.
     allocation
-        What was found with both clearances free; its local models and processes are used.
+        What was found with both clearances free; its local models are used.
     flank, radial
         Clearances, in ascending order [µm].
 
@@ -91,47 +92,61 @@ def modification_trade(
     -----
     Far from the chosen design its models are off, so for every pair the program is solved, the kernel runs the found
     design, and the room of the peak-to-peak is corrected by what the model missed; then again, until it misses
-    little. Other requirements keep their models.
+    little. Every pair has processes of its own. Other requirements keep their models.
     """
-    space, chosen, stacks = response.space, allocation.chosen, asked_stacks(allocation)
-    program = Programs(space, len(stacks)).of(space.process_positions(chosen.design))
-    known = float(response(chosen.design[np.newaxis]).values[0, 0])
-    pairs = [np.array([first, second]) for first in flank for second in radial]
-    found = [_corrected(program, stacks, pair, response, chosen, known) for pair in pairs]
+    search = _Search(response, allocation)
+    found = [search.cheapest(np.array([first, second])) for first in flank for second in radial]
     cost, missed = np.array(found).T
-    known_misses = missed[np.isfinite(missed)]
+    known = missed[np.isfinite(missed)]
     return ModificationTrade(
         flank=flank,
         radial=radial,
-        cost=cost.reshape(flank.size, radial.size) + space.locked_cost,
-        error=float(np.sqrt(np.mean(known_misses**2))) if known_misses.size else np.nan,
+        cost=cost.reshape(flank.size, radial.size) + response.space.locked_cost,
+        error=float(np.sqrt(np.mean(known**2))) if known.size else np.nan,
     )
 
 
-def _corrected(
-    program: ConvexProgram,
-    stacks: tuple[Stack, ...],
-    clearances: Float[np.ndarray, " 2"],
-    response: QuantileResponse,
-    chosen: VerifiedDesign,
-    known: float,
-) -> tuple[float, float]:
-    """Return the least cost at given clearances, and what the model last missed there [arcsec]."""
-    first, model, missed, cost, error = stacks[0], chosen.sides[0], 0.0, np.nan, np.inf
-    for _ in range(_CORRECTIONS):
-        corrected = (replace(first, room=first.room - missed), *stacks[1:])
-        bounds = {"shared_lower": clearances, "shared_upper": clearances}
-        solution = program.solve(corrected, **bounds)
-        # Where the model lets nothing keep the limits, it may still be the model that is wrong.
-        found = solution or program.least_infeasible(corrected, **bounds)
-        design = np.concatenate([found.zones, found.shared])
-        answered = response(design[np.newaxis])
-        if not answered.good[0]:
-            return np.nan, np.nan
-        rise = float(model.predicted(design) - model.predicted(chosen.design))
-        cost, before = solution.cost if solution else np.nan, error
-        error = float(answered.values[0, 0]) - known - rise - missed
-        if abs(error) <= _SETTLED:
-            break
-        missed += error / (1 - min(error / before, 0.0))  # the secant where corrections swing to and fro
-    return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)
+class _Search:
+    """The cheapest zones at given clearances, by the models of an allocation, corrected on the kernel."""
+
+    def __init__(self, response: QuantileResponse, allocation: Allocation) -> None:
+        self.response, self.space, self.chosen = response, response.space, allocation.chosen
+        self.stacks = asked_stacks(allocation)
+        self.programs = Programs(self.space, len(self.stacks))
+        self.known = float(response(self.chosen.design[np.newaxis]).values[0, 0])
+
+    def cheapest(self, clearances: Float[np.ndarray, " 2"]) -> tuple[float, float]:
+        """Return the least cost at given clearances, and what the model last missed there [arcsec]."""
+        first, model, missed, cost, error = self.stacks[0], self.chosen.sides[0], 0.0, np.nan, np.inf
+        processes = self.space.process_positions(self.chosen.design)
+        for number in range(_CORRECTIONS):
+            corrected = (replace(first, room=first.room - missed), *self.stacks[1:])
+            if number % _CHOSEN_AGAIN == 0:
+                processes = self._processes(corrected, clearances, processes)
+            program, bounds = self.programs.of(processes), {"shared_lower": clearances, "shared_upper": clearances}
+            solution = program.solve(corrected, **bounds)
+            # Where the model lets nothing keep the limits, it may still be the model that is wrong.
+            found = solution or program.least_infeasible(corrected, **bounds)
+            design = np.concatenate([found.zones, found.shared])
+            answered = self.response(design[np.newaxis])
+            if not answered.good[0]:
+                return np.nan, np.nan
+            rise = float(model.predicted(design) - model.predicted(self.chosen.design))
+            cost, before = solution.cost if solution else np.nan, error
+            error = float(answered.values[0, 0]) - self.known - rise - missed
+            if abs(error) > _SETTLED:
+                missed += error / (1 - min(error / before, 0.0))  # the secant where corrections swing to and fro
+            elif number >= _CHOSEN_AGAIN or not self.space.has_choices:
+                break
+            else:
+                error = np.inf  # the next processes are another curve
+        return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)
+
+    def _processes(
+        self, stacks: tuple[Stack, ...], clearances: Float[np.ndarray, " 2"], present: Int[np.ndarray, " group"]
+    ) -> Int[np.ndarray, " group"]:
+        """Return the cheapest processes at given clearances."""
+        if not self.space.has_choices:
+            return present
+        held = replace(self.space.shared, lower=clearances, upper=clearances)
+        return process_choice.allocate(replace(self.space.problem(stacks), shared=held)).processes

@@ -157,7 +157,7 @@ class Searches:
         exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
         response = replace(self.quantile(drawn.spread), space=space)
         searched, with_clearance = (
-            searched_front(response, drawn, exact, self._seeds("front"), effort, ladders, further, checkpoint)
+            searched_front(response, drawn, stacks, exact, self._seeds("front"), effort, ladders, further, checkpoint)
             for further in ((), (RADIAL_CLEARANCE,))
         )
         return Fronts(exact=exact, searched=searched[0], with_clearance=with_clearance[0], surrogate=searched[1])

@@ -139,7 +139,9 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
     with record.stage("front"):
         shares = np.linspace(*_FRONT, search.front.points)
         exact = exact_front(space, allocation.limit_stacks, allocation.limit, shares)
-        front, surrogate = searched_front(quantile, allocation.chosen, exact, seeds.child("front"), search.front)
+        front, surrogate = searched_front(
+            quantile, allocation.chosen, allocation.limit_stacks, exact, seeds.child("front"), search.front
+        )
     with record.stage("ranking"):
         sobol, stiffness = _ranking(prepared, kernel, allocation.baseline.sample, seeds)
         classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
