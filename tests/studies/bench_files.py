@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.studies.test_commands import tolalloc
+from tests.studies.command import tolalloc
 from tolalloc.identification.simulation import Bench, random_units, simulated_bench
 from tolalloc.measurement.folder import write_measurements
 from tolalloc.reducer.files import load_reducer

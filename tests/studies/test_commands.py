@@ -11,16 +11,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.studies.command import ROOT, refused, tolalloc
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import DATA
 
-ROOT = Path(__file__).parents[2]
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
-
-
-def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +47,6 @@ def set_cell(row: int, column: str, value: str):
         return frame
 
     return change
-
-
-def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
-    assert result.returncode == 2, result.stderr
-    assert "Traceback" not in result.stderr
-    sentence = result.stderr.strip()
-    assert sentence.splitlines()[-1].startswith("Error: ")
-    for word in words:
-        assert word in sentence, sentence
 
 
 def test_te_of_table_4():

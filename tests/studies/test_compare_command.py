@@ -7,7 +7,7 @@ import json
 import pandas as pd
 import pytest
 
-from tests.studies.test_commands import refused, tolalloc
+from tests.studies.command import refused, tolalloc
 
 SUMMARY = {
     "reducer": "RV-20E",

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import pytest
 
+from tests.studies.command import tolalloc
+
 SHOP = "process,tolerance [unit],unit,cost [cost units]\n"
-
-
-def tolalloc(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tolalloc.cli.main", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture

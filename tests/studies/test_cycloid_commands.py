@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.test_commands import ROOT, refused, tolalloc
+from tests.studies.command import ROOT, refused, tolalloc
 from tolalloc.reducer.files import PRESETS
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,16 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.command import ROOT, tolalloc
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND
-
-ROOT = Path(__file__).parents[2]
-
-
-def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from tests.studies.bench_files import (
     lines,
     value,
 )
-from tests.studies.test_commands import ROOT, refused, tolalloc
+from tests.studies.command import ROOT, refused, tolalloc
 from tolalloc.reducer.files import load_identified_stiffness
 
 

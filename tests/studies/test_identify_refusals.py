@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.studies.bench_files import NAME, Change, copied, files, identify, lines, text, value
-from tests.studies.test_commands import refused
+from tests.studies.command import refused
 from tolalloc.cli.main import main
 
 

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from tests.studies.command import ROOT, tolalloc
 from tolalloc.uncertainty.process_capability import load_process_capabilities
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
-ROOT = Path(__file__).parents[2]
 PEAK_TO_PEAK = "peak-to-peak transmission error"
 EFFORT = """effort=Effort(ranking=RankingEffort(
     units=2048, sobol=SobolEffort(start=256, limit=256, second_order=True), trajectories=8, moment_units=512,
     derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2, widened_units=500,
     permutations=200))"""
-
-
-def tolalloc(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tolalloc.cli.main", *(str(argument) for argument in arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
 
 
 def script_with(path: Path, **fields: object) -> Path:

@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.model import Weighted
 from tolalloc.allocation.cost.points import Points
+from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
 from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import app
-from tolalloc.report.allocation.calculator import cost_formula
+from tolalloc.report.allocation.cost_formulas import cost_formula
 from tolalloc.report.allocation.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
 from tolalloc.study.allocation import allocate_study
 from tolalloc.study.definition import Study
@@ -235,16 +236,62 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
     )
     assert [own.name for own in read] == [own.name for own in results.space.errors.sources]
     for own, before, after in zip(read, results.space.errors.sources, drawn_sources(results), strict=True):
-        # The file has four decimals of a micrometre; both limits of a size are rounded.
-        assert own.zone == pytest.approx(meant.get(own.name, 0.0), abs=1.01e-4 * UM)
+        # The file has five decimals of a micrometre.
+        assert own.zone == pytest.approx(meant.get(own.name, 0.0), abs=0.51e-5 * UM)
         assert own.locked == before.locked
         assert own.grade == after.grade
         assert own.group == before.group
         assert (own.minimum, own.maximum) == pytest.approx((before.minimum, before.maximum))
-    assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost, rel=1e-5)
+    paid_once = sum(made.change for made in results.drawn.made_by(results.chosen.design).values())
+    assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost - paid_once, rel=1e-9)
     if results.graded:
         np.testing.assert_allclose([own.zone for own in read], [own.zone for own in drawn_sources(results)], rtol=1e-12)
         assert {own.grade for own in read if own.zone} == set(results.graded.labels)
+
+
+def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
+    write_drawing(priced, tmp_path)
+    read = load_tolerance_table(tmp_path / "allocation.csv")
+    again = load_process_costs("rv20e", read)
+    made = priced.drawn.made_by(priced.chosen.design)
+    assert set(again) == set(made)
+    assert any(process.change > 0 for process in made.values())  # else nothing would be paid once
+    for before, drawn, after in zip(priced.space.errors.sources, drawn_sources(priced), read, strict=True):
+        if before.name not in made:
+            assert (after.process, after.cost) == (before.process, before.cost)
+            continue
+        chosen = made[before.name]
+        assert after.process == chosen.name
+        assert after.cost == pytest.approx(drawn.cost - chosen.change, rel=1e-9)
+        assert {own.name for own in again[before.name]} == {own.name for own in priced.space.processes[before.name]}
+        for own in again[before.name]:
+            was = next(process for process in priced.space.processes[before.name] if process.name == own.name)
+            assert (own.minimum, own.maximum) == pytest.approx((was.minimum, was.maximum), rel=1e-9)
+            zones = np.linspace(own.minimum, own.maximum, 5)
+            np.testing.assert_allclose(own.cost.value(zones), was.cost.value(zones), rtol=1e-9)
+            if own.name == chosen.name:
+                assert own.change == 0
+                assert float(own.total(np.array(drawn.zone))) == pytest.approx(drawn.cost - chosen.change, rel=1e-9)
+
+
+def test_a_table_without_a_process_cost_table_keeps_its_own_processes(graded, tmp_path):
+    kept = {"pin.diameter": "ground", "housing.pitch": "turned hard"}
+    sources = tuple(replace(own, process=kept.get(own.name, "")) for own in graded.space.errors.sources)
+    space = replace(graded.space, errors=replace(graded.space.errors, sources=sources))
+    write_drawing(replace(graded, space=space), tmp_path)
+    read = load_tolerance_table(tmp_path / "allocation.csv")
+    assert {own.name: own.process for own in read if own.process} == kept
+
+
+@pytest.mark.parametrize(("middle", "widest"), [(0.0, 2.4691), (1.76549, 2.46911), (-0.33333, 1.00007), (7.1, 0.3)])
+def test_a_zone_at_its_largest_is_not_refused_for_its_last_decimal(middle, widest, tmp_path):
+    pin = next(own for own in load_tolerance_table("rv20e_baseline") if own.name == "pin.diameter")
+    drawn = replace(pin, zone=widest * UM, middle=middle * UM, minimum=0.01 * UM, maximum=widest * UM)
+    table_frame([drawn]).to_csv(tmp_path / "table.csv", index=False)
+    (read,) = load_tolerance_table(tmp_path / "table.csv")
+    assert read.zone == pytest.approx(drawn.zone, rel=1e-12)
+    assert read.zone == read.maximum
+    assert read.middle == pytest.approx(drawn.middle, abs=0.51e-5 * UM)
 
 
 def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):

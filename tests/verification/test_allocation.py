@@ -200,8 +200,13 @@ def test_a_group_is_made_by_the_cheapest_process_that_all_its_members_have(prepa
 def test_members_without_a_common_process_are_refused(prepared):
     first, second, *_ = [source for source in prepared.space.errors.active if source.group == "disc bores"]
     coarse, fine = alternatives(first, 0.5)
-    with pytest.raises(InputError, match="no process in common"):
-        replace(prepared.space, processes={first.name: (coarse,), second.name: (fine,)})
+    bores = [source for source in prepared.space.errors.active if source.group == "disc bores"]
+    known = {source.name: (fine,) for source in bores}
+    with pytest.raises(InputError, match=rf"no process in common \({first.name} turned; {second.name} ground; "):
+        replace(prepared.space, processes={**known, first.name: (coarse,)})
+    del known[second.name]
+    with pytest.raises(InputError, match=rf"group disc bores: .* has no row for {second.name}, .* for all members or"):
+        replace(prepared.space, processes=known)
 
 
 def test_gradient_of_the_quantile_agrees_with_common_random_numbers(prepared):

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import tolalloc.allocation.robustness as module
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Weighted
 from tolalloc.allocation.cost.sampled import SumOfCosts
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.robustness import Robustness, Variant, robustness
+from tolalloc.allocation.robustness import COST_CHANGE, Robustness, Variant, robustness
 from tolalloc.allocation.search import SearchEffort, allocate
 from tolalloc.allocation.trade import ModificationTrade, modification_trade
 from tolalloc.allocation.verification import Verifier
@@ -182,6 +183,20 @@ def test_under_changed_costs_no_drawing_is_cheaper_than_the_one_made_for_them(pr
     assert 1e-4 < regrets.max() < 0.05
     assert all(variant.kept for variant in found.costs)
     np.testing.assert_allclose(found.optimum, allocation.inside.zones)
+
+
+def test_costs_are_changed_to_corners_and_what_is_lost_counts_locked_zones(monkeypatch, prepared, allocation):
+    corners, made = [], module._with_costs
+    monkeypatch.setattr(module, "_with_costs", lambda *given: corners.append(given[2]) or made(*given))
+    plain = robustness(verifier_of(prepared), allocation, (), SeedTree(1), 8).costs
+    assert set(np.unique(corners)) == {1 - COST_CHANGE, 1 + COST_CHANGE}
+    assert len({tuple(corner) for corner in corners}) == 8
+    locked = robustness(
+        verifier_of(prepared), replace(allocation, locked_cost=allocation.locked_cost + 100), (), SeedTree(1), 8
+    ).costs
+    for before, now in zip(plain, locked, strict=True):
+        assert now.cost == pytest.approx(before.cost + 100)
+        assert now.regret * now.cost == pytest.approx(before.regret * before.cost, abs=1e-9)
 
 
 def test_an_unchanged_kernel_changes_neither_what_is_kept_nor_the_cost(prepared, allocation):

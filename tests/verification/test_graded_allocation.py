@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tolalloc.allocation.design_space import ClearanceRange
-from tolalloc.allocation.grade.iso286 import grade_zone
-from tolalloc.allocation.grade.preferred import Series
+from tolalloc.allocation.grade.iso286 import grade_zones
+from tolalloc.allocation.grade.preferred import SERIES, ZONES
 from tolalloc.allocation.graded import AMOUNT_STEP, allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
@@ -74,12 +74,12 @@ def test_all_members_of_a_group_carry_one_zone_and_its_name(prepared, found):
         shared = {round(zones[own.name] / UM, 6) for own in members}
         assert len(shared) == 1
         zone = shared.pop() * UM
-        if labels[group] == "R10":
-            assert np.isclose(Series.R10.zones, zone, rtol=1e-9).any()
+        if labels[group] == SERIES:
+            assert np.isclose(ZONES, zone, rtol=1e-9).any()
         else:
-            assert zone == pytest.approx(grade_zone(members[0].nominal, labels[group]))
+            assert zone == pytest.approx(grade_zones(members[0].nominal)[labels[group]])
         assert all(own.minimum <= zone * (1 + 1e-9) and zone <= own.maximum * (1 + 1e-9) for own in members)
-    assert {"R10", "IT3"} <= set(labels.values())
+    assert {SERIES, "IT3"} <= set(labels.values())
 
 
 def test_every_choice_has_round_amounts_and_clearances_inside_their_range(found):

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_of, grade_zone, grade_zones
-from tolalloc.allocation.grade.ladder import Ladder, group_ladder, source_ladder
-from tolalloc.allocation.grade.preferred import Series, multiples
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_zones
+from tolalloc.allocation.grade.ladder import Ladder, group_ladder
+from tolalloc.allocation.grade.preferred import ZONES
+from tolalloc.exceptions import InputError
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.zones import Feature
@@ -58,84 +58,59 @@ def test_printed_zones_follow_the_formula_as_far_as_the_standard_rounds_them():
     assert np.median(apart[:, 6:]) < 0.02
 
 
-def test_the_grade_of_a_zone_is_the_coarsest_that_is_not_larger():
-    assert grade_of(30 * MM, 13 * UM) == "IT6"
-    assert grade_of(30 * MM, 20.9 * UM) == "IT6"
-    assert grade_of(30 * MM, 21 * UM) == "IT7"
-    assert grade_of(30 * MM, 0.59 * UM) is None
-    assert grade_of(30 * MM, 1.0) == "IT18"
-    for nominal in (2 * MM, 52 * MM, 500 * MM):
-        assert [grade_of(nominal, zone) for zone in grade_zones(nominal).values()] == [*GRADES]
-
-
 def test_sizes_outside_the_standard_are_refused():
     for nominal in (0.0, -1 * MM, 500.1 * MM, float("nan")):
         with pytest.raises(InputError, match="nominal"):
             grade_zones(nominal)
-    with pytest.raises(UnknownNameError, match="IT19"):
-        grade_zone(10 * MM, "IT19")
-    with pytest.raises(UnknownNameError, match="IT14"):
-        grade_zone(1 * MM, "IT14")
-    assert grade_zone(1 * MM, "IT13") == pytest.approx(140 * UM)
+    up_to_one = grade_zones(1 * MM)
+    assert (*up_to_one,) == tuple(grade for grade in GRADES if grade not in ("IT14", "IT15", "IT16", "IT17", "IT18"))
+    assert up_to_one["IT13"] == pytest.approx(140 * UM)
 
 
-@pytest.mark.parametrize("series", Series)
-def test_preferred_zones_grow_evenly_and_stay_near_the_geometric_series(series):
-    zones = series.zones / UM
-    steps = len(series.value)
-    exact = 0.1 * 10 ** (np.arange(4 * steps + 1) / steps)
-    assert zones[0] == pytest.approx(0.1)
-    assert zones[-1] == pytest.approx(1000)
-    assert np.abs(zones / exact - 1).max() < 0.025
-    assert np.all(np.diff(zones) > 0)
-
-
-def test_multiples_stay_inside_the_range_and_survive_decimal_numbers():
-    np.testing.assert_allclose(multiples(0.1, 0.3, 0.6), [0.3, 0.4, 0.5, 0.6])
-    np.testing.assert_allclose(multiples(0.5, -0.9, 1.2), [-0.5, 0.0, 0.5, 1.0])
-    with pytest.raises(InputError, match="min and max"):
-        multiples(0.5, 0.6, 0.9)
-    with pytest.raises(InputError, match="step"):
-        multiples(0.0, 0.6, 0.9)
+def test_preferred_zones_grow_evenly_and_stay_near_the_geometric_series():
+    exact = 0.1 * 10 ** (np.arange(41) / 10)
+    assert (ZONES / UM)[[0, 5, 10, -1]] == pytest.approx([0.1, 0.32, 1, 1000])
+    assert np.abs(ZONES / UM / exact - 1).max() < 0.025
+    assert np.all(np.diff(ZONES) > 0)
 
 
 def test_a_size_climbs_its_grades_and_anything_else_the_preferred_zones():
-    size = source_ladder(source(nominal=4 * MM))
+    size = group_ladder([source(nominal=4 * MM)])
     assert size.labels == ("IT1", "IT2", "IT3", "IT4", "IT5", "IT6", "IT7", "IT8")
     np.testing.assert_allclose(size.zones / UM, [1, 1.5, 2.5, 4, 5, 8, 12, 18])
     for other in (source(), source(feature=Feature.POSITION, nominal=4 * MM)):
-        ladder = source_ladder(other)
-        assert set(ladder.labels) == {"R10"}
+        ladder = group_ladder([other])
+        assert set(ladder.labels) == {"R′10"}
         assert len(ladder.labels) == len(ladder.zones)
         np.testing.assert_allclose(ladder.zones[[0, 5, -1]] / UM, [1, 3.2, 20])
-    assert len(source_ladder(source(), series=Series.R20).zones) > len(source_ladder(source()).zones)
 
 
-def test_zones_given_by_the_user_replace_every_other_ladder():
-    ladder = source_ladder(source(nominal=4 * MM), given=(7 * UM, 3 * UM, 7 * UM, 50 * UM))
-    np.testing.assert_allclose(ladder.zones / UM, [3, 7])
-    assert ladder.labels == ("given", "given")
-    for zones in ((), (0.0, 1 * UM), (float("nan"),)):
+def test_radii_have_no_grades():
+    table = {own.name: own for own in load_tolerance_table("rv20e_all_sources")}
+    labels = {name: set(group_ladder([table[name]]).labels) for name in table}
+    assert labels["housing.groove.radius"] == labels["each_pin.groove"] == {"R′10"}
+    graded = {name for name, own in labels.items() if own != {"R′10"}}
+    assert graded == {"pin.diameter", "each_pin.diameter"}
+
+
+def test_a_ladder_needs_increasing_zones():
+    for zones in ((), (0.0, 1 * UM), (float("nan"),), (2 * UM, 1 * UM)):
         with pytest.raises(InputError, match="zones"):
-            Ladder.given(zones)
+            Ladder(zones=np.array(zones, dtype=float), labels=("own",) * len(zones))
 
 
-def test_a_locked_source_keeps_its_zone():
-    assert source_ladder(source(locked=True, zone=5.3 * UM)).labels == ("locked",)
-    kept = source_ladder(source(locked=True, zone=5.3 * UM, grade="IT5"))
-    assert kept.labels == ("IT5",)
-    assert kept.zones[0] == 5.3 * UM
+def test_a_locked_source_has_no_ladder():
     with pytest.raises(InputError, match="locked"):
         group_ladder((source(locked=True), source()))
 
 
 def test_a_range_without_a_step_names_the_nearest_steps():
     with pytest.raises(InputError, match=r"source size: min and max.*\(2.6, 3.9\).*IT3 \(2.5 µm\) and IT4 \(4 µm\)"):
-        source_ladder(source(nominal=4 * MM, minimum=2.6 * UM, maximum=3.9 * UM, zone=3 * UM))
+        group_ladder([source(nominal=4 * MM, minimum=2.6 * UM, maximum=3.9 * UM, zone=3 * UM)])
     with pytest.raises(InputError, match=r"nearest of which are IT01 \(0.4 µm\)\."):
-        source_ladder(source(nominal=4 * MM, minimum=0.1 * UM, maximum=0.3 * UM, zone=0.2 * UM))
-    with pytest.raises(InputError, match=r"nearest of which are R10 \(1000 µm\)"):
-        source_ladder(source(minimum=1100 * UM, maximum=1200 * UM, zone=1150 * UM))
+        group_ladder([source(nominal=4 * MM, minimum=0.1 * UM, maximum=0.3 * UM, zone=0.2 * UM)])
+    with pytest.raises(InputError, match=r"nearest of which are R′10 \(1000 µm\)"):
+        group_ladder([source(minimum=1100 * UM, maximum=1200 * UM, zone=1150 * UM)])
 
 
 def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
@@ -147,6 +122,6 @@ def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
     alike = [source("a", nominal=20 * MM, group="g"), source("b", nominal=29 * MM, group="g")]
     assert group_ladder(alike).labels[:2] == ("IT0", "IT1")
     mixed = [source("a", nominal=20 * MM, group="g"), source("b", nominal=31 * MM, group="g")]
-    assert group_ladder(mixed).labels[0] == "R10"
+    assert group_ladder(mixed).labels[0] == "R′10"
     with pytest.raises(InputError, match="group g"):
         group_ladder([source("a", maximum=4 * UM, group="g"), source("b", minimum=4.5 * UM, group="g")])

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypervolume import hypervolume_ratio
 from stack_front import LOWER, UPPER, StackProblem, stack_problem
 
 from tolalloc.allocation.local_model import Side
@@ -19,7 +20,7 @@ from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE, DesignProblem
 from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
 from tolalloc.allocation.pareto.genetic import reference_directions, search
-from tolalloc.allocation.pareto.indicators import hypervolume_ratio, knee, nondominated, spread_over, thinned
+from tolalloc.allocation.pareto.indicators import knee, nondominated, spread_over, thinned
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.program import process_choice

@@ -46,10 +46,19 @@ def test_the_shipped_library_is_marked_as_assumed():
 
 
 def test_an_unknown_process_is_refused_with_the_nearest_ones(tmp_path):
-    with pytest.raises(UnknownNameError, match=r"t.csv, row 2 \(a\): process for feature size 'owm' .* are own"):
+    with pytest.raises(
+        UnknownNameError, match=r"row 2 \(a\): Cp is empty, and process for feature size 'owm' is .* own"
+    ):
         loaded(tmp_path, "owm")
     with pytest.raises(UnknownNameError, match="shipped process capability library"):
         load_process_capabilities("generik")
+
+
+def test_a_process_of_which_only_the_price_is_known_needs_its_own_cp(tmp_path):
+    row = loaded(tmp_path, "turned hard", "Cp", "1.1")
+    assert (row.process, row.cp, row.distribution, row.sorted) == ("turned hard", 1.1, Distribution.NORMAL, False)
+    with pytest.raises(UnknownNameError, match="Cp is empty"):
+        loaded(tmp_path, "turned hard", "shift", "0.1")
 
 
 BAD = [
@@ -61,7 +70,7 @@ BAD = [
     ("own,position,1.5,", "own,position,1.5,0.2", "shift must be 0 for feature position: 0.2"),
     ("own,position", "own,size", r"row 3 \(own\): process is 'own' for feature size for the second time"),
     ("note\n", "source\n", "column 'source' is not known; the nearest known are"),
-    ("Cp [-]", "shift [-]", "the column 'Cp' is missing"),
+    ("Cp [-]", "shift [-]", "the column 'shift' is there twice"),
     (",measured in the shop\nown,pos", ",\nown,pos", "note is missing"),
 ]
 
@@ -72,6 +81,11 @@ def test_bad_libraries_are_refused_in_one_sentence(text, wrong, sentence, tmp_pa
     with pytest.raises(TolallocError, match=sentence) as caught:
         loaded(tmp_path, "own", library=LIBRARY.replace(text, wrong))
     assert "\n" not in str(caught.value)
+
+
+def test_a_library_without_capabilities_is_refused(tmp_path):
+    with pytest.raises(InputError, match="the column 'Cp' is missing; needed are process, feature, Cp, note"):
+        loaded(tmp_path, "own", library="process,feature,note\nown,size,x\n")
 
 
 def test_a_truncated_library_is_refused(tmp_path):

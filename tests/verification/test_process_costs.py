@@ -17,9 +17,9 @@ from tolalloc.allocation.cost.closed_forms import (
 from tolalloc.allocation.cost.points_file import load_shop_points
 from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
 from tolalloc.allocation.cost.process_costs_file import load_process_costs, today
-from tolalloc.allocation.cost.rows import read_rows
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.exceptions import InputError, TolallocError
+from tolalloc.uncertainty.table_rows import read_rows
 from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.uncertainty.unit_file import DATA
 from tolalloc.uncertainty.zones import Feature
@@ -117,10 +117,11 @@ def test_without_a_factor_the_zone_of_the_tolerance_table_costs_what_that_table_
 
 def test_leaving_todays_process_costs_its_change_and_inspection_is_always_charged(tmp_path):
     rows = [f"disc1.pitch,{name},reciprocal,0,20,,,,,,0.7,0.1,shop" for name in ("hobbed", "ground")]
-    assert [process.change for process in loaded(tmp_path, *rows)["disc1.pitch"]] == pytest.approx([0.1, 0.8])
+    assert [process.change for process in loaded(tmp_path, *rows)["disc1.pitch"]] == pytest.approx([0.0, 0.7])
+    assert [cost_at(process, 10) for process in loaded(tmp_path, *rows)["disc1.pitch"]] == pytest.approx([2.1, 2.8])
     named = replace(PITCH, process="ground")
     changes = [process.change for process in loaded(tmp_path, *rows, sources=(named,))["disc1.pitch"]]
-    assert changes == pytest.approx([0.8, 0.1])
+    assert changes == pytest.approx([0.7, 0.0])
 
 
 def test_zones_are_those_that_process_and_tolerance_table_both_allow(tmp_path):
@@ -141,6 +142,26 @@ def test_shop_points_give_costs_and_the_zones_between_them(name, kind, tmp_path)
     assert isinstance(process.cost, kind)
     assert [cost_at(process, zone) for zone in (5, 10, 20, 30)] == pytest.approx([4.5, 2.5, 1.5, 1.2])
     assert (process.minimum, process.maximum) == pytest.approx((5e-6, 30e-6))
+
+
+@pytest.mark.parametrize("name", ["tabulated", "spline", "fitted"])
+def test_inspection_is_part_of_what_shop_points_cost(name, tmp_path):
+    rows = [f"disc1.pitch,hobbed,{name},,,,,shop.csv,,,,{inspection},shop" for inspection in ("", "0.3")]
+    without, inspected = (loaded(tmp_path, row)["disc1.pitch"][0] for row in rows)
+    for zone in (5, 8, 20):
+        assert cost_at(inspected, zone) == pytest.approx(cost_at(without, zone) + 0.3, rel=1e-9)
+    assert inspected.change == without.change == 0
+
+
+def test_the_cost_of_the_tolerance_table_is_that_of_its_process_alone(tmp_path):
+    rows = ["disc1.pitch,hobbed,reciprocal,,20,,,,,,,,shop", "disc1.pitch,ground,reciprocal,,,,,,,,,,shop"]
+    sentence = (
+        r"row 3 \(disc1.pitch\): factor is missing: the tolerance table's cost of disc1.pitch is that of 'hobbed'\."
+    )
+    with pytest.raises(InputError, match=sentence):
+        loaded(tmp_path, *rows)
+    named = loaded(tmp_path, *rows, sources=(replace(PITCH, process="ground"),))["disc1.pitch"]
+    assert float(named[1].total(np.asarray(PITCH.zone))) == pytest.approx(PITCH.cost, rel=1e-12)
 
 
 def test_a_fitted_row_takes_the_form_that_predicts_the_points(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, best_yield
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import InputError
 
 
 def test_the_mean_loss_is_that_of_sampled_units(generator):
@@ -45,12 +45,13 @@ def test_the_best_yield_is_the_one_with_the_cheapest_good_unit():
     np.testing.assert_array_equal(ladder.manufacturing, [cost(target) for target in yields])
 
 
-def test_yields_that_no_design_reaches_are_counted_and_never_chosen():
+def test_yields_that_no_design_reaches_have_no_price_and_are_never_chosen():
     ladder = best_yield(lambda target: 10.0 if target < 0.95 else nan, UnitPrice(scrap=100.0), (0.8, 0.9, 0.99))
-    assert (ladder.best, ladder.unreached) == (0.9, 1)
+    assert (ladder.best, ladder.priced.tolist()) == (0.9, [0.8, 0.9])
     assert np.isnan(ladder.prices[-1])
-    with pytest.raises(SolveError, match=r"No design reaches any of the yields 0.8, 0.9973\."):
-        best_yield(lambda target: nan, UnitPrice(), (0.8, 0.9973))
+    nothing = best_yield(lambda target: nan, UnitPrice(), (0.8, 0.9973))
+    assert nothing.priced.size == 0
+    assert np.isnan(nothing.best)
 
 
 def test_prices_that_make_no_sense_are_refused():

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.cost.process_costs_file import today
-from tolalloc.allocation.cost.sampled import SumOfCosts
+from tolalloc.allocation.cost.sampled import made_together
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
 from tolalloc.exceptions import InputError
 from tolalloc.reducer.design import CycloidStage, Modification
@@ -142,7 +142,7 @@ class DesignSpace:
         known = [{made.name for made in self._ways(source)} for source in members]
         common = [made.name for made in self._ways(members[0]) if all(made.name in names for names in known)]
         if not common:
-            raise InputError(f"group {group}: its members have no process in common; they are made alike.")
+            raise InputError(f"group {group}: {_apart(members, [self._ways(source) for source in members])}")
         found = [_joint(name, members, [self._made(source, name) for source in members]) for name in common]
         possible = tuple(process for process in found if process)
         if not possible:
@@ -177,7 +177,7 @@ class DesignSpace:
 
     def modification(self, design: Float[np.ndarray, " variable"]) -> Modification:
         """Return the modification amounts."""
-        return Modification.from_clearances(design[-2] * MICROMETRE, design[-1] * MICROMETRE, self.stage)
+        return Modification.from_clearances(float(design[-2]) * MICROMETRE, float(design[-1]) * MICROMETRE, self.stage)
 
     @cached_property
     def modification_by_clearance(self) -> Float[np.ndarray, "2 2"]:
@@ -215,6 +215,20 @@ class DesignSpace:
         return np.array([*([scale] * len(self.groups)), *(value / MICROMETRE for value in clearances)])
 
 
+def _apart(members: list[Source], ways: list[tuple[Process, ...]]) -> str:
+    """Return why members have no process in common, and what is allowed."""
+    unpriced = [source.name for source, own in zip(members, ways, strict=True) if own == (today(source),)]
+    if 0 < len(unpriced) < len(members):
+        return (
+            f"the process cost table has no row for {', '.join(unpriced)}, but for the other members; allowed are rows "
+            "for all members or for none."
+        )
+    made = "; ".join(
+        f"{source.name} {', '.join(process.name for process in own)}" for source, own in zip(members, ways, strict=True)
+    )
+    return f"its members have no process in common ({made}); allowed is one that all of them have."
+
+
 def _joint(name: str, members: list[Source], made: list[Process]) -> Process | None:
     """Return a process of a whole group over its scale, none if the members' ranges do not meet."""
     zones = [source.zone for source in members]
@@ -224,7 +238,7 @@ def _joint(name: str, members: list[Source], made: list[Process]) -> Process | N
         return None
     return Process(
         name=name,
-        cost=SumOfCosts(models=tuple(each.cost for each in made), ratios=tuple(zones)),
+        cost=made_together([each.cost for each in made], zones),
         minimum=minimum,
         maximum=maximum,
         change=sum(each.change for each in made),

@@ -21,8 +21,6 @@ AMOUNT_STEP = 0.5
 _STEPS_AROUND = 4
 """Steps to either side of the free amounts that are tried; the local models are trusted no further [-]."""
 _AMOUNTS = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
-_SECONDS = 20.0
-"""Longest time for one proof [s]."""
 _SETTLED = 0.2
 """Distance of a kept from a missed margin that ends the search [standard errors]."""
 _ROUNDING = 1e-9
@@ -185,7 +183,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     InputError
         A zone that has no step of its ladder between min and max, or none that a process holds.
     SolveError
-        Too many units failed, or no choice was found in the time allowed.
+        Too many units failed, or no choice was found within the nodes allowed.
 
     Notes
     -----
@@ -202,7 +200,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     while len(tried) <= steps and kept - missed > _SETTLED:
         margin = missed + 1.0 if kept == np.inf else (missed + kept) / 2
         stacks = _inside(tried[-1], tried, margin)
-        found = grid.problem(stacks).solve(_SECONDS)
+        found = grid.problem(stacks).solve()
         choice = grid.design(found) if found else grid.least_overloaded(stacks)
         judged = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
         if judged and not judged.met and found is None:
@@ -243,7 +241,7 @@ def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...
     stacks = tuple(
         replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried, margin=0.0)
     )
-    found = grid.problem(stacks).solve(_SECONDS)
+    found = grid.problem(stacks).solve()
     if found is None:
         raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
     return found

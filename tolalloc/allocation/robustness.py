@@ -17,7 +17,7 @@ from tolalloc.response.kernel import KernelResponse
 from tolalloc.uncertainty.seeds import SeedTree
 
 COST_CHANGE = 0.2
-"""Largest relative change of a cost that is tried [-]."""
+"""Relative change of every cost, up or down, in the corners that are tried [-]."""
 SAME = 0.1
 """Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
 
@@ -33,10 +33,10 @@ class Variant:
     scales
         Scale of every group [-].
     cost
-        Its cost under the changed assumption, without locked zones [cost units].
+        Its cost under the changed assumption, with the locked zones at their own [cost units].
     regret
-        What the chosen design costs more than this one under the changed assumption, as a share; not a number where
-        the chosen one no longer keeps a requirement [-].
+        What the undisturbed answer costs more than this one under the changed assumption, as a share of its cost; not
+        a number where the chosen design no longer keeps a requirement [-].
     kept
         Whether the chosen design still keeps every requirement, judged by the change that the same units show.
     """
@@ -59,7 +59,7 @@ class Robustness:
     optimum
         The undisturbed answer of the same local models [-].
     costs
-        Under costs changed at random by up to `COST_CHANGE` each.
+        In random corners of the box in which every cost changes by `COST_CHANGE`.
     stiffness
         With stiffnesses drawn from what is not known of them; none where a study names no identified stiffness.
     second_best
@@ -104,34 +104,38 @@ def robustness(
     seeds
         Node of the seed tree.
     draws
-        Random changes of the costs [-].
+        Random corners of the costs [-].
 
     Notes
     -----
-    Costs and processes are changed in the local models of the chosen design. A changed stiffness takes models of its
-    own around the same design. How far it moves what is compared with a limit is the difference between two kernels on
-    the same units, added to what the verification of the chosen design found: the luck of a second sample, often
-    smaller and so less able to show a yield, tells nothing of the stiffness.
+    Costs and processes are changed in the local models of the chosen design. What is lost is largest where every cost
+    is wrong by all of its change, so corners are drawn and not what lies between them. A changed stiffness takes models
+    of its own around the same design. How far it moves what is compared with a limit is the difference between two
+    kernels on the same units, added to what the verification of the chosen design found: the luck of a second sample,
+    often smaller and so less able to show a yield, tells nothing of the stiffness.
     """
-    problem, optimum = verifier.space.problem(allocation.stacks), allocation.inside
-    factors = 1 + COST_CHANGE * (2 * seeds.child("costs").generator().random((draws, len(problem.features))) - 1)
+    problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
+    corners = seeds.child("costs").generator().choice([1 - COST_CHANGE, 1 + COST_CHANGE], (draws, optimum.zones.size))
     return Robustness(
         groups=verifier.space.groups,
         optimum=optimum.zones,
-        costs=tuple(_with_costs(problem, optimum, own, f"costs {at}") for at, own in enumerate(factors, start=1)),
+        costs=tuple(
+            _with_costs(problem, optimum, own, locked, f"corner {at} of the costs")
+            for at, own in enumerate(corners, start=1)
+        ),
         stiffness=_with_kernels(verifier, allocation, kernels),
-        second_best=_second_best(problem, optimum),
+        second_best=_second_best(problem, optimum, locked),
     )
 
 
 def _with_costs(
-    problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarray, " group"], name: str
+    problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarray, " group"], locked: float, name: str
 ) -> Variant:
     """Return the answer where every cost is multiplied by a factor of its own."""
     features = tuple(_priced(feature, float(factor)) for feature, factor in zip(problem.features, factors, strict=True))
     changed = replace(problem, features=features)
     found = process_choice.allocate(changed)
-    cost, before = (changed.cost(own.zones, own.processes) for own in (found, optimum))
+    cost, before = (changed.cost(own.zones, own.processes) + locked for own in (found, optimum))
     return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1, kept=True)
 
 
@@ -167,15 +171,14 @@ def _with_kernel(verifier: Verifier, allocation: Allocation, undisturbed: Verifi
         stacks.append(replace(side.stack, room=loads[0] - (loads[1] - aimed.room) - rise))
     problem = verifier.space.problem(tuple(stacks))
     found = process_choice.allocate(problem)
-    cost = problem.cost(found.zones, found.processes)
+    cost = problem.cost(found.zones, found.processes) + allocation.locked_cost
+    before = optimum.cost + allocation.locked_cost
     kept = all(side.excess + rise <= 0 for side, rise in zip(chosen.sides, rises, strict=True))
     kept = kept and all(np.isfinite(side.value) for side in judged.sides)  # or so many units fail that none shows it
-    return Variant(
-        name=name, scales=found.zones, cost=cost, regret=optimum.cost / cost - 1 if kept else np.nan, kept=kept
-    )
+    return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1 if kept else np.nan, kept=kept)
 
 
-def _second_best(problem: AllocationProblem, optimum: Solution) -> Variant | None:
+def _second_best(problem: AllocationProblem, optimum: Solution, locked: float) -> Variant | None:
     """Return the answer made by the second-best set of processes, none if there is no other."""
     if all(len(feature.processes) == 1 for feature in problem.features):
         return None
@@ -190,7 +193,7 @@ def _second_best(problem: AllocationProblem, optimum: Solution) -> Variant | Non
     return Variant(
         name=f"second-best processes: {', '.join(changed)}",
         scales=found.zones,
-        cost=found.cost,
-        regret=optimum.cost / found.cost - 1,
+        cost=found.cost + locked,
+        regret=(optimum.cost + locked) / (found.cost + locked) - 1,
         kept=True,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import plotly.graph_objects as go
@@ -44,9 +45,14 @@ class HeatMap:
     values: Sequence[Sequence[float]]
 
     @property
+    def largest(self) -> float:
+        """The largest value; a cell without a number has no part in it."""
+        return max((value for row in self.values for value in row if isfinite(value)), default=0.0)
+
+    @property
     def texts(self) -> list[list[str]]:
         """The numbers in the cells."""
-        least = _SHOWN * max((value for row in self.values for value in row), default=0.0)
+        least = _SHOWN * self.largest
         return [[f"{value:.2f}" if value >= least else "" for value in row] for row in self.values]
 
 
@@ -82,7 +88,7 @@ def _(figure: HeatMap, path: Path) -> None:
         layout="constrained",
     )
     axes = canvas.subplots()
-    top = max((value for row in figure.values for value in row), default=1.0) or 1.0
+    top = figure.largest or 1.0
     drawn = axes.imshow(figure.values, cmap="Blues", aspect="auto", vmin=0.0, vmax=top)
     for row, texts in enumerate(figure.texts):
         for column, text in enumerate(texts):

@@ -24,7 +24,7 @@ from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import InputError
 from tolalloc.report.allocation.results import AllocationResults, Fronts
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.response.stiffness import StiffnessResponse
@@ -179,18 +179,11 @@ class Searches:
         return tuple(response.changed(change) for change in draws)
 
     def prices(self, joint: Allocation) -> YieldLadder | None:
-        """Return the price of a good unit over yield targets, if the study prices the others and one is in reach."""
+        """Return the price of a good unit over yield targets, if the study prices the others."""
         price = self.prepared.study.unit_price
         if price is None:
             return None
-        try:
-            return best_yield(
-                lambda target: cost_at_yield(self.prepared.space, joint, target), price, self.effort.yields
-            )
-        except SolveError:
-            if joint.chosen.met:
-                raise
-            return None  # the limits are out of reach at any yield, and the answer says which and by how much
+        return best_yield(lambda target: cost_at_yield(self.prepared.space, joint, target), price, self.effort.yields)
 
     def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SobolIndices:
         """Return the indices of the peak-to-peak at the zones and the modification of a design."""

@@ -9,18 +9,17 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record, shipped_or_path, validated
+from tolalloc.files import shipped_or_path
 from tolalloc.uncertainty.distributions import Distribution
-from tolalloc.uncertainty.table_file import read_text_table, split_header
-from tolalloc.uncertainty.tolerance_cells import require_shape, typed_cells
+from tolalloc.uncertainty.table_rows import TableRow, read_rows
+from tolalloc.uncertainty.tolerance_cells import require_shape
 from tolalloc.uncertainty.unit_file import DATA
 from tolalloc.uncertainty.zones import Feature
 
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
-REQUIRED = ("process", "feature", "Cp", "note")
 
 
-class ProcessCapability(Record):
+class ProcessCapability(TableRow):
     """One row: a process and a feature; the fields are the column headers without their unit."""
 
     process: Annotated[str, Field(min_length=1)]
@@ -63,19 +62,8 @@ def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".processes.csv", "process capability library")
-    table = read_text_table(path)
-    headers = tuple(split_header(header)[0] for header in table.headers)
-    for header in headers:
-        if header not in ProcessCapability.model_fields:
-            raise UnknownNameError.among(path, "column", header, ProcessCapability.model_fields)
-    for header in REQUIRED:
-        if header not in headers:
-            raise InputError(f"{path}: the column {header!r} is missing; needed are {', '.join(REQUIRED)}.")
     found: dict[tuple[str, Feature], ProcessCapability] = {}
-    for number, texts in zip(table.rows, table.cells, strict=True):
-        row = dict(zip(headers, texts, strict=True))
-        place = f"{path}, row {number} ({row['process'] or 'no process'})"
-        capability = validated(ProcessCapability, typed_cells(ProcessCapability, row, place), place)
+    for place, capability in read_rows(path, ProcessCapability, "process"):
         key = capability.process, capability.feature
         if key in found:
             raise InputError(
@@ -91,15 +79,21 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
     Raises
     ------
     UnknownNameError
-        The library has no such process for the row's feature.
+        The library has no such process for the row's feature, and the row does not state Cp either.
+
+    Notes
+    -----
+    A process may be known to a process cost table alone. Its row states Cp, so nothing has to be looked up.
     """
     process, feature = cells.get("process"), cells.get("feature")
     if process is None or feature is None:
         return dict(cells)
     capability = capabilities.get((str(process), Feature(str(feature))))
     if capability is None:
+        if "Cp" in cells:
+            return dict(cells)
         known = [name for name, kind in capabilities if kind == feature]
-        raise UnknownNameError.among(place, f"process for feature {feature}", str(process), known)
+        raise UnknownNameError.among(place, f"Cp is empty, and process for feature {feature}", str(process), known)
     taken = capability.cells
     if cells.get("distribution", capability.distribution) is not capability.distribution:
         del taken["shape"]  # it belongs to the library's distribution

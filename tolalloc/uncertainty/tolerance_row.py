@@ -19,6 +19,9 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 LARGEST_ZONE = 200.0
 """Largest zone that is believed [µm]; a metre typed for a millimetre is far above it."""
 
+_DECIMALS = 12
+"""Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""
+
 UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
 
 
@@ -52,9 +55,14 @@ class ToleranceRow(Record):
     over: Annotated[float | None, Field(gt=0, le=1000)] = None
     note: str = ""
 
+    @property
+    def zone(self) -> float:
+        """Full width; a difference of two decimal numbers is no decimal number [unit]."""
+        return round(self.plus - self.minus, _DECIMALS)
+
     @model_validator(mode="after")
     def _zone_makes_sense(self) -> ToleranceRow:
-        zone, factor = self.plus - self.minus, UNITS[self.unit]
+        zone, factor = self.zone, UNITS[self.unit]
         if not 0 <= zone * factor <= LARGEST_ZONE:
             raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
         if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
@@ -128,7 +136,7 @@ class ToleranceRow(Record):
             name=self.id,
             part=self.part,
             feature=self.feature,
-            zone=(self.plus - self.minus) * factor,
+            zone=self.zone * factor,
             middle=(self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0,
             nominal=self.nominal * MILLIMETRE,
             minimum=self.min * factor,
@@ -160,6 +168,6 @@ class ToleranceRow(Record):
         return load_measured_parts(
             (folder / self.measured).resolve(),
             self.feature,
-            (self.measured_zone or self.plus - self.minus) * factor,
+            (self.measured_zone or self.zone) * factor,
             (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0,
         )

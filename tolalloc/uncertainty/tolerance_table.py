@@ -23,6 +23,9 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 SMALLEST_KEPT = 0.01
 """Smallest share that sorting may leave of all parts [-]."""
 
+DECIMALS = 5
+"""Decimals of a micrometre that a written table has: half a zone of four decimals [-]."""
+
 HEADERS = {
     "id": "id",
     "part": "part",
@@ -115,16 +118,16 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.Dat
     """
     rows = []
     for source in sources:
-        zone, middle = source.zone / MICROMETRE, source.middle / MICROMETRE
-        is_size = source.feature is Feature.SIZE
+        zone, middle = round(source.zone / MICROMETRE, DECIMALS), source.middle / MICROMETRE
+        plus = round(middle + zone / 2, DECIMALS) if source.feature is Feature.SIZE else zone
         rows.append(
             {
                 "id": source.name,
                 "part": source.part,
                 "feature": source.feature.value,
                 "nominal": source.nominal / MILLIMETRE,
-                "plus": round(middle + zone / 2 if is_size else zone, 4),
-                "minus": round(middle - zone / 2 if is_size else 0.0, 4),
+                "plus": plus,
+                "minus": round(plus - zone, DECIMALS),
                 "unit": "µm",
                 "distribution": source.distribution.value,
                 "Cp": source.cp,
@@ -137,9 +140,9 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.Dat
                 "process": source.process,
                 "group": source.group,
                 "locked": "yes" if source.locked else "no",
-                "min": round(source.minimum / MICROMETRE, 4),
-                "max": round(source.maximum / MICROMETRE, 4),
-                "cost": round(source.cost, 6),
+                "min": round(source.minimum / MICROMETRE, DECIMALS),
+                "max": round(source.maximum / MICROMETRE, DECIMALS),
+                "cost": round(source.cost, 12),
                 "grade": source.grade,
                 "spectrum": source.written_spectrum or spectrum_text(source.spectrum),
                 "each": source.each,

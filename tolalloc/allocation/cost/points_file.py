@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.rows import TableRow, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.uncertainty.table_rows import TableRow, read_rows
 from tolalloc.uncertainty.tolerance_row import LARGEST_ZONE, UNITS
 from tolalloc.uncertainty.zones import Feature
 

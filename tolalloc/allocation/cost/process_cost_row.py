@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, ClassVar
 
@@ -20,10 +21,10 @@ from tolalloc.allocation.cost.closed_forms import (
 from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel
 from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.rows import TableRow
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.exceptions import InputError
 from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.table_rows import TableRow
 from tolalloc.uncertainty.tolerance_row import LARGEST_ZONE
 from tolalloc.units import MICROMETRE
 
@@ -102,12 +103,13 @@ class ProcessCostRow(TableRow):
         return self
 
     def cost(self, source: Source, points: Points | None, place: str) -> CostModel:
-        """Return the cost by the zone in micrometres.
+        """Return the cost with the inspection by the zone in micrometres.
 
         Parameters
         ----------
         source
-            The feature; a row without factor gives it the cost of the tolerance table at the table's zone.
+            The feature; a row without factor, which is that of the tolerance table's process, gives it the cost of that
+            table at its zone.
         points
             Points of the row's process, where the model is made from them [µm].
         place
@@ -119,22 +121,27 @@ class ProcessCostRow(TableRow):
             The fixed cost and the inspection are more than the cost of the tolerance table, or points rise.
         """
         if points is not None:
-            if self.model is CostCurve.FITTED:
-                return best_fit(points).model
-            return Tabulated(points) if self.model is CostCurve.TABULATED else Spline(points)
-        fixed = self.fixed or 0.0
+            return self._through(points)
+        fixed = (self.fixed or 0.0) + self.inspection
         if self.factor is not None:
             return self._closed_form(fixed, self.factor)
-        falling = source.cost - fixed - self.inspection
+        falling = source.cost - fixed
         if falling <= 0:
             raise InputError.at(
                 place,
                 "fixed and inspection without a factor",
-                fixed + self.inspection,
+                fixed,
                 f"less than {source.cost:g}, the cost of {source.name} in the tolerance table",
             )
         unit = self._closed_form(0.0, 1.0).value(np.asarray(source.zone / MICROMETRE))
         return self._closed_form(fixed, falling / float(unit))
+
+    def _through(self, points: Points) -> CostModel:
+        if self.model is CostCurve.FITTED:
+            model = best_fit(points).model
+            return replace(model, fixed=model.fixed + self.inspection)
+        inspected = replace(points, costs=tuple(cost + self.inspection for cost in points.costs))
+        return Tabulated(inspected) if self.model is CostCurve.TABULATED else Spline(inspected)
 
     def _closed_form(self, fixed: float, factor: float) -> ClosedForm:
         if self.model is CostCurve.RECIPROCAL_SQUARED:

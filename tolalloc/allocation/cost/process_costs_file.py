@@ -12,10 +12,10 @@ from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.cost.points_file import ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
-from tolalloc.allocation.cost.rows import read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
 from tolalloc.uncertainty.sources import Source
+from tolalloc.uncertainty.table_rows import read_rows
 from tolalloc.uncertainty.unit_file import DATA
 from tolalloc.units import MICROMETRE
 
@@ -84,6 +84,11 @@ def _processes(
     if source.process and source.process not in names:
         raise UnknownNameError.among(path, f"process of {source.name} in the tolerance table,", source.process, names)
     now = source.process or names[0]
+    for place, row in rows:
+        if not (row.factor or row.points or row.process == now):
+            raise InputError(
+                f"{place}: factor is missing: the tolerance table's cost of {source.name} is that of {now!r}."
+            )
     processes = [_process(source, place, row, shops, 0.0 if row.process == now else row.change) for place, row in rows]
     left = tuple(process for process in processes if process is not None)
     if not left:
@@ -109,5 +114,5 @@ def _process(
         cost=row.cost(source, points, place).rescaled(1 / MICROMETRE),
         minimum=minimum,
         maximum=maximum,
-        change=change + row.inspection,
+        change=change,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
+from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.convex_slopes import ROUNDING, convex_slopes
 from tolalloc.allocation.cost.model import CostModel
 from tolalloc.allocation.cost.points import Points
@@ -138,6 +140,25 @@ class Spline:
     def rescaled(self, unit: float) -> Spline:
         """Return the same cost as a function of zone / unit."""
         return Spline(self.points.rescaled(unit))
+
+
+def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostModel:
+    """Return the cost of several callouts that change together, as simple as it can be said.
+
+    Parameters
+    ----------
+    models
+        Cost of each callout as a function of its own zone.
+    ratios
+        Zone of each callout over the common variable [unit of the zone per unit of the variable].
+    """
+    own = [model.rescaled(ratio) for model, ratio in zip(models, ratios, strict=True)]
+    reciprocal = [model for model in own if isinstance(model, Reciprocal)]
+    if len(reciprocal) == len(own):
+        return Reciprocal(
+            fixed=sum(model.fixed for model in reciprocal), factor=sum(model.factor for model in reciprocal)
+        )
+    return SumOfCosts(models=tuple(models), ratios=tuple(ratios))
 
 
 @dataclass(frozen=True, kw_only=True)

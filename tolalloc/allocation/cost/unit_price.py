@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +144,7 @@ class YieldLadder:
     targets
         Yield targets [-].
     manufacturing
-        Cheapest unit made to each target; not a number where no design reaches it [cost units].
+        Cheapest unit made to each target; not a number where no design is shown to reach it [cost units].
     prices
         Price of a good unit [cost units].
     """
@@ -155,13 +155,13 @@ class YieldLadder:
 
     @property
     def best(self) -> float:
-        """Yield target with the cheapest good unit [-]."""
-        return float(self.targets[np.nanargmin(self.prices)])
+        """Yield target with the cheapest good unit, not a number where no target has a price [-]."""
+        return float(self.targets[np.nanargmin(self.prices)]) if self.priced.size else np.nan
 
     @property
-    def unreached(self) -> int:
-        """Number of targets that no design reaches [-]."""
-        return int(np.isnan(self.manufacturing).sum())
+    def priced(self) -> Float[np.ndarray, " known"]:
+        """Yield targets that a design reaches and that the units can show [-]."""
+        return np.asarray(self.targets[~np.isnan(self.prices)])
 
 
 def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields: Sequence[float]) -> YieldLadder:
@@ -180,8 +180,6 @@ def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields
     ------
     InputError
         There is no target, or one is no share.
-    SolveError
-        No design reaches any of the targets.
     """
     if not yields:
         raise InputError.at("price of a unit", "yields", list(yields), "one target or more")
@@ -189,6 +187,4 @@ def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields
         price.good_share(target)
     manufacturing = np.array([cost_of_yield(target) for target in yields], dtype=float)
     prices = [price.of_good_unit(float(cost), target) for cost, target in zip(manufacturing, yields, strict=True)]
-    if np.isnan(manufacturing).all():
-        raise SolveError(f"No design reaches any of the yields {', '.join(f'{target:.4g}' for target in yields)}.")
     return YieldLadder(targets=np.array(yields, dtype=float), manufacturing=manufacturing, prices=np.array(prices))

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 SIZE_STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
@@ -92,43 +92,3 @@ def grade_zones(nominal: float) -> dict[str, float]:
         zones[f"IT{number}"] = 10 * zones[f"IT{number - 5}"]
     too_small = nominal <= MILLIMETRE * (1 + _ROUNDING)
     return {grade: zone for grade, zone in zones.items() if not (too_small and grade in _COARSE)}
-
-
-def grade_zone(nominal: float, grade: str) -> float:
-    """Return the zone of a grade [m].
-
-    Parameters
-    ----------
-    nominal
-        Nominal size [m].
-    grade
-        Name of the grade, such as IT6.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The size is outside 0 to 500 mm; it has no such grade.
-    """
-    zones = grade_zones(nominal)
-    if grade not in zones:
-        raise UnknownNameError.among(f"ISO 286-1, {nominal / MILLIMETRE:g} mm", "grade", grade, zones)
-    return zones[grade]
-
-
-def grade_of(nominal: float, zone: float) -> str | None:
-    """Return the coarsest grade that is not larger than a zone, None below IT01.
-
-    Parameters
-    ----------
-    nominal
-        Nominal size [m].
-    zone
-        The zone [m].
-
-    Raises
-    ------
-    InputError
-        The size is outside 0 to 500 mm.
-    """
-    kept = [grade for grade, own in grade_zones(nominal).items() if own <= zone * (1 + _ROUNDING)]
-    return kept[-1] if kept else None

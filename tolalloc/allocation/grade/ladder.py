@@ -9,11 +9,15 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.grade.iso286 import grade_zones, size_step
-from tolalloc.allocation.grade.preferred import Series
+from tolalloc.allocation.grade.preferred import SERIES, ZONES
 from tolalloc.exceptions import InputError
 from tolalloc.uncertainty.sources import Source
 from tolalloc.uncertainty.zones import Feature
 from tolalloc.units import MICROMETRE
+
+RADII = ("radius", "groove")
+"""Last part of the name of a size that is a radius. ISO 286 grades diameters and widths; read for the
+number of a radius, a grade would be one of a feature half as large."""
 
 _ROUNDING = 1e-9
 """What a zone may lose on its way through a table [-]."""
@@ -28,7 +32,7 @@ class Ladder:
     zones
         The zones, tightest first [m].
     labels
-        Where each comes from: a grade, a series of preferred numbers, ``given``, or ``locked``.
+        Where each comes from: a grade, or the series of preferred numbers.
 
     Raises
     ------
@@ -46,27 +50,15 @@ class Ladder:
             raise InputError.at("ladder", "zones [µm]", listed, "one number above 0 or more, each above the last")
 
     @classmethod
-    def given(cls, zones: Sequence[float]) -> Ladder:
-        """Return the ladder of a user's own zones.
-
-        Parameters
-        ----------
-        zones
-            The zones in any order [m].
-        """
-        ordered = np.unique(np.array(zones, dtype=float))
-        return cls(zones=ordered, labels=("given",) * ordered.size)
-
-    @classmethod
     def grades(cls, nominal: float) -> Ladder:
         """Return the standard tolerance grades of a nominal size [m]."""
         zones = grade_zones(nominal)
         return cls(zones=np.array([*zones.values()]), labels=(*zones,))
 
     @classmethod
-    def preferred(cls, series: Series) -> Ladder:
-        """Return the zones of a series of preferred numbers."""
-        return cls(zones=series.zones, labels=(series.name,) * series.zones.size)
+    def preferred(cls) -> Ladder:
+        """Return the preferred numbers."""
+        return cls(zones=ZONES, labels=(SERIES,) * ZONES.size)
 
     def within(self, minimum: float, maximum: float, place: str) -> Ladder:
         """Return the steps inside a range.
@@ -95,39 +87,13 @@ class Ladder:
         return Ladder(zones=self.zones[inside], labels=labels)
 
 
-def source_ladder(source: Source, given: Sequence[float] = (), series: Series = Series.R10) -> Ladder:
-    """Return the ladder of one source.
-
-    Parameters
-    ----------
-    source
-        The source; a locked one keeps its zone.
-    given
-        The user's own zones in place of grades and preferred numbers [m].
-    series
-        Preferred numbers for what is not a size with a nominal value.
-
-    Raises
-    ------
-    InputError
-        The source's range holds no step.
-    """
-    if source.locked:
-        return Ladder(zones=np.array([source.zone]), labels=(source.grade or "locked",))
-    return group_ladder((source,), given, series)
-
-
-def group_ladder(sources: Sequence[Source], given: Sequence[float] = (), series: Series = Series.R10) -> Ladder:
+def group_ladder(sources: Sequence[Source]) -> Ladder:
     """Return the common ladder of sources that share one tolerance.
 
     Parameters
     ----------
     sources
         Sources of one group, none of them locked.
-    given
-        The user's own zones in place of grades and preferred numbers [m].
-    series
-        Preferred numbers for what is not a size with a nominal value.
 
     Raises
     ------
@@ -145,12 +111,14 @@ def group_ladder(sources: Sequence[Source], given: Sequence[float] = (), series:
     locked = [source.name for source in sources if source.locked]
     if locked:
         raise InputError.at(place, "locked members", locked, "none")
-    is_graded = all(source.feature is Feature.SIZE and source.nominal > 0 for source in sources)
-    if given:
-        ladder = Ladder.given(given)
-    elif is_graded and len({size_step(source.nominal) for source in sources}) == 1:
+    if all(_has_grades(source) for source in sources) and len({size_step(source.nominal) for source in sources}) == 1:
         ladder = Ladder.grades(max(source.nominal for source in sources))
     else:
-        ladder = Ladder.preferred(series)
+        ladder = Ladder.preferred()
     minimum, maximum = max(source.minimum for source in sources), min(source.maximum for source in sources)
     return ladder.within(minimum, maximum, place)
+
+
+def _has_grades(source: Source) -> bool:
+    """Return whether a source is a size that ISO 286 has grades for."""
+    return source.feature is Feature.SIZE and source.nominal > 0 and source.name.rsplit(".", 1)[-1] not in RADII

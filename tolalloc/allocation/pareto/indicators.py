@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from pymoo.indicators.hv import HV
 from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
-
-REFERENCE = 1.1
-"""Where the hypervolume ends in every objective: ideal at 0, nadir at 1, so the ends of the front count too [-]."""
 
 
 def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
@@ -46,31 +42,6 @@ def normalised(
     """Return losses where 0 is the best and 1 the worst value on a front [-]."""
     ideal, nadir = front.min(axis=0), front.max(axis=0)
     return np.asarray((losses - ideal) / np.where(nadir > ideal, nadir - ideal, 1.0))
-
-
-def hypervolume_ratio(
-    losses: Float[np.ndarray, "design objective"], exact: Float[np.ndarray, "point objective"]
-) -> float:
-    """Return the hypervolume of a front over that of the exact one [-].
-
-    Parameters
-    ----------
-    losses
-        Losses of the front, dominated designs allowed.
-    exact
-        Losses of points on the exact front, its ends among them.
-
-    Notes
-    -----
-    The volume of a few exact points is a staircase below the exact front's own, so a denser front may exceed 1.
-
-    References
-    ----------
-    Zitzler & Thiele 1999, IEEE Trans. Evol. Comput. 3:257–271; reference point of Ishibuchi et al. 2018, Evol.
-    Comput. 26:411–440.
-    """
-    volume = HV(ref_point=np.full(exact.shape[1], REFERENCE))
-    return float(volume(normalised(losses, exact)) / volume(normalised(exact, exact)))
 
 
 def knee(losses: Float[np.ndarray, "design objective"]) -> int:

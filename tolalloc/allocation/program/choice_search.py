@@ -11,7 +11,6 @@ finitely many others.
 
 from __future__ import annotations
 
-import time
 import warnings
 from dataclasses import dataclass, replace
 
@@ -58,33 +57,34 @@ class Choice:
     bound: float
 
 
-def best_choice(program: MultipleChoice, seconds: float) -> Choice | None:
+def best_choice(program: MultipleChoice, most_nodes: int) -> Choice | None:
     """Return the best choice, None where no choice is allowed.
 
     Parameters
     ----------
     program
         The groups and their choices.
-    seconds
-        Largest time, after which the best allowed choice so far is returned with its bound [s].
+    most_nodes
+        Nodes of the mixed-integer programs together, after which the best allowed choice so far is returned with its
+        bound [-].
 
     Raises
     ------
     SolveError
-        No allowed choice was found in this time, or the solver gave up.
+        No allowed choice was found within these nodes, or the solver gave up.
     """
     kept = program.undominated & program.possible
     if np.unique(program.group[kept]).size < program.starts.size:
         return None
-    found = _Search(program.restricted(kept), seconds).run()
+    found = _Search(program.restricted(kept), most_nodes).run()
     return found and replace(found, taken=np.flatnonzero(kept)[found.taken])
 
 
 class _Search:
     """What is known of the best choice of a program."""
 
-    def __init__(self, program: MultipleChoice, seconds: float) -> None:
-        self.program, self.rows, self.until = program, ChoiceRows(program), time.monotonic() + seconds
+    def __init__(self, program: MultipleChoice, most_nodes: int) -> None:
+        self.program, self.rows, self.nodes_left = program, ChoiceRows(program), most_nodes
         self.best: Int[np.ndarray, " group"] | None = None
         self.cost, self.bound = np.inf, -np.inf
 
@@ -94,7 +94,8 @@ class _Search:
         lift = self._lift(multipliers)
         self._offer(exchanged(self.program, values))
         kept = self._divide(self.bound + lift <= self.cost + RELAXED * COSTS)
-        while True:
+        status = cp.USER_LIMIT
+        while self.nodes_left > 0:
             taken, proven, status = self._decide(kept)
             self.bound = max(self.bound, min(proven, self.cost))
             if status == cp.INFEASIBLE:
@@ -104,7 +105,7 @@ class _Search:
                 break
             self.rows.exclude(taken)
         if self.best is None and status != cp.INFEASIBLE:
-            raise SolveError("No choice that keeps every stack was found in the time allowed; allow more seconds.")
+            raise SolveError("No choice that keeps every stack was found within the nodes allowed; allow more of them.")
         if self.best is None:
             return None
         cost = float(self.program.cost[self.best].sum())
@@ -187,17 +188,19 @@ class _Search:
             "mip_rel_gap": 0.0,
             "mip_abs_gap": 0.0,
             "presolve": "off",  # the rows are few and tight already
-            "time_limit": max(self.until - time.monotonic(), 0.01),
+            "mip_max_nodes": self.nodes_left,
         }
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Solution may be inaccurate")  # out of time, which the status says
+            warnings.filterwarnings("ignore", "Solution may be inaccurate")  # out of nodes, which the status says
             try:
                 program.solve(solver=cp.HIGHS, highs_options=options)
             except cp.SolverError as error:
                 raise SolveError(f"The mixed-integer program of the allocation was given up: {error}") from error
+        stats = program.solver_stats.extra_stats
+        self.nodes_left -= max(int(stats.mip_node_count), 1)
         if z.value is None:
             return None, -np.inf, program.status
         starts = np.searchsorted(columns, rows.program.starts)
         parts = np.split(z.value, starts[1:])
         taken = columns[starts + np.array([part.argmax() for part in parts])]
-        return taken, float(program.solver_stats.extra_stats.mip_dual_bound), program.status
+        return taken, float(stats.mip_dual_bound), program.status

@@ -15,6 +15,9 @@ from tolalloc.allocation.program.multiple_choice import MultipleChoice
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
 from tolalloc.exceptions import InputError
 
+MOST_NODES = 10_000
+"""Nodes of branch and bound for one proof, a limit that is the same on every machine [-]."""
+
 _ROUNDING = 1e-9
 """What a zone or a value of a grid may lose between units [-]."""
 
@@ -203,50 +206,20 @@ class DiscreteProblem:
             room=np.array([stack.room for stack in self._stacks]) / self._scales,
         )
 
-    def solve(self, seconds: float = 60.0) -> DiscreteSolution | None:
+    def solve(self, most_nodes: int = MOST_NODES) -> DiscreteSolution | None:
         """Return the cheapest allowed choice, None where none is allowed.
 
         Parameters
         ----------
-        seconds
-            Largest time, after which the best choice so far is returned with its bound [s].
+        most_nodes
+            Nodes of branch and bound, after which the best choice so far is returned with its bound [-].
 
         Raises
         ------
         SolveError
-            No allowed choice was found in this time.
+            No allowed choice was found within these nodes.
         """
-        return self._solution(best_choice(self._program, seconds))
-
-    def second_best(self, best: DiscreteSolution, seconds: float = 60.0) -> DiscreteSolution | None:
-        """Return the cheapest allowed choice that makes at least one feature by another process, None without one.
-
-        Parameters
-        ----------
-        best
-            The choice whose processes are not to be repeated as a whole.
-        seconds
-            Largest time, after which the best choice so far is returned with its bound [s].
-
-        Raises
-        ------
-        SolveError
-            No allowed choice was found in this time.
-        """
-        program, features = self._program, len(self.options)
-        same = np.zeros(program.cost.size)
-        same[: len(self._flat)] = np.repeat(best.processes, [len(options) for options in self.options]) == [
-            option.process for option in self._flat
-        ]
-        # Counted as one stack more: as many features as there are, less one, may keep their process.
-        counted = MultipleChoice(
-            group=program.group,
-            cost=program.cost,
-            adding=np.vstack([program.adding, same]),
-            squares=np.vstack([program.squares, np.zeros_like(same)]),
-            room=np.append(program.room, features - 1.0),
-        )
-        return self._solution(best_choice(counted, seconds))
+        return self._solution(best_choice(self._program, most_nodes))
 
     def least_overloaded(self) -> DiscreteSolution:
         """Return the choice whose largest overload over the stack's scale is least, which names the blocking stack.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import cvxpy as cp
 import numpy as np
 
+from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.exceptions import InputError
 
@@ -52,7 +55,10 @@ def least_priced_cost(process: Process, linear: float, square: float) -> tuple[f
     -----
     A convex function lies above its tangents at any two zones, so the crossing of the two bounds it from below
     wherever they stand; that they stand on both sides of the minimum and close together only makes the bound tight.
+    For b/t + p·t the minimum is known: it is reached at √(b/p), or at the nearer end of the range.
     """
+    if isinstance(process.cost, Reciprocal) and square == 0:
+        return _least_reciprocal(process, process.cost, linear)
     low, high = process.minimum, process.maximum
     for _ in range(_ROUNDS):
         zones = np.minimum(low * (high / low) ** _FRACTIONS, high)
@@ -68,3 +74,10 @@ def least_priced_cost(process: Process, linear: float, square: float) -> tuple[f
     slopes = process.cost.slope(ends) + linear + 2 * square * ends
     step = float(np.clip((values[1] - values[0] - slopes[1] * (high - low)) / (slopes[0] - slopes[1]), 0, high - low))
     return float(values[0] + slopes[0] * step), low + step
+
+
+def _least_reciprocal(process: Process, cost: Reciprocal, price: float) -> tuple[float, float]:
+    """Return the least of a reciprocal cost with a price on its zone, and the zone there."""
+    best = sqrt(cost.factor / price) if price > 0 else process.maximum
+    zone = min(max(best, process.minimum), process.maximum)
+    return cost.fixed + process.change + cost.factor / zone + price * zone, zone

@@ -6,19 +6,14 @@ more: small changes of zones are judged well, large ones by ``tolalloc`` on fres
 
 from __future__ import annotations
 
-from functools import singledispatch
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-from jaxtyping import Float
 from openpyxl import load_workbook
 from openpyxl.styles import Border, Font, PatternFill, Side
 from openpyxl.utils import get_column_letter
 
-from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import Weighted
-from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
+from tolalloc.report.allocation.cost_formulas import cost_formula, number
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.allocation.tables import unit_of
 from tolalloc.units import MICROMETRE
@@ -39,92 +34,6 @@ _NOTES = {
         "Predicted by models around the drawing: good for small changes, to be verified by tolalloc for large ones.",
     ),
 }
-
-
-@singledispatch
-def cost_formula(model: object, zone: str) -> str:
-    """Return a cost as a formula of a spreadsheet, without the equals sign.
-
-    Parameters
-    ----------
-    model
-        The cost model.
-    zone
-        Expression of the zone in the unit of the model.
-    """
-    raise TypeError(f"{type(model).__name__} has no formula of {zone}")
-
-
-@cost_formula.register
-def _(model: Reciprocal, zone: str) -> str:
-    return f"({_number(model.fixed)}+{_number(model.factor)}/{zone})"
-
-
-@cost_formula.register
-def _(model: ReciprocalPower, zone: str) -> str:
-    return f"({_number(model.fixed)}+{_number(model.factor)}/{zone}^{_number(model.exponent)})"
-
-
-@cost_formula.register
-def _(model: Exponential, zone: str) -> str:
-    return f"({_number(model.fixed)}+{_number(model.factor)}*EXP(-{zone}/{_number(model.scale)}))"
-
-
-@cost_formula.register
-def _(model: Combined, zone: str) -> str:
-    falling = f"EXP(-{zone}/{_number(model.scale)})/{zone}^{_number(model.exponent)}"
-    return f"({_number(model.fixed)}+{_number(model.factor)}*{falling})"
-
-
-@cost_formula.register
-def _(model: SumOfCosts, zone: str) -> str:
-    parts = [cost_formula(own.rescaled(ratio), zone) for own, ratio in zip(model.models, model.ratios, strict=True)]
-    return f"({'+'.join(parts)})"
-
-
-@cost_formula.register
-def _(model: Weighted, zone: str) -> str:
-    return f"({_number(model.weight)}*{cost_formula(model.model, zone)})"
-
-
-@cost_formula.register
-def _(model: Tabulated, zone: str) -> str:
-    zones, slopes = np.array(model.points.zones), np.diff(model.points.costs) / np.diff(model.points.zones)
-    return _piecewise(zone, model.points.costs[0], slopes[0], zones[:-1], np.diff(slopes, prepend=slopes[0])[:, None])
-
-
-@cost_formula.register
-def _(model: Spline, zone: str) -> str:
-    zones, costs = np.array(model.points.zones), np.array(model.points.costs)
-    slopes, lengths = model.slope(zones), np.diff(zones)
-    secants, ends = np.diff(costs) / lengths, slopes[:-1] + slopes[1:]
-    # Square and cubic coefficients of every piece, none before the first point and behind the last.
-    square = np.concatenate([[0.0], (3 * secants - slopes[:-1] - ends) / lengths, [0.0]])
-    cubic = np.concatenate([[0.0], (ends - 2 * secants) / lengths**2, [0.0]])
-    bent = np.diff(square) - 3 * cubic[:-1] * np.concatenate([[0.0], lengths])
-    return _piecewise(zone, costs[0], slopes[0], zones, np.stack([np.zeros(zones.size), bent, np.diff(cubic)], axis=1))
-
-
-def _piecewise(
-    zone: str,
-    cost: float,
-    slope: float,
-    zones: Float[np.ndarray, " point"],
-    changes: Float[np.ndarray, "point power"],
-) -> str:
-    """Return a line that gets terms of first, second, … power behind every point: no IF in an IF, however many."""
-    terms = [
-        f"{_number(change)}*MAX({zone}-{_number(point)},0)^{power}"
-        for point, own in zip(zones, changes, strict=True)
-        for power, change in enumerate(own, start=1)
-        if change
-    ]
-    return f"({'+'.join([_number(cost), f'{_number(slope)}*({zone}-{_number(zones[0])})', *terms])})"
-
-
-def _number(value: float) -> str:
-    """Return a number with all its digits, as a workbook stores it whatever the language of its reader."""
-    return repr(float(value)).upper()
 
 
 def calculator_sheets(results: AllocationResults) -> dict[str, pd.DataFrame]:
@@ -152,7 +61,7 @@ def _zones(results: AllocationResults) -> pd.DataFrame:
             "inside": [f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")' for row in rows],
             "process": chosen.processes,
             "cost [cost units]": [
-                f"={cost_formula(process.cost, f'D{row}')}+{_number(process.change)}"
+                f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}"
                 for process, row in zip(made, rows, strict=True)
             ],
         }
@@ -181,11 +90,11 @@ def _requirements(results: AllocationResults) -> pd.DataFrame:
                 "what": side.stack.name,
                 "limit": side.limit,
                 "verified on fresh units": side.value,
-                "predicted for the zones": f"=B{row}{'+' if upper else '-'}({load}+({_number(rest)}))",
+                "predicted for the zones": f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))",
                 "kept by the model": f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")',
             }
         )
-    total = f"=SUM(zones!I{first}:I{last})+{_number(space.locked_cost)}"
+    total = f"=SUM(zones!I{first}:I{last})+{number(space.locked_cost)}"
     return pd.DataFrame([*watched, {"what": "cost [cost units]", "predicted for the zones": total}])
 
 
@@ -207,8 +116,8 @@ def style_calculator(path: Path) -> None:
     zones.freeze_panes = "C2"
     for name, notes in _NOTES.items():
         sheet = workbook[name]
-        for number, text in enumerate(notes, start=sheet.max_row + 2):
-            sheet.cell(number, 1, text).font = Font(italic=True)
+        for row, text in enumerate(notes, start=sheet.max_row + 2):
+            sheet.cell(row, 1, text).font = Font(italic=True)
         for column in range(2, sheet.max_column + 1):
             sheet.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
     workbook.save(path)

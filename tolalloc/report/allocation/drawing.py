@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.report.allocation.calculator import calculator_sheets, style_calculator
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.excel import write_sheets
@@ -17,7 +18,7 @@ from tolalloc.units import MICROMETRE
 
 
 def drawn_sources(results: AllocationResults) -> tuple[Source, ...]:
-    """Return all sources of the tolerance table at the zones of the drawing, with grade and cost."""
+    """Return all sources of the tolerance table at the zones of the drawing, with process, grade and cost."""
     space, chosen = results.drawn, results.chosen
     zones = dict(zip((source.name for source in space.errors.active), space.zones(chosen.design), strict=True))
     made = space.made_by(chosen.design)
@@ -33,10 +34,26 @@ def drawn_sources(results: AllocationResults) -> tuple[Source, ...]:
                 source,
                 zone=zone,
                 cost=float(made[source.name].total(np.array(zone))),
+                process=made[source.name].name if _has_prices(source, results) else source.process,
                 grade=labels.get(source.group, ""),
             )
         )
     return tuple(found)
+
+
+def _has_prices(source: Source, results: AllocationResults) -> bool:
+    """Return whether the process cost table knows a source; where it does not, no process was chosen."""
+    alone = (today(source),)
+    return results.space.processes.get(source.name, alone) != alone
+
+
+def sources_to_go_on_from(results: AllocationResults) -> tuple[Source, ...]:
+    """Return the drawn sources as the next study takes them: leaving the old process was paid for, once."""
+    made = results.drawn.made_by(results.chosen.design)
+    return tuple(
+        replace(source, cost=source.cost - made[source.name].change) if source.name in made else source
+        for source in drawn_sources(results)
+    )
 
 
 def drawing_table(results: AllocationResults) -> pd.DataFrame:
@@ -76,10 +93,9 @@ def _shares(results: AllocationResults) -> dict[str, float]:
 
 
 def full_drawing_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the tolerance table in the layout of the input, with process, share of the variance and change added."""
+    """Return the tolerance table in the layout of the input, with share of the variance and change added."""
     frame, short = table_frame(drawn_sources(results)), drawing_table(results).set_index("source")
     names = frame[HEADERS["id"]]
-    frame[HEADERS["process"]] = names.map(short["process"]).fillna(frame[HEADERS["process"]])
     for header in ("share of variance [%]", "change [%]", "cost before [cost units]"):
         frame[header] = names.map(short[header])
     return frame
@@ -95,7 +111,7 @@ def write_drawing(results: AllocationResults, folder: Path) -> None:
     folder
         The written report.
     """
-    table_frame(drawn_sources(results), folder).to_csv(folder / "allocation.csv", index=False)
+    table_frame(sources_to_go_on_from(results), folder).to_csv(folder / "allocation.csv", index=False)
     sheets = {"drawing": full_drawing_table(results), **calculator_sheets(results)}
     write_sheets(sheets, folder / "drawing.xlsx")
     style_calculator(folder / "drawing.xlsx")

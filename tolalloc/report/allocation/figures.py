@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.report.allocation import tables
+from tolalloc.report.allocation import tables, what_if_tables
 from tolalloc.report.allocation.drawing import drawing_table
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.heat_map import HeatMap
+from tolalloc.units import MICROMETRE
 
 
 def zones_figure(results: AllocationResults) -> Figure:
@@ -50,13 +51,20 @@ def front_figure(results: AllocationResults) -> Figure:
     searched, exact = fronts.searched, fronts.exact
     checked = ~np.isnan(searched.on_kernel)
     compared = tables.designs(results)
+    others = "; the search keeps the other requirements by their local models" if len(results.requirements) > 1 else ""
+    knee = searched.knee
     return Figure(
         name="front",
-        title=f"What a limit costs: fronts and verified designs; dashed is the limit of {limit:g}″",
+        title=f"What a limit costs, dashed: {limit:g}″{others}",
         x_label=f"peak-to-peak kept by {results.target:.2%} of units [arcsec]",
         y_label="cost [cost units]",
         series=(
-            Series(label="exact front of the local models", kind="line", x=list(exact.limits), y=list(exact.cost)),
+            Series(
+                label=f"exact by the local models (±{results.chosen.sides[0].doubt:.2g}″)",
+                kind="line",
+                x=list(exact.limits),
+                y=list(exact.cost),
+            ),
             Series(label="NSGA-II, told", kind="line", x=list(searched.quantile), y=list(searched.cost)),
             Series(
                 label="NSGA-II, on the kernel",
@@ -68,9 +76,15 @@ def front_figure(results: AllocationResults) -> Figure:
                 Series(label=label, kind="points", x=[design.quantile_bound], y=[design.cost])
                 for label, design in compared.items()
             ),
+            Series(label="knee of NSGA-II", kind="points", x=[searched.quantile[knee]], y=[searched.cost[knee]]),
         ),
         vertical=((limit, ""),),  # a label would stand among the legend's
     )
+
+
+def trade_figures(results: AllocationResults) -> tuple[Figure | HeatMap, ...]:
+    """Return what the modification is worth, nothing where no pair of clearances has a cost."""
+    return (trade_figure(results), trade_map(results)) if np.isfinite(results.trade.cost).any() else ()
 
 
 def trade_map(results: AllocationResults) -> HeatMap:
@@ -78,7 +92,7 @@ def trade_map(results: AllocationResults) -> HeatMap:
     trade = results.trade
     return HeatMap(
         name="modification_cost",
-        title="Cost of the cheapest zones for every pair of clearances; empty where none keep the requirements",
+        title="Cost of the cheapest zones; an empty cell: none found that keep all requirements",
         columns=[f"{value:.3g}" for value in trade.radial],
         rows=[f"flank {value:.3g} µm" for value in trade.flank],
         x_label="radial clearance at tip and root [µm]",
@@ -100,7 +114,7 @@ def trade_figure(results: AllocationResults) -> Figure:
             for flank, cost in zip(trade.flank, trade.cost, strict=True)
             if np.isfinite(cost).any()
         ),
-        vertical=((now.radial_clearance * 1e6, "as it is"), (float(results.chosen.design[-1]), "chosen")),
+        vertical=((now.radial_clearance / MICROMETRE, "as it is"), (float(results.chosen.design[-1]), "chosen")),
     )
 
 
@@ -111,19 +125,19 @@ def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray,
 
 
 def robustness_figure(results: AllocationResults) -> Figure:
-    """Return how far every zone moves when an assumption is wrong."""
-    frame = tables.robustness_table(results)
+    """Return how far every free zone moves when an assumption is wrong."""
+    frame = what_if_tables.robustness_table(results)
     bars = Series(
-        label="zone; between its smallest and largest under all changed assumptions",
+        label="free zone; between its smallest and largest under all changed assumptions",
         kind="bars",
         x=list(frame["group"]),
-        y=list(frame["zone [µm]"]),
-        low=list(np.minimum(frame["smallest under all changes [µm]"], frame["zone [µm]"])),
-        high=list(np.maximum(frame["largest under all changes [µm]"], frame["zone [µm]"])),
+        y=list(frame["free zone [µm]"]),
+        low=list(np.minimum(frame["smallest under all changes [µm]"], frame["free zone [µm]"])),
+        high=list(np.maximum(frame["largest under all changes [µm]"], frame["free zone [µm]"])),
     )
     return Figure(
         name="robustness",
-        title="Zones when costs, stiffness or processes are not what was assumed",
+        title="Free zones when costs, stiffness or processes are not what was assumed",
         x_label="zone [µm]",
         y_label="",
         series=(bars,),

@@ -78,7 +78,7 @@ class AllocationResults:
     robustness
         Answers under changed assumptions.
     prices
-        Price of a good unit over yield targets, if the study states what becomes of the others and one is in reach.
+        Price of a good unit over yield targets, if the study states what becomes of the others.
     loss
         What a peak-to-peak costs a user, if the study states it.
     neglected
@@ -124,4 +124,5 @@ class AllocationResults:
     @cached_property
     def modification(self) -> Modification:
         """Modification amounts of the chosen design."""
-        return self.drawn.modification(self.chosen.design)
+        found = self.drawn.modification(self.chosen.design)
+        return Modification(equidistant=float(found.equidistant), shift=float(found.shift))

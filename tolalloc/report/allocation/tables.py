@@ -6,12 +6,20 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.guarantee import AtCpk, AtYield, Guarantee
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.program.problem import Solution
+from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.units import MICROMETRE
 
 _ROUNDING = 1e-6
-"""Price of a micrometre, over the cost, below which it is the solver's rounding [1/µm]."""
+"""Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""
+
+
+def solver_noise(solution: Solution) -> float:
+    """Return the cost below which a price tells nothing of a solution [cost units]."""
+    return max(solution.gap, _ROUNDING) * solution.cost
 
 
 def unit_of(name: str) -> str:
@@ -37,6 +45,35 @@ def guarantee_text(guarantee: Guarantee) -> str:
     if isinstance(guarantee, AtCpk):
         return f"Cpk {guarantee.target:g}"
     return "worst case found"
+
+
+def limit_price(side: Side, price: float) -> tuple[float, str]:
+    """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1."""
+    unit = unit_of(side.stack.name)
+    return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
+
+
+def unit_quantile(design: VerifiedDesign, check: Check) -> float:
+    """Return the limit that exactly the target share of a design's units keeps [unit of the output].
+
+    Parameters
+    ----------
+    design
+        The verified design.
+    check
+        How it stands against a requirement.
+
+    Returns
+    -------
+    float
+        Not a number unless the requirement is a yield with one limit; two share the units beyond.
+    """
+    guarantee = check.requirement.guarantee
+    if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
+        return float("nan")
+    sign, values = check.sides[0].sign, design.outputs[check.requirement.output]
+    turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))
+    return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])
 
 
 def designs_table(results: AllocationResults) -> pd.DataFrame:
@@ -75,16 +112,19 @@ def _loss(results: AllocationResults, design: VerifiedDesign) -> dict[str, float
 
 
 def requirements_table(results: AllocationResults) -> pd.DataFrame:
-    """Return every limited side with what each design was shown to keep, and what one unit of the limit costs."""
-    prices, compared = results.joint.prices, designs(results)
+    """Return every limited side with what each design was shown to keep, and what the limit costs."""
+    prices, compared, noise = results.joint.prices, designs(results), solver_noise(results.joint.optimum)
     rows = []
     for number, side in enumerate(results.chosen.sides):
         check = next(check for check in results.chosen.checks if side in check.sides)
         unit = unit_of(check.requirement.output)
+        price = prices[side.stack.name]
+        price, per = limit_price(side, price if price * side.scale > noise else 0.0)
         row: dict[str, object] = {
             "requirement": check.requirement.output,
             "limit": f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit}",
             "shown for": guarantee_text(check.requirement.guarantee),
+            "quantile of the units [unit of the output]": unit_quantile(results.chosen, check),
         }
         row |= {f"kept: {label} [unit of the output]": design.sides[number].value for label, design in compared.items()}
         rows.append(
@@ -92,63 +132,12 @@ def requirements_table(results: AllocationResults) -> pd.DataFrame:
                 **row,
                 "slack [unit of the output]": -side.excess,
                 "standard error of it [unit of the output]": side.doubt,
-                "one unit of the limit costs [cost units]": prices[side.stack.name],
+                "marginal price of the limit [cost units]": price,
+                "for each": per,
                 "OK": "yes" if side.excess <= 0 else "no",
             }
         )
     return pd.DataFrame(rows)
-
-
-def certificate_table(results: AllocationResults) -> pd.DataFrame:
-    """Return cost, certified bound and gap of every search."""
-    searches = {"tolerances alone": results.alone, "tolerances and modification": results.joint}
-    rows = [
-        {
-            "search": label,
-            "verified cost [cost units]": found.chosen.cost,
-            "cheapest of the local models [cost units]": found.optimum.cost + found.locked_cost,
-            "certified bound [cost units]": found.bound,
-            "gap of the program [-]": found.optimum.gap,
-            "gap of the verified design [%]": found.gap * 100,
-            "designs verified [-]": len(found.tried),
-        }
-        for label, found in searches.items()
-    ]
-    graded = results.graded
-    if graded:
-        locked = graded.space.locked_cost
-        rows.append(
-            {
-                "search": "grades",
-                "verified cost [cost units]": graded.chosen.cost,
-                "cheapest of the local models [cost units]": graded.solution.cost + locked,
-                "certified bound [cost units]": graded.bound,
-                "gap of the program [-]": graded.solution.gap,
-                "gap of the verified design [%]": (graded.chosen.cost / graded.bound - 1) * 100,
-                "designs verified [-]": len(graded.tried),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def bounds_table(results: AllocationResults) -> pd.DataFrame:
-    """Return what the smallest and the largest zones of the tolerance table cost."""
-    space, found = results.space, results.joint
-    zones, scales = space.first_zones / MICROMETRE, found.optimum.zones
-    made = [feature.processes[at] for feature, at in zip(space.features, found.optimum.processes, strict=True)]
-    prices = found.optimum.bound_prices / zones[:, np.newaxis]
-    prices = np.where(prices > _ROUNDING * found.optimum.cost, prices, 0.0)
-    return pd.DataFrame(
-        {
-            "group": space.groups,
-            "process": [process.name for process in made],
-            "smallest zone [µm]": [process.minimum for process in made] * zones,
-            "zone [µm]": scales * zones,
-            "largest zone [µm]": [process.maximum for process in made] * zones,
-            "1 µm less of the smallest saves [cost units]": prices[:, 0],
-            "1 µm more of the largest saves [cost units]": prices[:, 1],
-        }
-    )
 
 
 def verified_table(results: AllocationResults) -> pd.DataFrame:
@@ -172,105 +161,6 @@ def verified_table(results: AllocationResults) -> pd.DataFrame:
             for search, designs in tried.items()
             for design in designs
         ]
-    )
-
-
-def trade_table(results: AllocationResults) -> pd.DataFrame:
-    """Return cost and price of a micrometre for every pair of clearances."""
-    trade = results.trade
-    flank, radial = np.meshgrid(trade.flank, trade.radial, indexing="ij")
-    return pd.DataFrame(
-        {
-            "flank clearance [µm]": flank.ravel(),
-            "radial clearance [µm]": radial.ravel(),
-            "cost [cost units]": trade.cost.ravel(),
-            "1 µm more on the flank costs [cost units]": trade.price_of_flank.ravel(),
-            "1 µm more at tip and root costs [cost units]": trade.price_of_radial.ravel(),
-        }
-    )
-
-
-def robustness_table(results: AllocationResults) -> pd.DataFrame:
-    """Return how far every zone moves when an assumption is wrong."""
-    found, zones = results.robustness, results.space.first_zones / MICROMETRE
-    ratios, best = found.ratios, found.optimum * zones
-    return pd.DataFrame(
-        {
-            "group": found.groups,
-            "zone [µm]": best,
-            "smallest under all changes [µm]": best * ratios.min(axis=0),
-            "largest under all changes [µm]": best * ratios.max(axis=0),
-            "same in all": ["yes" if same else "no" for same in found.same],
-        }
-    )
-
-
-def variants_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the answers under changed assumptions, worst regret first among the costs."""
-    rows = [
-        {
-            "assumption": variant.name,
-            "cheapest then [cost units]": variant.cost + results.space.locked_cost,
-            "chosen design costs more by [%]": variant.regret * 100,
-            "chosen design keeps all": "yes" if variant.kept else "no",
-        }
-        for variant in results.robustness.variants
-    ]
-    return pd.DataFrame(rows)
-
-
-def prices_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the price of a good unit over yield targets."""
-    found = results.prices
-    if found is None:
-        return pd.DataFrame()
-    return pd.DataFrame(
-        {
-            "yield target [%]": found.targets * 100,
-            "cheapest unit made to it [cost units]": found.manufacturing,
-            "price of a good unit [cost units]": found.prices,
-        }
-    )
-
-
-def searched_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the front of the search with what the kernel says of it, its knee marked."""
-    front = results.fronts.searched
-    return pd.DataFrame(
-        {
-            "peak-to-peak kept, told [arcsec]": front.quantile,
-            "on the kernel [arcsec]": front.on_kernel,
-            "cost [cost units]": front.cost,
-            "flank clearance [µm]": front.designs[:, -2],
-            "radial clearance [µm]": front.designs[:, -1],
-            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
-        }
-    )
-
-
-def clearance_front_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the front of cost, peak-to-peak and radial clearance, its knee marked."""
-    front = results.fronts.with_clearance
-    return pd.DataFrame(
-        {
-            "cost [cost units]": front.cost,
-            "peak-to-peak kept, told [arcsec]": front.quantile,
-            "on the kernel [arcsec]": front.on_kernel,
-            "radial clearance [µm]": front.further[:, 0],
-            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
-        }
-    )
-
-
-def front_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the exact front of the local models with its certified bound."""
-    front = results.fronts.exact
-    return pd.DataFrame(
-        {
-            "peak-to-peak limit [arcsec]": front.limits,
-            "cost [cost units]": front.cost,
-            "certified bound [cost units]": front.bound,
-        }
     )
 
 

@@ -1,4 +1,4 @@
-"""Rows of the tables of this room: text in, checked records out, each with its place in the file."""
+"""Rows of users' tables: text in, checked records out, each with its place in the file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tolalloc.uncertainty.tolerance_cells import typed_cells
 
 
 class TableRow(Record):
-    """Base of the rows of this room."""
+    """Base of the rows; the fields are the column headers without their unit."""
 
     units: ClassVar[Mapping[str, str]] = {}
     """Field → unit that its header may state; numbers are never converted, so every other unit is refused."""

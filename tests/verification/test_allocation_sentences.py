@@ -1,0 +1,289 @@
+"""What the report of an allocation says: every sentence and number is what was computed, and no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tolalloc.allocation.cost.unit_price import UnitPrice, YieldLadder
+from tolalloc.allocation.guarantee import AtCpk
+from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.trade import ModificationTrade
+from tolalloc.capability.indices import Limits
+from tolalloc.report.allocation import figures, optimality_tables, tables, what_if_tables
+from tolalloc.report.allocation.cautions import warnings
+from tolalloc.report.allocation.document import allocation_document
+from tolalloc.report.allocation.paragraphs import cheapest_clearances, quantiles
+from tolalloc.report.allocation.sentences import answer, least_saving
+from tolalloc.study.allocation import allocate_study
+from tolalloc.study.definition import Study
+from tolalloc.study.effort import QUICK
+from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame
+
+KEPT = {"housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter"}
+LOST, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
+SMALL = replace(
+    QUICK,
+    verification_units=512,
+    shared_units=16,
+    search=replace(
+        QUICK.search,
+        front=replace(
+            QUICK.search.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3
+        ),
+    ),
+    allocation=replace(
+        QUICK.allocation,
+        graded_steps=4,
+        exact_points=4,
+        flank_steps=1,
+        radial_steps=2,
+        changed_costs=3,
+        share_blocks=8,
+        yields=(0.8, 0.95, 0.9999),
+    ),
+)
+
+
+class Silence:
+    """Progress that nobody watches."""
+
+    def begin(self, stage):
+        pass
+
+    def advance(self, units):
+        pass
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    table = tmp_path_factory.mktemp("said") / "few.csv"
+    sources = [source for source in load_tolerance_table("rv20e_baseline") if source.name in KEPT]
+    table_frame(sources).to_csv(table, index=False)
+    study = Study(
+        name="said",
+        tolerances=str(table),
+        neglected=("*",),
+        limit_arcsec=50.0,
+        yield_target=0.95,
+        other_limits={LOST: Limits(upper=0.5), RADIAL: Limits(lower=-8.0)},
+        guarantees={LOST: AtCpk(target=1.33)},
+        grades=True,
+        unit_price=UnitPrice(scrap=5.0),
+        effort=SMALL,
+    )
+    found = allocate_study(study, Silence())
+    assert found.chosen.met
+    assert found.alone.chosen.met
+    return found
+
+
+def said(results, start: str) -> str:
+    """Return the one sentence of the answer with a beginning."""
+    (sentence,) = [own for own in answer(results) if own.startswith(start)]
+    return sentence
+
+
+def costing(allocation: Allocation, cost: float) -> Allocation:
+    return replace(allocation, chosen=replace(allocation.chosen, cost=cost))
+
+
+def missing(allocation: Allocation, beyond: float = 3.0) -> Allocation:
+    """Return an allocation whose design keeps so much more than its limit."""
+    first, *others = allocation.chosen.checks
+    side = replace(first.sides[0], value=first.sides[0].limit + beyond)
+    return replace(allocation, chosen=replace(allocation.chosen, checks=(replace(first, sides=(side,)), *others)))
+
+
+def test_the_certificate_says_what_the_dual_bound_says(results):
+    joint = results.joint
+    sentence = said(results, "Certified: by the local models")
+    assert f"that keep the limits cost less than {joint.bound:.2f}; it costs {joint.gap:.1%} more" in sentence
+    points = 100 * (joint.inside.cost - joint.optimum.cost) / joint.bound
+    assert points > 0.1
+    assert f"{points:.1f} points of that for the margin of one standard error" in sentence
+    at_once = replace(results, joint=replace(joint, inside=joint.optimum))
+    assert "margin" not in said(at_once, "Certified")
+    graded = said(results, "On grades")
+    assert f"that keeps the limits costs less than {results.graded.bound:.2f}." in graded
+
+
+def test_nothing_is_certified_of_a_miss(results):
+    graded = missing(results.graded)
+    lost = replace(results, joint=missing(results.joint), graded=graded)
+    sentences = answer(lost)
+    assert allocation_document(lost).summary["certified bound [cost units]"] is None
+    assert not [own for own in sentences if "Certified" in own or "costs less than" in own or "at the rate of" in own]
+    assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
+
+
+def test_the_certificate_table_has_both_rooms(results):
+    table = optimality_tables.certificate_table(results).set_index("search")
+    row, joint = table.loc["tolerances and modification"], results.joint
+    assert row["certified bound, at the limits [cost units]"] == joint.bound
+    assert row["certified bound, inside [cost units]"] == joint.inside.bound + joint.locked_cost
+    assert row["certified bound, inside [cost units]"] > row["certified bound, at the limits [cost units]"]
+    assert row["cheapest of the models, inside [cost units]"] <= row["verified cost [cost units]"]
+    assert 0 < row["of that for the margin [%]"] <= row["verified cost above the bound at the limits [%]"]
+    assert np.isnan(table.loc["grades", "certified bound, inside [cost units]"])
+
+
+def test_the_modification_saves_only_what_the_searches_can_tell(results):
+    joint = costing(results.joint, 10.0 * results.joint.bound)
+    cost = joint.chosen.cost
+    plain = replace(
+        results, joint=costing(results.joint, results.joint.bound), alone=costing(results.alone, 1e3 * cost)
+    )
+    tight = replace(plain, alone=replace(plain.alone, optimum=replace(plain.alone.optimum, bound=1e3 * cost)))
+    assert "certified" not in said(tight, "The modification saves")
+    small = replace(results, joint=joint, alone=costing(results.alone, 1.1 * cost))
+    sentence = said(small, f"The modification saves {0.1 * cost:.2f} cost units (9.1%)")
+    assert f"ended {small.alone.gap:.1%} above its own certified bound, so up to that much of it may" in sentence
+    for factor in (1.0, 0.9):
+        same = replace(results, joint=joint, alone=costing(results.alone, factor * cost))
+        assert "Nothing cheaper was found with the modification free" in " ".join(answer(same))
+        assert "modification saves" not in " ".join(answer(same))
+
+
+def test_a_search_that_missed_says_what(results):
+    alone = said(replace(results, alone=missing(results.alone)), "Tolerances alone were not verified")
+    assert "limit 50 arcsec: it keeps 53 arcsec (shown for 95.00% of units), 3 arcsec beyond; the" in alone
+    joint = replace(results, joint=missing(results.joint, 7.0))
+    assert "57 arcsec" in said(joint, "With tolerances and modification free no design was verified")
+    assert "modification saves" not in " ".join(answer(joint))
+    both = replace(joint, alone=missing(results.alone))
+    assert "53 arcsec" in said(both, "Nor with tolerances alone")
+    unknown = replace(results, alone=missing(results.alone, np.inf))
+    assert "too many units have no answer" in said(unknown, "Tolerances alone")
+
+
+def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
+    joint, chosen = results.joint, results.chosen
+    hand = joint.by_hand
+    least = hand.cost * min(1.0, hand.quantile_bound / joint.limit)
+    assert least_saving(results) == pytest.approx(1 - chosen.cost / least)
+    sentence = said(results, "Cost ")
+    assert f"with the modification as it is ({hand.cost:.2f})" in sentence
+    assert f"used the limit to its last arcsecond ({least:.2f})" in sentence
+    assert allocation_document(results).summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
+
+
+def ladder(prices) -> YieldLadder:
+    targets = np.array([0.8, 0.9, 0.9973])
+    return YieldLadder(targets=targets, manufacturing=np.array(prices), prices=np.array(prices))
+
+
+@pytest.mark.parametrize(
+    ("prices", "words"),
+    [
+        ([1.0, 2.0, 3.0], "Of the yields that were tried a good unit is cheapest at or below 80%: 1.00 cost units"),
+        ([3.0, 2.0, 1.0], "Of the yields that were tried a good unit is cheapest at or above 99.73%: 1.00"),
+        ([3.0, 2.0, np.nan], "Of the yields that were tried a good unit is cheapest at or above 90%: 2.00"),
+        ([3.0, 2.0, 4.0], "Of the yields that were tried a good unit is cheapest at 90%: 2.00"),
+        ([np.nan, 2.0, np.nan], "Of the yields that were tried only 90% has a price for a good unit: 2.00"),
+    ],
+)
+def test_the_cheapest_good_unit_at_the_end_of_the_ladder_is_no_optimum(results, prices, words):
+    sentence = said(replace(results, prices=ladder(prices)), words)
+    assert "by the local models, not verified; units beyond the peak-to-peak limit alone" in sentence
+
+
+def test_where_no_yield_has_a_price_one_sentence_says_so(results):
+    nothing = replace(results, prices=ladder([np.nan] * 3))
+    assert said(nothing, "No good unit has a price: no yield")
+    assert what_if_tables.prices_table(nothing).empty
+    assert "nan" not in " ".join(answer(nothing))
+    assert not [own for own in answer(replace(results, prices=None)) if "good unit" in own]
+
+
+def test_a_yield_that_the_units_cannot_show_has_no_price(results):
+    assert np.isnan(results.prices.prices[-1])
+    assert np.isfinite(results.prices.prices[:-1]).all()
+
+
+def test_costs_are_changed_to_corners(results):
+    assert "In 3 random corners of ±20 % on every cost the free zones are at most" in said(results, "In 3 random")
+    assert len(results.robustness.costs) == 3
+    assert "free zones cost more by [%]" in what_if_tables.variants_table(results).columns
+
+
+def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
+    table = tables.requirements_table(results)
+    sample, target, at = results.chosen.sample, results.target, "quantile of the units [unit of the output]"
+    value = table[at][0]
+    kept = np.count_nonzero(sample.values <= value) / sample.evaluation.status.size
+    before = np.count_nonzero(sample.values < value) / sample.evaluation.status.size
+    assert before < target <= kept
+    assert value <= results.chosen.quantile_bound
+    radial = results.chosen.outputs[RADIAL]
+    assert np.count_nonzero(radial >= table[at][2]) / radial.size >= target > np.mean(radial > table[at][2])
+    assert np.isnan(table[at][1])  # a Cpk
+    first = quantiles(results)[0]
+    assert (
+        f"95.00% of these units keep at most {value:.4g} arcsec; {results.chosen.quantile_bound:.4g} arcsec is" in first
+    )
+
+
+def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
+    side = results.joint.chosen.sides[0]
+    assert tables.limit_price(side, 0.9) == (0.9, "arcsec")
+    assert tables.limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
+    price = results.joint.prices[side.stack.name]
+    sentence = said(results, "peak-to-peak transmission error: at its limit of 50 arcsec")
+    assert f"at the rate of {price:.3g} cost units per arcsec" in sentence
+
+
+def test_prices_below_the_noise_of_the_solver_are_nothing(results):
+    optimum = results.joint.optimum
+    noise = tables.solver_noise(optimum)
+    assert noise >= max(optimum.gap, 0.0) * optimum.cost
+    quiet = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 0.1 * noise / optimum.zones.max()))
+    found = optimality_tables.bounds_table(replace(results, joint=replace(results.joint, optimum=quiet)))
+    for end in ("smallest", "largest"):
+        assert (found[f"marginal price of the {end} [cost units/µm]"] == 0.0).all()
+    loud = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 10 * noise / optimum.zones.min()))
+    found = optimality_tables.bounds_table(replace(results, joint=replace(results.joint, optimum=loud)))
+    assert (found["marginal price of the smallest [cost units/µm]"] > 0.0).all()
+
+
+def test_failed_units_are_counted_by_a_yield_alone(results):
+    (sentence,) = [
+        own
+        for own in warnings(replace(results, statuses={"equilibrium found": 9, "no equilibrium": 2}))
+        if "no equilibrium" in own
+    ]
+    assert sentence == "2 units have no equilibrium; a yield counts them as outside the limits, a Cpk leaves them out."
+
+
+def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
+    kept = results.robustness.costs[0]
+    stiffness = (kept, replace(kept, kept=False, regret=np.nan))
+    lost = replace(results, robustness=replace(results.robustness, stiffness=stiffness))
+    assert "With 1 of 2 drawn stiffnesses the free zones are no longer shown to keep every limit." in warnings(lost)
+    assert not [own for own in warnings(results) if "stiffness" in own]
+    assert "nan" not in " ".join(answer(lost))
+
+
+def test_a_trade_without_any_cost_is_said_in_words(results):
+    trade = ModificationTrade(
+        **{**vars(results.trade), "cost": np.full_like(results.trade.cost, np.nan), "error": np.nan}
+    )
+    nothing = replace(results, trade=trade)
+    assert cheapest_clearances(nothing) == (
+        "With no pair of clearances that was tried were zones found that keep all requirements.",
+    )
+    assert figures.trade_figures(nothing) == ()
+    assert len(figures.trade_figures(results)) == 2
+    for section in allocation_document(nothing).sections:
+        assert "nan" not in " ".join(section.paragraphs)
+
+
+def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
+    front = figures.front_figure(results)
+    assert "the search keeps the other requirements by their local models" in front.title
+    (knee,) = [series for series in front.series if series.label.startswith("knee")]
+    searched = results.fronts.searched
+    assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
+    assert front.series[0].label == f"exact by the local models (±{results.chosen.sides[0].doubt:.2g}″)"
