@@ -19,6 +19,10 @@ from tolalloc.report.figure import Figure, as_html, save_png
 from tolalloc.report.heat_map import HeatMap
 
 
+_LARGE = (24, 15)
+"""Rows and columns beyond which a table is folded [-]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """One heading with what stands below it.
@@ -82,6 +86,11 @@ def _number(value: object) -> str:
     return str(value)
 
 
+def _is_large(frame: pd.DataFrame) -> bool:
+    """Return whether a page shows a table only when it is asked for."""
+    return len(frame) > _LARGE[0] or frame.shape[1] > _LARGE[1]
+
+
 def html_table(frame: pd.DataFrame) -> Markup:
     """Return a frame as an HTML table."""
     text = frame.map(_number)
@@ -110,7 +119,7 @@ def write_document(document: Document, folder: Path) -> None:
             "heading": section.heading,
             "paragraphs": section.paragraphs,
             "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
-            "tables": [(name, len(frame), html_table(frame)) for name, frame in section.tables],
+            "tables": [(name, len(frame), _is_large(frame), html_table(frame)) for name, frame in section.tables],
         }
         for section in document.sections
     ]

@@ -205,8 +205,10 @@ def _(figure: Figure) -> str:
         xaxis_title=figure.x_label,
         yaxis_title=figure.y_label,
         height=max(420, 24 * figure.rows + 140),
-        margin={"l": 60, "r": 30, "t": 30, "b": 60},
-        legend={"orientation": "h", "y": 1.08},
+        # Room for the rows of the legend; the buttons stand beside the picture and not over it.
+        margin={"l": 60, "r": 60, "t": 36 + 20 * (len(figure.series) // 4), "b": 60},
+        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom"},
+        modebar={"orientation": "v"},
     )
     if figure.logarithmic:
         canvas.update_yaxes(type="log", exponentformat="power")
