@@ -18,7 +18,6 @@ from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, as_html, save_png
 from tolalloc.report.heat_map import HeatMap
 
-
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
 
