@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.report import tables
+from tolalloc.report.before_after import units_figure, zones_figure
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.results import StudyResults
 from tolalloc.units import ARCSECOND, DEGREE
@@ -12,10 +13,16 @@ from tolalloc.units import ARCSECOND, DEGREE
 
 def study_figures(results: StudyResults) -> tuple[Figure, ...]:
     """Return all figures, in the order of the report."""
+    allocation = results.allocation
     return (
         _ranking(results),
-        _zones(results),
-        _peak_to_peak(results),
+        zones_figure(tables.before_after(results), "zone after [µm]"),
+        units_figure(
+            allocation.baseline.sample.values,
+            allocation.chosen.sample.values,
+            allocation.chosen.achieved.estimate,
+            allocation.limit,
+        ),
         _pareto(results),
         _curves(results),
         _orders(results),
@@ -38,37 +45,6 @@ def _ranking(results: StudyResults) -> Figure:
         x_label="total Sobol index [-]",
         y_label="",
         series=(bars,),
-    )
-
-
-def _zones(results: StudyResults) -> Figure:
-    frame = tables.before_after(results)
-    frame = frame[frame["zone before [µm]"] > 0]
-    names = list(frame["source"])
-    return Figure(
-        name="zones",
-        title="Drawing zones before and after",
-        x_label="zone [µm]",
-        y_label="",
-        series=(
-            Series(label="before", kind="bars", x=names, y=list(frame["zone before [µm]"])),
-            Series(label="after", kind="bars", x=names, y=list(frame["zone after [µm]"])),
-        ),
-    )
-
-
-def _peak_to_peak(results: StudyResults) -> Figure:
-    allocation = results.allocation
-    return Figure(
-        name="peak_to_peak",
-        title=f"Random units before and after; yield after {allocation.chosen.achieved.estimate:.2%}",
-        x_label="peak-to-peak transmission error, output side [arcsec]",
-        y_label="units [-]",
-        series=(
-            Series(label="tolerance table as it is", kind="histogram", x=list(allocation.baseline.sample.values)),
-            Series(label="allocated", kind="histogram", x=list(allocation.chosen.sample.values)),
-        ),
-        vertical=((results.limit, f"limit {results.limit:g}″"),),
     )
 
 

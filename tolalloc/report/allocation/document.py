@@ -9,16 +9,17 @@ from tolalloc.report.allocation.paragraphs import cheapest_clearances, quantiles
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.allocation.sentences import answer
 from tolalloc.report.allocation.summary import summary
+from tolalloc.report.before_after import units_figure, zones_figure
 from tolalloc.report.document import Document, Section
 
 
 def sections(results: AllocationResults) -> tuple[Section, ...]:
     """Return the sections of the report."""
-    price = what_if_tables.prices_table(results)
+    price, chosen = what_if_tables.prices_table(results), results.chosen
     return (
         Section(
             heading="What to write on the drawing",
-            figures=(figures.zones_figure(results),),
+            figures=(zones_figure(drawing_table(results), "zone [µm]"),),
             tables=(("drawing", drawing_table(results)),),
             paragraphs=(
                 "allocation.csv beside this report has the layout of the tolerance table and is read back by tolalloc; "
@@ -28,7 +29,14 @@ def sections(results: AllocationResults) -> tuple[Section, ...]:
         Section(
             heading="Requirements",
             paragraphs=quantiles(results),
-            figures=(figures.units_figure(results),),
+            figures=(
+                units_figure(
+                    results.joint.baseline.sample.values,
+                    chosen.sample.values,
+                    chosen.achieved.estimate,
+                    results.joint.limit,
+                ),
+            ),
             tables=(
                 ("requirements", tables.requirements_table(results)),
                 ("designs", tables.designs_table(results)),

@@ -6,43 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.report.allocation import tables, what_if_tables
-from tolalloc.report.allocation.drawing import drawing_table
 from tolalloc.report.allocation.results import AllocationResults
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.heat_map import HeatMap
 from tolalloc.units import MICROMETRE
-
-
-def zones_figure(results: AllocationResults) -> Figure:
-    """Return the zones before and after."""
-    frame = drawing_table(results)
-    names = list(frame["source"])
-    return Figure(
-        name="zones",
-        title="Drawing zones before and after",
-        x_label="zone [µm]",
-        y_label="",
-        series=(
-            Series(label="before", kind="bars", x=names, y=list(frame["zone before [µm]"])),
-            Series(label="after", kind="bars", x=names, y=list(frame["zone [µm]"])),
-        ),
-    )
-
-
-def units_figure(results: AllocationResults) -> Figure:
-    """Return the peak-to-peak of random units before and after."""
-    limit = results.joint.limit
-    return Figure(
-        name="peak_to_peak",
-        title=f"Random units before and after; yield after {results.chosen.achieved.estimate:.2%}",
-        x_label="peak-to-peak transmission error, output side [arcsec]",
-        y_label="units [-]",
-        series=(
-            Series(label="tolerance table as it is", kind="histogram", x=list(results.joint.baseline.sample.values)),
-            Series(label="as drawn", kind="histogram", x=list(results.chosen.sample.values)),
-        ),
-        vertical=((limit, f"limit {limit:g}″"),),
-    )
 
 
 def front_figure(results: AllocationResults) -> Figure:

@@ -1,0 +1,60 @@
+"""Pictures of a drawing before and after, whatever chose it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from tolalloc.report.figure import Figure, Series
+
+
+def zones_figure(drawing: pd.DataFrame, after: str) -> Figure:
+    """Return the zones before and after.
+
+    Parameters
+    ----------
+    drawing
+        One row per source; those without a zone are left out.
+    after
+        Header of the column with the zones after.
+    """
+    frame = drawing[drawing["zone before [µm]"] > 0]
+    names = list(frame["source"])
+    return Figure(
+        name="zones",
+        title="Drawing zones before and after",
+        x_label="zone [µm]",
+        y_label="",
+        series=(
+            Series(label="before", kind="bars", x=names, y=list(frame["zone before [µm]"])),
+            Series(label="after", kind="bars", x=names, y=list(frame[after])),
+        ),
+    )
+
+
+def units_figure(
+    before: Float[np.ndarray, " before"], after: Float[np.ndarray, " after"], share: float, limit: float
+) -> Figure:
+    """Return the peak-to-peak of random units before and after.
+
+    Parameters
+    ----------
+    before, after
+        Peak-to-peak of the units [arcsec].
+    share
+        Yield after [-].
+    limit
+        Largest peak-to-peak allowed [arcsec].
+    """
+    return Figure(
+        name="peak_to_peak",
+        title=f"Random units before and after; yield after {share:.2%}",
+        x_label="peak-to-peak transmission error, output side [arcsec]",
+        y_label="units [-]",
+        series=(
+            Series(label="tolerance table as it is", kind="histogram", x=list(before)),
+            Series(label="as drawn", kind="histogram", x=list(after)),
+        ),
+        vertical=((limit, f"limit {limit:g}″"),),
+    )
