@@ -12,7 +12,6 @@ from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.trust_region import kept_stacks, step_to_optimum
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
@@ -108,11 +107,6 @@ class Allocation:
         return {
             side.stack.name: float(price) for side, price in zip(self.chosen.sides, self.optimum.prices, strict=True)
         }
-
-    @property
-    def blocking(self) -> Check | None:
-        """The requirement that the least violating design misses most, none where the chosen design meets them all."""
-        return None if self.chosen.met else self.chosen.blocking
 
     @property
     def saving(self) -> float:
