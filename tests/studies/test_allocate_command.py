@@ -95,6 +95,13 @@ def allocated(tmp_path_factory) -> tuple[Path, str]:
     return path / "report", result.stdout + result.stderr
 
 
+def test_an_allocation_is_compared_with_itself(allocated):
+    folder, _ = allocated
+    result = tolalloc("compare", folder, folder, "--json")
+    assert result.returncode == 0, result.stderr
+    assert "housing.pitch" in result.stdout
+
+
 def test_the_report_is_complete(allocated):
     folder, said = allocated
     assert {path.name for path in folder.iterdir()} == {

@@ -181,7 +181,9 @@ def read_run(folder: Path) -> FinishedRun:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such run folder.")
     if (folder / "tables" / "ranking.csv").is_file():
-        return _read_ranking(folder)
+        return _read_document(folder, "tables/ranking.csv", "tables/tolerances.csv")
+    if (folder / "tables" / "shares.csv").is_file():
+        return _read_document(folder, "tables/shares.csv", "allocation.csv")
     summaries = {name: _read_json(folder / f"{name}.json") for name in ("summary", "manifest")}
     return FinishedRun(
         name=str(summaries["manifest"].get("study", folder.name)),
@@ -192,16 +194,16 @@ def read_run(folder: Path) -> FinishedRun:
     )
 
 
-def _read_ranking(folder: Path) -> FinishedRun:
-    """Return what the folder of ``tolalloc rank`` says."""
+def _read_document(folder: Path, ranking: str, zones: str) -> FinishedRun:
+    """Return what the folder of ``tolalloc rank`` or ``tolalloc allocate`` says, with these two tables."""
     said, manifest = _read_json(folder / "summary.json"), _read_json(folder / "manifest.json")
     said = _with(said, ("study", "study hash", "quick", "limit [arcsec]", "yield [-]"), folder / "summary.json")
     return FinishedRun(
         name=str(said["study"]),
         summary=said,
         manifest={**manifest, "study hash": said["study hash"], "quick": said["quick"]},
-        ranking=_read_table(folder / "tables" / "ranking.csv", _RANKED),
-        zones=_read_table(folder / "tables" / "tolerances.csv", _ZONED),
+        ranking=_read_table(folder / ranking, _RANKED),
+        zones=_read_table(folder / zones, _ZONED),
     )
 
 

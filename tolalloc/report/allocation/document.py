@@ -11,6 +11,7 @@ from tolalloc.report.allocation.sentences import answer
 from tolalloc.report.allocation.summary import summary
 from tolalloc.report.before_after import units_figure, zones_figure
 from tolalloc.report.document import Document, Section
+from tolalloc.report.sobol_table import sobol_table
 
 
 def sections(results: AllocationResults) -> tuple[Section, ...]:
@@ -25,6 +26,10 @@ def sections(results: AllocationResults) -> tuple[Section, ...]:
                 "allocation.csv beside this report has the layout of the tolerance table and is read back by tolalloc; "
                 "drawing.xlsx goes on calculating: change a zone there and see cost and limits.",
             ),
+        ),
+        Section(
+            heading="What still drives the peak-to-peak of the drawing",
+            tables=(("shares", sobol_table(results.shares)),),
         ),
         Section(
             heading="Requirements",
