@@ -15,9 +15,10 @@ from tolalloc.allocation.design_space import ClearanceRange
 from tolalloc.allocation.fronts import exact_front
 from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
 from tolalloc.allocation.local_model import adding_stack, spreading_stack
+from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.search import SearchEffort, allocate
-from tolalloc.allocation.trust_region import Programs, aimed
+from tolalloc.allocation.trust_region import aimed
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.allocation.trust_region import SETTLED
+from tolalloc.allocation.programs import SETTLED
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.reducer.design import Modification
 

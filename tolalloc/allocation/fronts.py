@@ -16,8 +16,8 @@ from tolalloc.allocation.pareto.indicators import spread_over
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.front import front
 from tolalloc.allocation.program.problem import Solution, Stack
+from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
-from tolalloc.allocation.trust_region import Programs
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.surrogate.regression import Surrogate
 from tolalloc.uncertainty.seeds import SeedTree
@@ -81,12 +81,12 @@ def exact_front(
     )
 
 
-def designs_around(
-    space: DesignSpace, centre: Float[np.ndarray, " variable"], span: float, count: int, seeds: SeedTree
+def _designs_around(
+    space: DesignSpace, centre: Float[np.ndarray, " variable"], count: int, seeds: SeedTree
 ) -> Float[np.ndarray, "design variable"]:
     """Return space-filling designs around a centre; clearances vary over their whole range."""
     genes = to_genes(centre)
-    reach = np.append(np.full(genes.size - 2, np.log(span)), [np.inf, np.inf])
+    reach = np.append(np.full(genes.size - 2, np.log(_SPAN)), [np.inf, np.inf])
     lower = np.maximum(to_genes(space.lower), genes - reach)
     upper = np.maximum(np.minimum(to_genes(space.upper), genes + reach), lower)
     unit = qmc.LatinHypercube(genes.size, rng=seeds.generator()).random(count)
@@ -133,7 +133,7 @@ def searched_front(
     return pareto_front(
         replace(response, spread=best.spread),
         LocalQuantile(side=best.sides[0]),
-        designs_around(response.space, best.design, _SPAN, effort.designs, seeds.child("designs")),
+        _designs_around(response.space, best.design, effort.designs, seeds.child("designs")),
         np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),
         seeds.child("pareto"),
         effort,

@@ -12,7 +12,7 @@ from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.trust_region import kept_stacks, step_to_optimum
+from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
 
@@ -85,6 +85,11 @@ class Allocation:
     def stacks(self) -> tuple[Stack, ...]:
         """The chosen design's local models with the room that the search aims at, or that the design takes of it."""
         return kept_stacks(self.chosen, self.tried, margin=1.0)
+
+    @property
+    def asked_stacks(self) -> tuple[Stack, ...]:
+        """The same with the room that the limits leave, however far the chosen design lies beyond them."""
+        return self.stacks if self.chosen.met else aimed(self.chosen, list(self.tried))
 
     @cached_property
     def limit_stacks(self) -> tuple[Stack, ...]:

@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Stack
+from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import Allocation
-from tolalloc.allocation.trust_region import Programs, aimed
 
 _CORRECTIONS = 6
 """Largest number of corrections of the model of the peak-to-peak, on the kernel, for every pair of clearances [-]."""
@@ -65,12 +65,6 @@ def _slope(cost: Float[np.ndarray, "flank radial"], along: Float[np.ndarray, " s
     return np.gradient(cost, along, axis=axis) if along.size > 1 else np.full(cost.shape, np.nan)
 
 
-def asked_stacks(allocation: Allocation) -> tuple[Stack, ...]:
-    """Return the chosen design's local models with the room that the limits leave, however far it lies beyond them."""
-    chosen = allocation.chosen
-    return allocation.stacks if chosen.met else aimed(chosen, list(allocation.tried))
-
-
 def modification_trade(
     response: QuantileResponse,
     allocation: Allocation,
@@ -111,7 +105,7 @@ class _Search:
 
     def __init__(self, response: QuantileResponse, allocation: Allocation) -> None:
         self.response, self.space, self.chosen = response, response.space, allocation.chosen
-        self.stacks = asked_stacks(allocation)
+        self.stacks = allocation.asked_stacks
         self.programs = Programs(self.space, len(self.stacks))
         self.known = float(response(self.chosen.design[np.newaxis]).values[0, 0])
 

@@ -10,7 +10,6 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution
 from tolalloc.allocation.search import Allocation
-from tolalloc.allocation.trade import asked_stacks
 
 
 def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> float:
@@ -36,7 +35,7 @@ def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> 
     place of what was compared with the limit; at the yield asked for they are the same. What the zones spread is in
     proportion to it, so the weights of the model are, too. Other requirements stay.
     """
-    chosen, (first, *others) = allocation.chosen, asked_stacks(allocation)
+    chosen, (first, *others) = allocation.chosen, allocation.asked_stacks
     shown = chosen.sample.quantile_bound(target)
     if not np.isfinite(shown):
         return np.nan

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.unit_price import YieldLadder, best_yield
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
 from tolalloc.allocation.fronts import exact_front, searched_front
-from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_ladders, with_shared_zones
+from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE
 from tolalloc.allocation.quantile import QuantileResponse
@@ -34,8 +33,6 @@ from tolalloc.study.definition import Prepared, Study, prepare
 from tolalloc.study.effort import QUICK, AllocationEffort
 from tolalloc.study.stages import Progress, Record
 from tolalloc.uncertainty.seeds import SeedTree
-
-Ladders = Mapping[str, Float[np.ndarray, " position"]]
 
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
@@ -229,7 +226,7 @@ def allocate_study(
     prepared, record = prepare(replace(study, effort=QUICK) if quick else study), Record(progress)
     require_groups(prepared.space, f"study {study.name}")
     if study.grades:
-        group_ladders(with_shared_zones(prepared.space))  # before anything long runs
+        group_options(with_shared_zones(prepared.space))  # before anything long runs
     searches = Searches(prepared=prepared, kernel=replace(prepared.kernel, observe=record.observe))
     searches.require_enough_units()
     kept = Checkpoint(path=checkpoint, every=4, question=prepared.hash) if checkpoint else None

@@ -124,5 +124,4 @@ class AllocationResults:
     @cached_property
     def modification(self) -> Modification:
         """Modification amounts of the chosen design."""
-        found = self.drawn.modification(self.chosen.design)
-        return Modification(equidistant=float(found.equidistant), shift=float(found.shift))
+        return self.drawn.modification(self.chosen.design)
