@@ -135,7 +135,7 @@ def write_document(document: Document, folder: Path) -> None:
             save_png(figure, figures / f"{figure.name}.png")
     write_json(document.summary, folder / "summary.json")
     versions = {"tolalloc": version("tolalloc"), "python": platform.python_version()}
-    libraries = ("numpy", "scipy", "numba", "pymoo", "pandas")
+    libraries = ("numpy", "scipy", "numba", "pymoo", "cvxpy", "clarabel", "highspy", "SALib", "pandas")
     write_json(
         {
             "title": document.title,
