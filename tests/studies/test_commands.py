@@ -218,7 +218,7 @@ def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     assert answer["lost_motion_arcmin"]["this_unit"] > 2 * tight["lost_motion_arcmin"]["this_unit"]
 
 
-@pytest.mark.parametrize("reducer", ["rv20e", "rv40e", "rv80e"])
+@pytest.mark.parametrize("reducer", ["rv20e", "rv40e", "rv80e", "bx40e"])
 def test_every_preset_turns(reducer):
     answer = json.loads(tolalloc("te", "--reducer", reducer, "--attribute", "--json").stdout)
     assert answer["statuses"]["equilibrium found"] == 936

@@ -1,0 +1,111 @@
+"""Everything that is known of an assembly before it begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.assembly.chain import DatumFlowChain
+from tolalloc.assembly.state_space import StateSpace, state_space
+from tolalloc.assembly.steps import Step
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngularRequirements:
+    """What the final angles must keep, and what the angular tolerances of the parts cost.
+
+    Parameters
+    ----------
+    tilt_limit
+        Limit of three standard deviations of every part's tilt, x and y together; infinite where there is none [rad].
+    rotation_limit
+        The same of its rotation about the datum's axis [rad].
+    smallest, largest
+        Bounds of every tolerance [rad].
+    form
+        Cost of a tolerance t: ``reciprocal`` is fixed + factor/t, ``exponential`` fixed + factor·exp(−t/scale).
+    factor
+        Of every part's three tolerances [cost units·rad, or cost units].
+    fixed
+        The same [cost units].
+    scale
+        The same, of the exponential form [rad].
+    effort_price
+        Cost of one unit of effort times angle² [cost units/rad²].
+    """
+
+    tilt_limit: Float[np.ndarray, " part"]
+    rotation_limit: Float[np.ndarray, " part"]
+    smallest: float
+    largest: float
+    form: str
+    factor: Float[np.ndarray, "part 3"]
+    fixed: Float[np.ndarray, "part 3"]
+    scale: Float[np.ndarray, "part 3"]
+    effort_price: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssemblyPlan:
+    """Chain, steps and weights of one assembly.
+
+    Parameters
+    ----------
+    name, source
+        What it is, and who describes it.
+    chain
+        The parts.
+    steps
+        The steps.
+    tolerances
+        Angular tolerance of every part about its own axes, ±, three standard deviations [rad].
+    precision
+        Q, weight of the final errors against the effort [-].
+    weights
+        Further weight of every part's final errors [-].
+    measurement_noise, adjustment_noise
+        Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad].
+    requirements
+        Limits and costs, if any are stated.
+    reducer
+        Preset or file of the reducer that the parts' errors act on; empty if there is none.
+    assumptions
+        What no source prints.
+    """
+
+    name: str
+    source: str
+    chain: DatumFlowChain
+    steps: tuple[Step, ...]
+    tolerances: Float[np.ndarray, "part 3"]
+    precision: float
+    weights: Float[np.ndarray, " part"]
+    measurement_noise: float
+    adjustment_noise: float
+    requirements: AngularRequirements | None = None
+    reducer: str = ""
+    assumptions: tuple[str, ...] = ()
+
+    @cached_property
+    def space(self) -> StateSpace:
+        """The assembly as a linear system."""
+        return state_space(self.chain, self.steps)
+
+    @property
+    def variances(self) -> Float[np.ndarray, " error"]:
+        """Variance of every part error [rad²]."""
+        return np.asarray((self.tolerances / 3).ravel() ** 2)
+
+    def final_weight(self, precision: float | None = None) -> Float[np.ndarray, "state state"]:
+        """Return the weight matrix of the final errors, Q(N) [-].
+
+        Parameters
+        ----------
+        precision
+            Q in place of the plan's own [-].
+        """
+        own = self.precision if precision is None else precision
+        return np.diag(own * np.repeat(self.weights, 3))

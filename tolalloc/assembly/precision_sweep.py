@@ -1,0 +1,142 @@
+"""What the weight of precision against effort buys, and where it stops buying."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.assembly.final_errors import FinalErrors, final_errors
+from tolalloc.assembly.kalman import kalman_filter
+from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.regulator import Regulator, limiting_regulator, regulator
+from tolalloc.assembly.trajectory import foreseen
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrecisionSweep:
+    """Final errors and effort over the precision weight.
+
+    Parameters
+    ----------
+    precisions
+        Q [-].
+    total
+        Root of the sum of the variances of all final angles [rad].
+    tilt
+        Standard deviation of every part's final tilt, x and y together [rad].
+    rotation
+        The same of its rotation about the datum's axis [rad].
+    effort
+        Expected Σ uᵀRu [rad²].
+    cost
+        Expected weighted square of the final errors plus effort, what the adjustments minimise [rad²].
+    next_unit
+        Share of the total that another unit of Q takes off [-].
+    noise_floor
+        Total that is left however large Q is [rad].
+    """
+
+    precisions: Float[np.ndarray, " precision"]
+    total: Float[np.ndarray, " precision"]
+    tilt: Float[np.ndarray, "precision part"]
+    rotation: Float[np.ndarray, "precision part"]
+    effort: Float[np.ndarray, " precision"]
+    cost: Float[np.ndarray, " precision"]
+    next_unit: Float[np.ndarray, " precision"]
+    noise_floor: float
+
+    def diminished(self, share: float = 0.01) -> float | None:
+        """Return the smallest Q from which on another unit of Q takes off less than a share, if the sweep reaches it.
+
+        Parameters
+        ----------
+        share
+            Share of the total [-].
+        """
+        worth = np.flatnonzero(self.next_unit >= share)
+        first = worth[-1] + 1 if worth.size else 0
+        return float(self.precisions[first]) if first < len(self.precisions) else None
+
+
+def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precision"]) -> PrecisionSweep:
+    """Return what is to be expected of an assembly over the precision weight.
+
+    Parameters
+    ----------
+    plan
+        The assembly; its own precision does not matter.
+    precisions
+        Q, ascending [-].
+
+    Raises
+    ------
+    InputError
+        A reading without noise is known without being taken, from others or from earlier ones.
+
+    Notes
+    -----
+    The estimator does not depend on Q (separation), so it is the same at all of them.
+    """
+    noise = plan.measurement_noise, plan.adjustment_noise
+    kalman = kalman_filter(plan.space, plan.variances, *noise, plan.name)
+
+    def under(adjustments: Regulator) -> FinalErrors:
+        return final_errors(plan.space, adjustments, kalman, *noise)
+
+    def weighed(weight: Float[np.ndarray, "state state"]) -> FinalErrors:
+        return under(regulator(plan.space, weight))
+
+    def angles(found: FinalErrors) -> Float[np.ndarray, "part 3"]:
+        return np.diag(found.covariance(plan.variances)).reshape(-1, 3)
+
+    weights = [plan.final_weight(float(precision)) for precision in precisions]
+    maps = [weighed(weight) for weight in weights]
+    variances = np.array([angles(each) for each in maps])
+    unit = plan.final_weight(1.0)
+    following = np.array([angles(weighed(weight + unit)) for weight in weights])
+    total, next_total = (np.sqrt(each.sum(axis=(1, 2))) for each in (variances, following))
+    return PrecisionSweep(
+        precisions=precisions,
+        total=total,
+        tilt=np.sqrt(variances[..., 0] + variances[..., 1]),
+        rotation=np.sqrt(variances[..., 2]),
+        effort=np.array([each.expected_effort(plan.variances) for each in maps]),
+        cost=np.array([each.expected_cost(plan.variances, weight) for each, weight in zip(maps, weights, strict=True)]),
+        next_unit=1 - next_total / np.where(total > 0, total, 1.0),
+        noise_floor=float(np.sqrt(angles(under(limiting_regulator(plan.space, unit))).sum())),
+    )
+
+
+def norms(
+    plan: AssemblyPlan, errors: Float[np.ndarray, "*samples error"], precisions: Float[np.ndarray, " precision"]
+) -> Float[np.ndarray, "precision *samples"]:
+    """Return the weighted norm of the final errors of parts that are measured beforehand, over the precision weight.
+
+    Parameters
+    ----------
+    plan
+        The assembly; its own precision does not matter.
+    errors
+        Errors of the parts in their own axes [rad].
+    precisions
+        Q [-].
+
+    Returns
+    -------
+    norms
+        √(xᵀQx) of the final errors at Q = 1 times the plan's weights: the plain norm where all weights are 1 [rad].
+
+    Notes
+    -----
+    With S = √Q₁ W √Q₁ ⪰ 0 the weighted final state is (I + qS)⁻¹ times the unadjusted one: each of its coordinates
+    along the eigenvectors of S falls and is convex in q, and so is the norm. A single angle need not fall.
+    """
+    root = np.sqrt(np.diag(plan.final_weight(1.0)))
+    found = list[Float[np.ndarray, "*samples"]]()
+    for precision in precisions:
+        adjustments = regulator(plan.space, plan.final_weight(float(precision)))
+        final = foreseen(plan.space, adjustments, errors).adjusted[..., -1, :]
+        found.append(np.linalg.norm(root * final, axis=-1))
+    return np.array(found)

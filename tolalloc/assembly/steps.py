@@ -1,0 +1,168 @@
+"""Steps of an assembly: what is mounted, what may be turned at which effort, and what is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.assembly.chain import DatumFlowChain
+from tolalloc.exceptions import InputError, UnknownNameError
+
+Choice = Literal["current", "mounted", "all"]
+"""The part just mounted; all parts mounted so far; also those that are not there yet, as zhang2025's R = 1000 does."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One step: mount a part, measure, adjust.
+
+    Parameters
+    ----------
+    mount
+        Name of the part that is mounted.
+    adjust
+        T(k): names of the parts that may be turned.
+    effort
+        R(k): effort of turning each of them by one unit of angle, against the precision weight [-].
+    measure
+        C(k): what is measured against the datum, ``A``, or of one part against another, ``A - B``.
+    """
+
+    mount: str
+    adjust: tuple[str, ...]
+    effort: Mapping[str, float] = field(default_factory=dict)
+    measure: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Efforts:
+    """Effort of turning a part by one unit of angle, over that of the precision weight.
+
+    Parameters
+    ----------
+    just_mounted, mounted_earlier, not_mounted
+        Of the part mounted in this step; before; afterwards [-].
+    """
+
+    just_mounted: float = 1.0
+    mounted_earlier: float = 10.0
+    not_mounted: float = 1000.0
+
+    def of(self, part: int, step: int) -> float:
+        """Return the effort of turning the part at a position in the order of assembly at a step [-]."""
+        if part > step:
+            return self.not_mounted
+        return self.just_mounted if part == step else self.mounted_earlier
+
+
+def steps_in_order(chain: DatumFlowChain, adjust: Choice, measure: Choice, efforts: Efforts) -> tuple[Step, ...]:
+    """Return one step per part, in the order of assembly.
+
+    Parameters
+    ----------
+    chain
+        The parts.
+    adjust, measure
+        Which parts may be turned, and which are measured against the datum, at every step.
+    efforts
+        Effort of turning.
+    """
+    return tuple(
+        Step(
+            mount=mounted,
+            adjust=_chosen(chain.names, at, adjust),
+            effort={name: efforts.of(place, at) for place, name in enumerate(chain.names)},
+            measure=_chosen(chain.names, at, measure),
+        )
+        for at, mounted in enumerate(chain.names)
+    )
+
+
+def _chosen(names: tuple[str, ...], step: int, choice: Choice) -> tuple[str, ...]:
+    return {"current": names[step : step + 1], "mounted": names[: step + 1], "all": names}[choice]
+
+
+def adjustable(chain: DatumFlowChain, step: Step) -> Bool[np.ndarray, " part"]:
+    """Return which parts may be turned at a step."""
+    return np.array([name in step.adjust for name in chain.names])
+
+
+def efforts(chain: DatumFlowChain, step: Step) -> Float[np.ndarray, " part"]:
+    """Return the effort of turning each part at a step, 1 where none is given [-]."""
+    return np.array([float(step.effort.get(name, 1.0)) for name in chain.names])
+
+
+def observed(chain: DatumFlowChain, step: Step) -> Float[np.ndarray, "reading part"]:
+    """Return what is measured at a step as rows of 1, −1 and 0 over the parts [-]."""
+    rows = np.zeros((len(step.measure), len(chain.parts)))
+    for row, text in zip(rows, step.measure, strict=True):
+        for name, sign in zip((name.strip() for name in text.split(" - ")), (1.0, -1.0), strict=False):
+            row[chain.names.index(name)] += sign
+    return rows
+
+
+def check_steps(chain: DatumFlowChain, steps: Sequence[Step], place: str) -> None:
+    """Refuse steps that cannot be carried out.
+
+    Parameters
+    ----------
+    chain
+        The parts.
+    steps
+        The steps.
+    place
+        File or caller for the sentence.
+
+    Raises
+    ------
+    InputError
+        A part is mounted twice or never, a part is adjusted or measured before it is mounted, an effort is not
+        positive.
+    UnknownNameError
+        A name that no part has.
+
+    Notes
+    -----
+    Parts that are not there can be turned by `steps_in_order` with ``all`` only, zhang2025's own way.
+    """
+    mounted: list[str] = []
+    for number, step in enumerate(steps, start=1):
+        where = f"{place}, step {number}"
+        _check_names_and_efforts(chain, step, where)
+        if step.mount in mounted:
+            raise InputError.at(where, "mount", step.mount, "a part that is not mounted yet")
+        mounted.append(step.mount)
+        for what, names in (("adjust", step.adjust), ("measure", _measured(step))):
+            for name in names:
+                if name not in mounted:
+                    raise InputError(
+                        f"{where}: {what} names {name}, which is not mounted yet; allowed is {' or '.join(mounted)}."
+                    )
+    missing = [name for name in chain.names if name not in mounted]
+    if missing:
+        raise InputError.at(place, "steps", f"none mounts {missing[0]}", "steps that mount every part once")
+    order = [chain.names.index(name) for name in mounted]
+    if order != sorted(order):
+        raise InputError.at(place, "steps", ", ".join(mounted), "the order of the parts: " + ", ".join(chain.names))
+
+
+def _measured(step: Step) -> list[str]:
+    return [name.strip() for text in step.measure for name in text.split(" - ")]
+
+
+def _check_names_and_efforts(chain: DatumFlowChain, step: Step, where: str) -> None:
+    """Refuse unknown names, efforts that are not positive and measurements that are none."""
+    for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
+        if name not in chain.names:
+            raise UnknownNameError.among(where, "part", name, chain.names)
+    for name, effort in step.effort.items():
+        if not 0 < effort < np.inf:
+            raise InputError.at(where, f"effort of {name}", effort, "a number above 0")
+    for text in step.measure:
+        parts = [name.strip() for name in text.split(" - ")]
+        if len(parts) > 2 or len(set(parts)) < len(parts):
+            raise InputError.at(where, "measure", text, "a part, or one part - another")
