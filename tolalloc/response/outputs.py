@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.cycloid.contact_stiffness import peak_pressure
 from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.equivalent.kinematics import Positions
+from tolalloc.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.outputs import OUTPUTS, Solved, waves
 from tolalloc.equivalent.radial_clearance import radial_clearance
@@ -61,25 +60,20 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     solved = Solved.of(model.equilibria(errors, np.copysign(model.reducer.load.rated_torque, torque), _ANGLES))
     own = [output.value(solved) for output in OUTPUTS if output.name in _FORCES]
-    values = np.stack([*own, *_pin_stress(model, solved.forces.pins)], axis=1)
+    values = np.stack([*own, *_pin_stress(solved)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))
 
 
-def _pin_stress(
-    model: EquivalentModel, pins: Float[np.ndarray, "chunk angle disc pin"]
-) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
-    """Return the largest force over face width [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
+def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
+    """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
 
     Notes
     -----
-    Both take the force as spread evenly over the face width; a tilted tooth loads one end more.
+    Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     """
-    stage, at = model.reducer.cycloid_stage, Positions(model.reducer, _ANGLES)
-    discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(model.reducer.disc_count)]
-    pin_angle = np.stack(discs, axis=1)
-    of_one_newton = peak_pressure(stage, model.reducer.contact_modulus, pin_angle, np.ones_like(pin_angle))
-    pressure = of_one_newton * np.sqrt(pins)  # Hertz's grows with the root of the force
-    return pins.max(axis=(1, 2, 3)) / (stage.face_width / MILLIMETRE), pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+    line_load = peak_line_load(solved.equilibria, solved.forces)
+    pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
+    return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
 
 
 def _radial_clearance(

@@ -1,0 +1,175 @@
+"""Line load along tilted teeth: the closed forms against the kernel's force law and against plain integration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.random_reducers import random_reducer
+from tolalloc.cycloid.contact_stiffness import peak_pressure
+from tolalloc.cycloid.mesh import normals
+from tolalloc.cycloid.solvers.contact_law import LINEAR, pin_force
+from tolalloc.equivalent.contact_pattern import contact_pattern
+from tolalloc.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.equivalent.line_load import LineContact, line_contact, peak_line_load, unit_pressure
+from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.equivalent.outputs import Solved
+from tolalloc.exceptions import InputError
+from tolalloc.response.kernel import KernelResponse
+from tolalloc.response.outputs import OutputsResponse
+from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+
+TORQUE = -100.0
+
+
+def whole_width(contact):
+    """Positions at the middle of 20 000 slices of the width, and the width of a slice [m]."""
+    count = 20_000
+    return (np.arange(count) + 0.5) / count * contact.face_width - contact.face_width / 2, contact.face_width / count
+
+
+def test_the_closed_forms_are_those_of_slices_pressed_to_their_own_depth(generator):
+    stiffness, width = 2e9, 12e-3
+    for _ in range(200):
+        slope, compression = generator.normal(0, 1e-3), generator.normal(0, 5e-6)
+        force, _ = pin_force(LINEAR, stiffness, 0.0, 0.5 * width * abs(slope), compression)
+        contact = LineContact(
+            force=np.array([force]), stiffness=np.array([stiffness]), slope=np.array([slope]), face_width=width
+        )
+        position, slice_width = whole_width(contact)
+        load = stiffness / width * np.maximum(compression + slope * position, 0.0)
+        np.testing.assert_allclose(contact.line_load(position)[0], load, rtol=1e-9, atol=1e-9 * load.max() + 1e-6)
+        kink = stiffness / width * abs(slope) * slice_width**2  # of the slice in which the contact ends
+        assert force == pytest.approx(load.sum() * slice_width, rel=1e-9, abs=kink)
+        deepest = max(compression + 0.5 * width * abs(slope), 0.0)
+        assert contact.peak[0] == pytest.approx(stiffness / width * deepest, rel=1e-9, abs=1e-6)
+        assert contact.deformation[0] == pytest.approx(deepest, rel=1e-9, abs=1e-15)
+
+
+def test_both_forms_of_the_peak_meet_where_one_end_just_lifts():
+    stiffness, width, slope = 2e9, 12e-3, 1e-4
+    lifting = stiffness * width * slope / 2
+    forces = lifting * np.array([1 - 1e-12, 1.0, 1 + 1e-12])
+    contact = LineContact(force=forces, stiffness=np.full(3, stiffness), slope=np.full(3, slope), face_width=width)
+    np.testing.assert_allclose(contact.peak, np.sqrt(2 * stiffness * slope * lifting / width), rtol=1e-11)
+    np.testing.assert_allclose(contact.peak, lifting / width + stiffness * slope / 2, rtol=1e-11)
+
+
+def tilted(model, generator, samples=4):
+    """Errors of units with tilted discs, one of them with no tilt at all."""
+    errors = np.zeros((samples, len(model.columns)))
+    discs = range(1, model.reducer.disc_count + 1)
+    tilts = [model.columns.index(f"disc{disc}.tilt.{axis}") for disc in discs for axis in "xy"]
+    errors[1:, tilts] = generator.normal(0, 300 * ARCSECOND, (samples - 1, len(tilts)))
+    return errors
+
+
+def linear(reducer, law, bending):
+    return replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law, pin_bending=bending))
+
+
+@pytest.mark.parametrize(("law", "bending"), [("constant", np.inf), ("table2", 3e8)])
+def test_the_load_along_the_width_adds_up_to_the_force_of_the_kernel(law, bending, generator):
+    model = EquivalentModel(linear(random_reducer(generator), law, bending))
+    errors, angles = tilted(model, generator), np.array([0.0, 0.3, 2.0])
+    solved = Solved.of(model.equilibria(errors, TORQUE, angles))
+    assert not solved.equilibria.status.any()
+    contact = line_contact(solved.equilibria, solved.forces)
+    lifted = 0
+    for place in np.ndindex(contact.force.shape[:-1]):
+        own = contact.of(place)
+        position, slice_width = whole_width(own)
+        load = own.line_load(position)
+        np.testing.assert_allclose(load.sum(axis=1) * slice_width, own.force, rtol=1e-5, atol=1e-3)
+        assert load.max() <= own.peak.max()
+        lifted += np.count_nonzero((load.min(axis=1) == 0) & (own.force > 0))
+    assert lifted > 10
+
+
+def test_a_tooth_presses_deepest_on_the_side_to_which_its_tilt_moves_it(rv20e):
+    """The depth along the width is that of the pin rows when the disc is displaced as the tilt displaces its slices."""
+    errors, angles = np.zeros((1, len(rv20e.columns))), np.array([0.4])
+    gamma = {"x": 70 * ARCSECOND, "y": -40 * ARCSECOND}
+    for axis, value in gamma.items():
+        errors[0, rv20e.columns.index(f"disc2.tilt.{axis}")] = value
+    solved = Solved.of(rv20e.equilibria(errors, TORQUE, angles))
+    contact, stage = line_contact(solved.equilibria, solved.forces), rv20e.reducer.cycloid_stage
+    assert not contact.slope[0, 0, 0].any()
+    # A turn (γx, γy) moves a point at height z by z·(γy, −γx); a disc moved along n goes out of the pin.
+    turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    moved_x, moved_y = turn @ [gamma["y"], -gamma["x"]]
+    crank = -stage.disc_teeth * 0.4 + np.pi
+    pin_angle = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count - crank
+    into = normals(stage.shortening, pin_angle)
+    normal = crank + np.arctan2(into.towards_tangent, into.towards_crank)
+    expected = -(moved_x * np.cos(normal) + moved_y * np.sin(normal))
+    np.testing.assert_allclose(contact.slope[0, 0, 1], expected, atol=1e-15)
+
+
+def test_pressure_of_an_even_load_is_hertz_s(rv20e):
+    solved = Solved.of(rv20e.equilibria(np.zeros((1, len(rv20e.columns))), TORQUE, np.array([0.1])))
+    stage = rv20e.reducer.cycloid_stage
+    pins = solved.forces.pins[0, 0, 0]
+    found = unit_pressure(solved.equilibria)[0, 0] * np.sqrt(peak_line_load(solved.equilibria, solved.forces)[0, 0, 0])
+    pin_angle = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count + stage.disc_teeth * 0.1
+    expected = peak_pressure(stage, rv20e.reducer.contact_modulus, pin_angle, pins)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def stress(model, errors):
+    fixed = dict(zip(model.columns, errors, strict=True))
+    response = OutputsResponse(kernel=KernelResponse(model=model, torque=TORQUE, columns=(), fixed=fixed))
+    return dict(zip(response.outputs, response(np.empty((1, 0))).values[0], strict=True))
+
+
+def test_a_tilted_disc_loads_one_end_more_and_a_level_one_evenly(rv20e, table4):
+    width, level = rv20e.reducer.cycloid_stage.face_width / MILLIMETRE, stress(rv20e, table4[0])
+    force, load = "largest pin force, rated torque [N]", "largest line load, rated torque [N/mm]"
+    assert level[load] == pytest.approx(level[force] / width, rel=1e-14)
+    errors = table4[0].copy()
+    errors[rv20e.columns.index("disc1.tilt.x")] = 100 * ARCSECOND
+    tilted = stress(rv20e, errors)
+    assert tilted[load] > 1.1 * tilted[force] / width
+    rated = -abs(rv20e.reducer.load.rated_torque)
+    solved = Solved.of(rv20e.equilibria(errors[np.newaxis], rated, LOOP_ANGLES[::9]))
+    own = peak_line_load(solved.equilibria, solved.forces)
+    assert tilted[load] == pytest.approx(own.max() * MILLIMETRE, rel=1e-12)
+    pressure, even = (unit_pressure(solved.equilibria) * np.sqrt(q) for q in (own, solved.forces.pins / width * 1e3))
+    assert tilted["peak pressure, rated torque [MPa]"] == pytest.approx(pressure.max() / MEGAPASCAL, rel=1e-12)
+    assert (pressure[0, :, 0] >= even[0, :, 0]).all()
+    np.testing.assert_allclose(pressure[0, :, 1], even[0, :, 1], rtol=1e-12)
+
+
+def test_the_logarithmic_law_spreads_every_force_evenly(rv20e):
+    model = EquivalentModel(linear(rv20e.reducer, "logarithmic", np.inf))
+    solved = Solved.of(model.equilibria(np.zeros((1, len(model.columns))), TORQUE, np.array([0.1, 0.2])))
+    width = rv20e.reducer.cycloid_stage.face_width
+    np.testing.assert_array_equal(peak_line_load(solved.equilibria, solved.forces), solved.forces.pins / width)
+
+
+def test_a_contact_pattern_lies_where_the_line_load_is_largest(rv20e, generator):
+    errors = tilted(rv20e, generator)[1]
+    pattern = contact_pattern(rv20e, errors, TORQUE, disc=2)
+    solved = Solved.of(rv20e.equilibria(errors[np.newaxis], TORQUE))
+    peak = peak_line_load(solved.equilibria, solved.forces)[0, :, 1].max()
+    assert pattern.line_load.max() == pytest.approx(peak, rel=1e-12)
+    again = contact_pattern(rv20e, errors, TORQUE, disc=2, carrier_angle=pattern.carrier_angle, positions=401)
+    np.testing.assert_allclose(again.force, pattern.force, rtol=1e-6, atol=1e-6)
+    added = np.trapezoid(again.line_load, again.position, axis=1)
+    np.testing.assert_allclose(added, again.force, rtol=1e-3, atol=1.0)
+    assert (pattern.deformation > 0).tolist() == (pattern.force > 0).tolist()
+    assert pattern.pressure.max() / MEGAPASCAL > 100
+
+
+@pytest.mark.parametrize("disc", [0, 3])
+def test_a_contact_pattern_knows_the_discs_of_its_reducer(rv20e, table4, disc):
+    with pytest.raises(InputError, match="allowed is 1 to 2"):
+        contact_pattern(rv20e, table4[0], TORQUE, disc=disc)
+
+
+def test_a_contact_pattern_needs_a_law_that_knows_the_load_along_the_width(rv20e, table4):
+    model = EquivalentModel(linear(rv20e.reducer, "logarithmic", np.inf))
+    with pytest.raises(InputError, match="allowed is constant or table2"):
+        contact_pattern(model, np.zeros(len(model.columns)), TORQUE)
