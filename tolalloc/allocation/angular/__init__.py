@@ -1,0 +1,1 @@
+"""Angular tolerances of parts that are adjusted while they are assembled."""
