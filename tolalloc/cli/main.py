@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from tolalloc.cli.allocate import allocate
+from tolalloc.cli.assemble import assemble
 from tolalloc.cli.console import (
     AsJson,
     ReportFolder,
@@ -25,6 +26,7 @@ from tolalloc.cli.contact import asked_reducer, contact_answer
 from tolalloc.cli.costs import costs
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
+from tolalloc.cli.mount import mount
 from tolalloc.cli.rank import rank
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
@@ -238,6 +240,8 @@ app.command()(allocate)
 app.command()(costs)
 app.command()(identify)
 app.command()(diagnose)
+app.command()(assemble)
+app.command()(mount)
 
 
 @app.command()

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
+from math import log10
 from pathlib import Path
 from typing import Any, Literal
 
@@ -195,10 +196,15 @@ def _(figure: Figure) -> str:
     canvas = go.Figure()
     for number, item in enumerate(figure.series):
         _add(canvas, item, COLOURS[number % len(COLOURS)])
+    # On a logarithmic axis plotly places a line by its value and a text by the logarithm of it.
     for value, name in figure.vertical:
-        canvas.add_vline(x=value, line_dash="dash", line_color="#b00020", annotation_text=name)
+        canvas.add_vline(x=value, line_dash="dash", line_color="#b00020")
+        place = log10(value) if figure.logarithmic_x else value
+        canvas.add_annotation(x=place, y=1, yref="paper", text=name, showarrow=False, xanchor="left", yanchor="top")
     for value, name in figure.horizontal:
-        canvas.add_hline(y=value, line_dash="dash", line_color="#b00020", annotation_text=name)
+        canvas.add_hline(y=value, line_dash="dash", line_color="#b00020")
+        place = log10(value) if figure.logarithmic else value
+        canvas.add_annotation(x=1, xref="paper", y=place, text=name, showarrow=False, xanchor="right", yanchor="bottom")
     canvas.update_layout(
         template="plotly_white",
         barmode="overlay" if any(item.kind == "histogram" for item in figure.series) else "group",

@@ -1,0 +1,78 @@
+"""zhang2025's BX40E: what adjusting takes out of angular errors, what that does, and what the tolerances may cost then.
+
+python studies/zhang2025_assembly.py [--quick] [--out FOLDER]
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from zhang2025_sections import (
+    PRECISIONS,
+    drawn_parts_section,
+    exponential_section,
+    genetic_section,
+    mounting_section,
+    pattern_section,
+    priced_section,
+)
+
+from tolalloc.cli.document_script import run_document
+from tolalloc.report.assembly.document import assembly_document
+from tolalloc.report.document import Document
+from tolalloc.study.assembly import AssemblyStudy, assemble, prepare_assembly
+from tolalloc.units import ARCSECOND
+
+SEED = 20250711
+"""Seed of the parts that stand for zhang2025's Table 3, which is lost."""
+
+
+class Silent:
+    """Tells nobody how far the work has come."""
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage."""
+
+    def advance(self, units: int) -> None:
+        """Count units."""
+
+
+def parts_drawn() -> np.ndarray:
+    """Return errors within ±60″, to 0.01″ [rad]."""
+    return np.round(np.random.default_rng(SEED).uniform(-60, 60, (4, 3)), 2) * ARCSECOND
+
+
+def build(quick: bool) -> Document:
+    """Return the report."""
+    asked = AssemblyStudy(chain="bx40e", assemblies=10_000 if quick else 100_000, seed=1)
+    prepared = replace(prepare_assembly(asked), name="parts drawn within ±60″", errors=parts_drawn())
+    results = assemble(prepared, Silent())
+    document = assembly_document(results)
+    plan = results.plan
+    drawn, shares = drawn_parts_section(plan, 40 if quick else 200)
+    mounting, mounted = mounting_section(3 if quick else 100)
+    genetic, searched = genetic_section(plan, 2 if quick else 10)
+    priced, prices = priced_section(plan)
+    return replace(
+        document,
+        title="BX40E of zhang2025: angular errors, adjustment, tolerances",
+        answer=(*document.answer, shares, prices, searched, mounted),
+        sections=(
+            *document.sections,
+            drawn,
+            pattern_section(prepared.plan, parts_drawn(), PRECISIONS),
+            priced,
+            exponential_section(plan),
+            genetic,
+            mounting,
+        ),
+        assumptions=(
+            *document.assumptions,
+            f"errors of the parts drawn from ±60″ with seed {SEED}: zhang2025's Table 3 is lost",
+        ),
+    )
+
+
+if __name__ == "__main__":
+    run_document("zhang2025_assembly", build)

@@ -1,0 +1,383 @@
+"""Sentences, tables and figures of the report on an assembly: a real run without a reducer, and made-up curves."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.gains import assembled, tuned_gains
+from tolalloc.assembly.steps import Efforts, steps_in_order
+from tolalloc.assembly.trajectory import random_numbers
+from tolalloc.equivalent.contact_pattern import ContactPattern
+from tolalloc.reducer.files import load_reducer
+from tolalloc.report.assembly import tables, tolerance_tables, transmission
+from tolalloc.report.assembly.cautions import assumptions, warnings
+from tolalloc.report.assembly.document import assembly_document
+from tolalloc.report.assembly.results import AssemblyResults, TransmissionEffect
+from tolalloc.report.assembly.sentences import answer
+from tolalloc.report.assembly.summary import summary
+from tolalloc.report.figure import as_html
+from tolalloc.response.orientations import TRANSMISSION, TransmissionCurves
+from tolalloc.study.assembly import AssemblyStudy, PreparedAssembly, assemble
+from tolalloc.units import ARCSECOND
+
+CHAIN = """
+name = "pump"
+source = "own"
+datum = "base"
+precision = 5
+adjust = "mounted"
+measure = "current"
+assumptions = ["the base is rigid"]
+
+[noise]
+measurement_arcsec = 2
+adjustment_arcsec = 1
+
+[[part]]
+name = "bracket"
+on = "base"
+tolerance_arcsec = [60, 60, 60]
+tilt_limit_arcsec = 25
+cost = { form = "reciprocal", factor = [100, 100, 50] }
+
+[[part]]
+name = "rotor"
+on = "bracket"
+turned_deg = [0, 0, 90]
+tolerance_arcsec = [40, 40, 40]
+rotation_limit_arcsec = 15
+cost = { form = "reciprocal", factor = [70, 70, 90] }
+
+[[part]]
+name = "cover"
+on = "base"
+tolerance_arcsec = [30, 30, 30]
+cost = { form = "reciprocal", factor = [10, 10, 10] }
+
+[tolerances]
+smallest_arcsec = 3
+largest_arcsec = 120
+effort_price = 0.02
+"""
+ERRORS = ARCSECOND * np.array([[70.0, -20, 10], [-30, 15, 0], [5, 25, -12]])
+
+
+class Silent:
+    def begin(self, stage: str) -> None: ...
+
+    def advance(self, units: int) -> None: ...
+
+
+def run(plan, errors=None) -> AssemblyResults:
+    asked = AssemblyStudy(chain="pump", assemblies=2000)
+    return assemble(PreparedAssembly(asked=asked, plan=plan, name="seven", errors=errors), Silent())
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    path = tmp_path_factory.mktemp("chain") / "pump.chain.toml"
+    path.write_text(CHAIN, encoding="utf-8")
+    return load_plan(path)
+
+
+@pytest.fixture(scope="module")
+def expected(plan) -> AssemblyResults:
+    return run(plan)
+
+
+@pytest.fixture(scope="module")
+def measured(plan) -> AssemblyResults:
+    return run(plan, ERRORS)
+
+
+def curves(samples: int) -> TransmissionCurves:
+    angle = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    wave = np.tile(np.sin(40 * angle), (samples, 1))
+    return TransmissionCurves(
+        carrier_angle=angle,
+        transmission_error=wave * ARCSECOND,
+        pin_force=2 + wave,
+        disc_force=2 + wave,
+        line_load=2 + wave,
+        pressure=2 + wave,
+        pins_in_contact=2 + wave,
+        status=np.zeros((samples, 200), dtype=np.uint8),
+    )
+
+
+def pattern(largest: float) -> ContactPattern:
+    force = largest * np.array([0.0, 0.4, 1.0, 0.0])
+    along = force[:, np.newaxis] * np.ones(41)
+    return ContactPattern(
+        disc=2,
+        carrier_angle=1.0,
+        position=np.linspace(-6e-3, 6e-3, 41),
+        force=force,
+        deformation=1e-9 * force,
+        line_load=1e3 * along,
+        pressure=1e6 * along,
+    )
+
+
+def effect(samples: int) -> TransmissionEffect:
+    """Return made-up answers at Q = 0 and 5: the line load halves, the peak-to-peak rises in all but the last."""
+    outputs = tuple(name for reading in TRANSMISSION for name in reading.outputs)
+    values = np.ones((2, samples, len(outputs)))
+    values[0, :, outputs.index(transmission.LINE_LOAD)] = 400.0
+    values[1, :, outputs.index(transmission.LINE_LOAD)] = 200.0
+    values[1, :, outputs.index(transmission.PEAK_TO_PEAK)] = 3.0
+    values[1, -1, outputs.index(transmission.PEAK_TO_PEAK)] = 3.0 if samples == 1 else 0.5
+    return TransmissionEffect(
+        reducer=load_reducer("bx40e"),
+        test_torque=-1.0,
+        precisions=np.array([0.0, 5.0]),
+        outputs=outputs,
+        perfect=np.full(len(outputs), 0.8),
+        values=values,
+        good=np.ones(samples, dtype=bool),
+        perfect_curves=curves(1),
+        curves=curves(2),
+        patterns=(pattern(400.0), pattern(200.0)),
+    )
+
+
+def said(results: AssemblyResults) -> str:
+    return " ".join(answer(results))
+
+
+def test_the_norm_of_measured_parts_is_said_before_and_after(measured):
+    before, after = measured.measured.norms[[0, tables.at_precision(measured)]] / ARCSECOND
+    assert np.linalg.norm(measured.measured.unadjusted) / ARCSECOND == pytest.approx(before)
+    assert np.linalg.norm(measured.measured.adjusted) / ARCSECOND == pytest.approx(after)
+    assert f"takes the norm of all final angles from {before:.2f}″ to {after:.2f}″" in said(measured)
+
+
+def test_a_weighted_norm_is_called_so(plan):
+    assert "weighted norm" in said(run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), ERRORS))
+
+
+def test_what_is_to_be_expected_is_said_with_the_noise(expected):
+    sweep, at = expected.sweep, tables.at_precision(expected)
+    before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
+    sentence = answer(expected)[0]
+    assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
+    assert f"noise leaves {floor:.2f}″" in sentence
+
+
+def test_where_another_unit_of_precision_buys_little_is_said(expected):
+    found = expected.sweep.diminished()
+    assert f"From a precision of {found:g} on, another unit takes less than 1%" in said(expected)
+
+
+def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
+    sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, 0.25))
+    assert "another unit still takes off 25.0%" in said(replace(expected, sweep=sweep))
+
+
+def test_the_line_load_is_said_with_perfect_parts(measured):
+    sentences = said(replace(measured, transmission=effect(1)))
+    assert "Largest line load at rated torque: 400 → 200 N/mm (perfect parts: 0.8 N/mm)." in sentences
+    assert "Peak-to-peak transmission error at -1 N·m: 1 → 3 arcsec" in sentences
+    assert "Neither need fall with the angles." in sentences
+
+
+def test_random_assemblies_are_counted(expected):
+    sentences = said(replace(expected, transmission=effect(10)))
+    assert "medians of 10 random assemblies: 400 → 200 N/mm (perfect parts: 0.8 N/mm, smaller in 10 of 10)" in sentences
+    assert "1 → 3 arcsec (perfect parts: 0.8 arcsec, smaller in 1 of 10)" in sentences
+
+
+def test_costs_are_said_with_and_without_adjusting(expected):
+    tolerances = expected.tolerances
+    assert (
+        f"{tolerances.adjusted.total:.2f} cost units with adjusting at a precision of 5, "
+        f"{tolerances.unadjusted.total:.2f} without adjusting"
+    ) in said(expected)
+
+
+def test_limits_out_of_reach_without_adjusting_are_said_and_warned_of(expected):
+    without = replace(expected, tolerances=replace(expected.tolerances, unadjusted="pump: too wide."))
+    assert "without adjusting no tolerances keep the limits" in said(without)
+    assert "Without adjusting: pump: too wide." in warnings(without)
+    assert "unadjusted, ± [arcsec]" not in tolerance_tables.tolerance_table(without.plan, without.tolerances)
+
+
+def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected):
+    tolerances = expected.tolerances
+    saving = 1 - tolerances.retuned.best.total / tolerances.adjusted.total
+    assert saving > 0
+    assert f"brings them to {tolerances.retuned.best.total:.2f}, {saving:.1%} less." in said(expected)
+    assert any("that no other filter allows cheaper ones is not proven" in warning for warning in warnings(expected))
+
+
+def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
+    share = expected.tolerances.verification.share
+    assert f"Of 2000 random assemblies with the cheapest of these tolerances {share.estimate:.2%} are" in said(expected)
+
+
+def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
+    everything = steps_in_order(plan.chain, "all", "current", Efforts())
+    warned = "Turns of parts that are mounted later cannot be made: steps 1, 2."
+    assert warned in warnings(run(replace(plan, steps=everything, requirements=None)))
+    assert warned not in warnings(expected)
+
+
+def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan):
+    best = expected.tolerances.by_precision.best
+    assert f"a precision of {best.gains.precision:.4g}" in said(expected)
+    assert "best precision" in set(tolerance_tables.certificate_table(plan, expected.tolerances)["allocation"])
+    free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
+    assert "With effort priced" not in said(free)
+    assert "best precision" not in set(tolerance_tables.certificate_table(free.plan, free.tolerances)["allocation"])
+
+
+def test_parts_beyond_their_tolerance_are_named_and_no_others(measured):
+    assert "Beyond their stated tolerance: bracket about x (+70.00″, ±60″)." in warnings(measured)
+
+
+def test_a_part_at_its_tolerance_is_not_beyond_it(plan):
+    assert not any("Beyond" in warning for warning in warnings(run(plan, plan.tolerances)))
+
+
+def test_missed_limits_are_named(expected):
+    tight = replace(expected.plan.requirements, tilt_limit=ARCSECOND * np.array([1.0, np.inf, np.inf]))
+    missed = warnings(replace(expected, plan=replace(expected.plan, requirements=tight)))
+    assert any("miss limits: tilt of bracket (" in warning and "limit 1″" in warning for warning in missed)
+    assert not any("miss limits" in warning for warning in warnings(expected))
+
+
+def test_a_characteristic_that_rises_is_named(measured):
+    assert not tables.larger(measured)
+    swapped = replace(measured.measured, unadjusted=measured.measured.adjusted / 2)
+    assert any(
+        warning.startswith("Adjusting leaves larger than unadjusted: tilt of bracket (")
+        for warning in warnings(replace(measured, measured=swapped))
+    )
+
+
+def test_assemblies_without_equilibrium_are_counted(expected):
+    made = effect(10)
+    lost = replace(made, good=np.arange(10) > 0)
+    assert "Assemblies without equilibrium, left out of the transmission: 1." in warnings(
+        replace(expected, transmission=lost)
+    )
+    assert transmission.answers(lost, transmission.LINE_LOAD).shape == (2, 9)
+
+
+def test_turning_as_listed_gives_what_is_said_to_be_left(measured):
+    frame, plan = tables.step_table(measured), measured.plan
+    state = np.zeros(9)
+    for number, step in enumerate(plan.steps):
+        state = state + plan.space.entering[number] @ ERRORS.ravel() / ARCSECOND
+        rows = frame[frame["step [-]"] == number + 1]
+        assert set(rows["mount"]) == {step.mount}
+        for part, *turn in rows[["turn", "x [arcsec]", "y [arcsec]", "z [arcsec]"]].itertuples(index=False):
+            first = 3 * plan.chain.names.index(part)
+            state = state + plan.chain.transform[:, first : first + 3] @ np.array(turn)
+        for part, tilt, rotation in rows.iloc[:, [3, 7, 8]].itertuples(index=False):
+            x, y, z = state.reshape(-1, 3)[plan.chain.names.index(part)]
+            # Every turn is rounded to 0.005″, and up to nine of them add up.
+            assert (tilt, rotation) == pytest.approx((np.hypot(x, y), z), abs=0.1)
+
+
+def test_expected_turns_have_the_effort_that_is_expected(expected):
+    turned = tables.turns(expected).reshape(3, -1) / 3
+    effort = (expected.plan.space.effort * turned**2).sum()
+    assert effort == pytest.approx(expected.sweep.effort[tables.at_precision(expected)])
+
+
+def test_the_last_step_leaves_what_the_sweep_says(expected):
+    tilt, rotation = tables.tilt_and_rotation(expected.expected[-1, 1])
+    at = tables.at_precision(expected)
+    np.testing.assert_allclose(tilt, expected.sweep.tilt[at])
+    np.testing.assert_allclose(rotation, expected.sweep.rotation[at])
+
+
+def test_noise_alone_is_what_perfect_parts_are_left_with(expected, plan):
+    noise = tables.characteristic_table(expected)["noise, 3σ [arcsec]"].to_numpy()
+    # A filter that expects the stated tolerances, on parts that have none.
+    drawn = assembled(
+        plan, tuned_gains(plan, 5.0, plan.tolerances), 0 * plan.tolerances, np.eye(random_numbers(plan.space))
+    )
+    tilt, rotation = tables.tilt_and_rotation(3 * np.sqrt((drawn.adjusted[:, -1] ** 2).sum(axis=0)) / ARCSECOND)
+    np.testing.assert_allclose(noise, [*tilt, *rotation])
+    assert (noise < tables.characteristic_table(expected)["after, 3σ [arcsec]"]).all()
+
+
+def test_costs_of_single_tolerances_add_up(expected):
+    frame = tolerance_tables.tolerance_table(expected.plan, expected.tolerances)
+    assert frame["cost adjusted [cost units]"].sum() == pytest.approx(expected.tolerances.adjusted.cost)
+
+
+def test_a_part_without_a_limit_is_neither_kept_nor_missed(expected):
+    frame = tables.characteristic_table(expected)
+    free = frame["limit [arcsec]"].isna()
+    assert free.sum() == 4
+    assert set(frame.loc[free, "OK"]) == {""} and set(frame.loc[~free, "OK"]) == {"yes"}
+
+
+def test_what_is_drawn_over_the_precision_is_computed():
+    outputs = {name for reading in TRANSMISSION for name in reading.outputs}
+    assert set(transmission.DRAWN.values()) <= outputs
+
+
+def test_differences_from_perfect_parts_are_in_percent():
+    frame = transmission.difference_table(effect(1))
+    assert frame["largest line load, rated torque, above perfect parts [%]"].tolist() == pytest.approx(
+        [100 * (400 / 0.8 - 1), 100 * (200 / 0.8 - 1)]
+    )
+
+
+@pytest.mark.parametrize("samples", [1, 10])
+def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured, samples):
+    document = assembly_document(replace(measured if samples == 1 else expected, transmission=effect(samples)))
+    for section in document.sections:
+        for name, frame in section.tables:
+            for column in frame.columns:
+                if pd.api.types.is_numeric_dtype(frame[column]):
+                    assert column.endswith("]"), (name, column)
+        for figure in section.figures:
+            assert as_html(figure)
+    json.dumps(document.summary, allow_nan=False)
+
+
+def test_only_pins_that_carry_are_shown(measured):
+    figure = transmission.pressure_map(effect(1), 5.0)
+    assert list(figure.rows) == ["Q = 0, pin 2", "Q = 0, pin 3", "Q = 5, pin 2", "Q = 5, pin 3"]
+    assert figure.largest == pytest.approx(400.0)
+
+
+def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
+    document = assembly_document(run(replace(plan, requirements=None)))
+    assert [section.heading for section in document.sections] == [
+        "How errors build up and are adjusted",
+        "Precision against effort",
+    ]
+    assert "the base is rigid" in document.assumptions
+
+
+def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, expected):
+    exactly = "all parts are measured before the first is mounted, exactly, and turned exactly as listed"
+    assert exactly in assumptions(measured)
+    assert exactly not in assumptions(expected)
+
+
+def test_a_single_angle_that_rises_is_counted(plan):
+    # The rotor's own error, about axes turned by 90°, cancels what the bracket hands on about x.
+    results = run(plan, ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]]))
+    paragraphs = " ".join(assembly_document(results).sections[0].paragraphs)
+    found = results.measured
+    rose = int((np.abs(found.adjusted) > np.abs(found.unadjusted)).sum())
+    assert rose > 0
+    assert f"{rose} of 9 are larger adjusted than unadjusted" in paragraphs
+
+
+def test_finite_rotations_are_compared(measured):
+    apart = summary(measured)["measured"]["largest difference by finite rotations [arcsec]"]
+    assert 0 < apart < 0.1  # products of angles of some 70″

@@ -1,0 +1,54 @@
+"""The command ``tolalloc assemble``: what to turn at every step, what it leaves, and what tolerances cost then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+
+
+def assemble(
+    chain: Annotated[str, typer.Argument(help="Datum flow chain: shipped name or TOML file.")],
+    measured: Annotated[
+        Path | None, typer.Option(help="CSV: columns part, 'x [arcsec]', 'y [arcsec]', 'z [arcsec]'.")
+    ] = None,
+    precision: Annotated[
+        float | None, typer.Option(help="Weight of the final angles against effort, in place of the chain's.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of every random number.")] = 1,
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
+    # The report's libraries take half a second to import; a misspelt option need not wait for them.
+    from tolalloc.cli.document_script import written
+    from tolalloc.report.assembly.document import assembly_document
+    from tolalloc.report.assembly.tables import characteristic_table, step_table
+    from tolalloc.study.assembly import AssemblyStudy, prepare_assembly
+    from tolalloc.study.assembly import assemble as assembled
+    from tolalloc.study.run_folder import require_usable
+
+    prepared = prepare_assembly(AssemblyStudy(chain=chain, measured=measured, precision=precision, seed=seed))
+    if out:
+        require_usable(out)
+    if prepared.plan.reducer:
+        announce_compilation()
+    with UnitProgress("assemblies") as progress:
+        results = assembled(prepared, progress)
+    document = assembly_document(results)
+    if out:
+        written(out, lambda: document)
+    if as_json:
+        print_json(document.summary)
+        return
+    name = prepared.name or prepared.plan.name
+    for (step, mount, measure), rows in step_table(results).groupby(["step [-]", "mount", "measure"], sort=False):
+        print_table(rows.iloc[:, 3:], f"Step {step}: mount {mount}, measure {measure}, turn about own axes")
+    print_table(
+        characteristic_table(results),
+        f"{name}: final angles against {prepared.plan.chain.datum}, before and after adjusting",
+    )
+    say(document)

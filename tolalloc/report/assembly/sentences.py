@@ -1,0 +1,112 @@
+"""The answer of an assembly in sentences, each no stronger than what was computed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.report.assembly.results import AngularTolerances, AssemblyResults, MeasuredParts, TransmissionEffect
+from tolalloc.report.assembly.tables import at_precision, norm_of
+from tolalloc.report.assembly.tolerance_tables import is_priced
+from tolalloc.report.assembly.transmission import LINE_LOAD, PIN_FORCE, answers, perfect
+from tolalloc.response.kernel import PEAK_TO_PEAK
+from tolalloc.units import ARCSECOND
+
+LITTLE = 0.01
+"""Share of all final angles below which another unit of precision buys little [-]."""
+
+
+def answer(results: AssemblyResults) -> tuple[str, ...]:
+    """Return the answer in sentences."""
+    tolerances, effect = results.tolerances, results.transmission
+    return (
+        _measured(results, results.measured) if results.measured else _expected(results),
+        _diminishing(results),
+        *(_transmission(effect, results.plan.precision) if effect else ()),
+        *(_costs(results, tolerances) if tolerances else ()),
+    )
+
+
+def _measured(results: AssemblyResults, measured: MeasuredParts) -> str:
+    before, after = measured.norms[[0, at_precision(results)]] / ARCSECOND
+    return (
+        f"{measured.name}: adjusting at a precision of {results.plan.precision:g} takes the {norm_of(results)} of all "
+        f"final angles from {before:.2f}″ to {after:.2f}″, if every part is turned exactly as listed."
+    )
+
+
+def _expected(results: AssemblyResults) -> str:
+    sweep, at = results.sweep, at_precision(results)
+    before, after, floor = np.array([sweep.total[0], sweep.total[at], sweep.noise_floor]) / ARCSECOND
+    return (
+        f"Parts within the stated tolerances leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ "
+        f"adjusted at a precision of {results.plan.precision:g}; noise leaves {floor:.2f}″ at any precision."
+    )
+
+
+def _diminishing(results: AssemblyResults) -> str:
+    sweep = results.sweep
+    found, floor = sweep.diminished(LITTLE), sweep.noise_floor / ARCSECOND
+    noise = f"; noise leaves {floor:.2f}″ rms at any precision" if results.measured else ""
+    if found is None:
+        return (
+            f"At the largest precision tried, {sweep.precisions[-1]:g}, another unit still takes off "
+            f"{sweep.next_unit[-1]:.1%} of what is to be expected{noise}."
+        )
+    return (
+        f"From a precision of {found:g} on, another unit takes less than {LITTLE:.0%} off what is to be "
+        f"expected{noise}."
+    )
+
+
+def _transmission(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
+    """Return what adjusting gains: the line load, and two outputs that need not follow the angles."""
+    at = int(np.flatnonzero(effect.precisions == precision)[0])
+    single = effect.good.size == 1
+
+    def change(output: str) -> str:
+        values, unit = answers(effect, output), output.removesuffix("]").split(" [")[1]
+        before, after = np.median(values[[0, at]], axis=1)
+        counted = "" if single else f", smaller in {int((values[at] < values[0]).sum())} of {values.shape[1]}"
+        return f"{before:.4g} → {after:.4g} {unit} (perfect parts: {perfect(effect, output):.4g} {unit}{counted})"
+
+    of_them = "" if single else f", medians of {int(effect.good.sum())} random assemblies"
+    return (
+        f"Largest line load at rated torque{of_them}: {change(LINE_LOAD)}.",
+        f"Peak-to-peak transmission error at {effect.test_torque:g} N·m: {change(PEAK_TO_PEAK)}; largest pin force at "
+        f"rated torque: {change(PIN_FORCE)}. Neither need fall with the angles.",
+    )
+
+
+def _costs(results: AssemblyResults, tolerances: AngularTolerances) -> tuple[str, ...]:
+    """Return what the cheapest tolerances cost, with and without adjusting."""
+    adjusted, best, share = tolerances.adjusted, tolerances.retuned.best, tolerances.verification.share
+    without = (
+        "without adjusting no tolerances keep the limits"
+        if isinstance(tolerances.unadjusted, str)
+        else f"{tolerances.unadjusted.total:.2f} without adjusting"
+    )
+    found = [
+        f"Cheapest tolerances that keep all limits: {adjusted.total:.2f} cost units with adjusting at a precision of "
+        f"{adjusted.gains.precision:g}, {without}. Certified: with these gains no "
+        f"tolerances that keep them cost less than {adjusted.bound:.2f} (gap {max(adjusted.gap, 0.0):.1g}).",
+    ]
+    saving = 1 - best.total / adjusted.total
+    if saving > 0:
+        found.append(f"A filter tuned to what is allocated brings them to {best.total:.2f}, {saving:.1%} less.")
+    found.append(
+        f"Of {tolerances.verification.assemblies} random assemblies with the cheapest of these tolerances "
+        f"{share.estimate:.2%} are within all limits at once (95 % interval {share.low:.2%}…{share.high:.2%})."
+    )
+    return (*found, *_best_precision(results, tolerances))
+
+
+def _best_precision(results: AssemblyResults, tolerances: AngularTolerances) -> tuple[str, ...]:
+    """Return the precision that costs least, nothing where turning has no price."""
+    found = tolerances.by_precision
+    if not is_priced(results.plan):
+        return ()
+    end = "" if found.interior else ", the end of the range that was searched"
+    return (
+        f"With effort priced, a precision of {found.best.gains.precision:.4g}{end} costs least: "
+        f"{found.best.total:.2f} cost units, {tolerances.adjusted.total:.2f} at {results.plan.precision:g}.",
+    )

@@ -1,0 +1,210 @@
+"""From a datum flow chain to adjustments, what they leave, what that does to the transmission, and tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.angular.allocation import AngularAllocation, allocate_angles
+from tolalloc.allocation.angular.precision import best_precision
+from tolalloc.allocation.angular.retuning import retuned_allocation
+from tolalloc.allocation.angular.verification import verify_angles
+from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.errors_file import load_errors
+from tolalloc.assembly.gains import expected_angles, tuned_gains
+from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.precision_sweep import norms, precision_sweep
+from tolalloc.assembly.regulator import regulator
+from tolalloc.assembly.trajectory import foreseen
+from tolalloc.exceptions import InputError
+from tolalloc.report.assembly.results import AngularTolerances, AssemblyResults, MeasuredParts
+from tolalloc.study.assembly_transmission import transmission_effect
+from tolalloc.study.stages import Progress, Record
+from tolalloc.uncertainty.seeds import SeedTree
+
+SWEPT = (
+    0.0,
+    0.1,
+    0.2,
+    0.3,
+    0.5,
+    0.7,
+    1.0,
+    1.5,
+    2.0,
+    3.0,
+    4.0,
+    5.0,
+    6.0,
+    8.0,
+    10.0,
+    13.0,
+    16.0,
+    20.0,
+    30.0,
+    50.0,
+    100.0,
+)
+"""Precisions over which the expected errors are drawn [-]."""
+SHOWN = (0.0, 1.0, 5.0, 10.0)
+"""Precisions at which the transmission is solved; zhang2025 shows some of them [-]."""
+LARGEST_PRECISION = 1e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssemblyStudy:
+    """Which assembly is asked about.
+
+    Parameters
+    ----------
+    chain
+        Shipped name or chain file.
+    measured
+        CSV file with the measured errors of its parts, if there is one.
+    precision
+        Q in place of the chain's own [-].
+    assemblies
+        Random assemblies that verify the tolerances [-].
+    draws
+        Random assemblies whose transmission is solved where the parts are not measured [-].
+    seed
+        Seed of every random number [-].
+
+    Raises
+    ------
+    InputError
+        A precision out of range.
+    """
+
+    chain: str | Path
+    measured: Path | None = None
+    precision: float | None = None
+    assemblies: int = 100_000
+    draws: int = 100
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.precision is not None and not 0 <= self.precision <= LARGEST_PRECISION:
+            raise InputError.at("tolalloc assemble", "--precision", self.precision, f"0 to {LARGEST_PRECISION:g}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreparedAssembly:
+    """A checked assembly.
+
+    Parameters
+    ----------
+    asked
+        What was asked.
+    plan
+        The chain at the precision that was asked for.
+    name
+        Where the errors of the parts come from.
+    errors
+        Measured errors of its parts, if there are any [rad].
+    """
+
+    asked: AssemblyStudy
+    plan: AssemblyPlan
+    name: str
+    errors: Float[np.ndarray, "part 3"] | None
+
+
+def prepare_assembly(asked: AssemblyStudy) -> PreparedAssembly:
+    """Return an assembly with its files read and checked.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    """
+    plan = load_plan(asked.chain)
+    if asked.precision is not None:
+        plan = replace(plan, precision=asked.precision)
+    errors = None if asked.measured is None else load_errors(asked.measured, plan)
+    return PreparedAssembly(
+        asked=asked, plan=plan, name="" if asked.measured is None else asked.measured.stem, errors=errors
+    )
+
+
+def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
+    """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
+
+    Parameters
+    ----------
+    prepared
+        The assembly.
+    progress
+        Told how far the work has come.
+
+    Raises
+    ------
+    InputError
+        A measurement that tells nothing new, a column that the reducer does not have, or limits out of reach.
+    SolveError
+        A unit without equilibrium.
+    """
+    plan, record, seeds = prepared.plan, Record(progress), SeedTree(prepared.asked.seed).child("assembly")
+    with record.stage("adjustment"):
+        gains = tuned_gains(plan, plan.precision, plan.tolerances)
+        swept = np.array(sorted({*SWEPT, plan.precision}))
+        sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
+        measured = None if prepared.errors is None else _measured(plan, prepared.name, prepared.errors, swept)
+    with record.stage("tolerances"):
+        tolerances = None
+        if plan.requirements is not None:
+            tolerances = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
+    with record.stage("transmission"):
+        shown = np.array(sorted({*SHOWN, plan.precision}))
+        transmission = None
+        if plan.reducer:
+            draws = prepared.asked.draws
+            transmission = transmission_effect(
+                plan, prepared.errors, shown, draws, seeds.child("transmission"), record.observe
+            )
+    return AssemblyResults(
+        plan=plan,
+        regulator=gains.regulator,
+        sweep=sweep,
+        expected=expected,
+        measured=measured,
+        transmission=transmission,
+        tolerances=tolerances,
+        seed=prepared.asked.seed,
+        statuses=record.counts,
+    )
+
+
+def _measured(
+    plan: AssemblyPlan, name: str, errors: Float[np.ndarray, "part 3"], precisions: Float[np.ndarray, " precision"]
+) -> MeasuredParts:
+    adjusting = regulator(plan.space, plan.final_weight())
+    return MeasuredParts(
+        name=name,
+        errors=errors,
+        sequence=foreseen(plan.space, adjusting, errors.ravel()),
+        unadjusted=(plan.chain.transform @ errors.ravel()).reshape(-1, 3),
+        exact=plan.chain.finite(errors),
+        norms=norms(plan, errors.ravel(), precisions),
+    )
+
+
+def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> AngularTolerances:
+    retuned = retuned_allocation(plan)
+    return AngularTolerances(
+        adjusted=retuned.allocations[0],
+        unadjusted=_without_adjusting(plan),
+        retuned=retuned,
+        verification=verify_angles(plan, retuned.best, seeds, assemblies),
+        by_precision=best_precision(plan),
+    )
+
+
+def _without_adjusting(plan: AssemblyPlan) -> AngularAllocation | str:
+    try:
+        return allocate_angles(plan, 0.0)
+    except InputError as error:
+        return str(error)
