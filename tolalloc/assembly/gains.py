@@ -102,4 +102,4 @@ def expected_angles(plan: AssemblyPlan, gains: Gains) -> Float[np.ndarray, "step
     """
     # One assembly for each random number: everything is linear in them, and they are independent.
     each = assembled(plan, gains, plan.tolerances, np.eye(random_numbers(plan.space)))
-    return np.sqrt((np.stack([each.mounted, each.adjusted], axis=2) ** 2).sum(axis=0))
+    return np.asarray(np.sqrt((np.stack([each.mounted, each.adjusted], axis=2) ** 2).sum(axis=0)))

@@ -52,8 +52,8 @@ class HeatMap:
     @property
     def texts(self) -> list[list[str]]:
         """The numbers in the cells."""
-        least = _SHOWN * self.largest
-        return [[f"{value:.2f}" if value >= least else "" for value in row] for row in self.values]
+        least, decimals = _SHOWN * self.largest, 2 if self.largest < 100 else 0
+        return [[f"{value:.{decimals}f}" if value >= least else "" for value in row] for row in self.values]
 
 
 @as_html.register

@@ -49,7 +49,7 @@ SWEPT = (
     100.0,
 )
 """Precisions over which the expected errors are drawn [-]."""
-SHOWN = (0.0, 1.0, 5.0, 10.0)
+SHOWN = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Precisions at which the transmission is solved; zhang2025 shows some of them [-]."""
 LARGEST_PRECISION = 1e6
 
@@ -76,17 +76,19 @@ class AssemblyStudy:
     Raises
     ------
     InputError
-        A precision out of range.
+        A precision or a seed out of range.
     """
 
     chain: str | Path
     measured: Path | None = None
     precision: float | None = None
     assemblies: int = 100_000
-    draws: int = 100
+    draws: int = 50
     seed: int = 1
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError.at("tolalloc assemble", "--seed", self.seed, "0 or a positive integer")
         if self.precision is not None and not 0 <= self.precision <= LARGEST_PRECISION:
             raise InputError.at("tolalloc assemble", "--precision", self.precision, f"0 to {LARGEST_PRECISION:g}")
 
@@ -143,7 +145,7 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
     Raises
     ------
     InputError
-        A measurement that tells nothing new, a column that the reducer does not have, or limits out of reach.
+        A measurement that tells nothing new, or a column that the reducer does not have.
     SolveError
         A unit without equilibrium.
     """
@@ -154,9 +156,7 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
         sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
         measured = None if prepared.errors is None else _measured(plan, prepared.name, prepared.errors, swept)
     with record.stage("tolerances"):
-        tolerances = None
-        if plan.requirements is not None:
-            tolerances = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
+        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
     with record.stage("transmission"):
         shown = np.array(sorted({*SHOWN, plan.precision}))
         transmission = None
@@ -167,12 +167,13 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
             )
     return AssemblyResults(
         plan=plan,
-        regulator=gains.regulator,
+        gains=gains,
         sweep=sweep,
         expected=expected,
         measured=measured,
         transmission=transmission,
         tolerances=tolerances,
+        unreachable=unreachable,
         seed=prepared.asked.seed,
         statuses=record.counts,
     )
@@ -192,15 +193,22 @@ def _measured(
     )
 
 
-def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> AngularTolerances:
-    retuned = retuned_allocation(plan)
-    return AngularTolerances(
+def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> tuple[AngularTolerances | None, str]:
+    """Return the cheapest tolerances, if any are asked for, or why there are none."""
+    if plan.requirements is None:
+        return None, ""
+    try:
+        retuned = retuned_allocation(plan)
+    except InputError as error:  # who wants to know what to turn must not be kept from it
+        return None, str(error)
+    found = AngularTolerances(
         adjusted=retuned.allocations[0],
         unadjusted=_without_adjusting(plan),
         retuned=retuned,
         verification=verify_angles(plan, retuned.best, seeds, assemblies),
         by_precision=best_precision(plan),
     )
+    return found, ""
 
 
 def _without_adjusting(plan: AssemblyPlan) -> AngularAllocation | str:

@@ -67,7 +67,8 @@ def transmission_effect(
         )
     shown = response.errors(np.concatenate([np.zeros((1, final.shape[2])), final[:, 0]]))
     rated = float(np.copysign(reducer.load.rated_torque, torque))
-    worst = contact_pattern(model, shown[1], rated, reducer.disc_count)
+    discs = [contact_pattern(model, shown[1], rated, disc + 1) for disc in range(reducer.disc_count)]
+    worst = max(discs, key=lambda pattern: float(pattern.line_load.max()))
     return TransmissionEffect(
         reducer=reducer,
         test_torque=torque,
@@ -78,9 +79,7 @@ def transmission_effect(
         good=good,
         perfect_curves=transmission_curves(model, shown[:1], rated),
         curves=transmission_curves(model, shown[1:], rated),
-        patterns=tuple(
-            contact_pattern(model, each, rated, reducer.disc_count, worst.carrier_angle) for each in shown[1:]
-        ),
+        patterns=tuple(contact_pattern(model, each, rated, worst.disc, worst.carrier_angle) for each in shown[1:]),
     )
 
 

@@ -40,7 +40,7 @@ class MountingStudy:
     Raises
     ------
     InputError
-        A number of starts out of range.
+        A number of starts or a seed out of range.
     """
 
     parts: Path
@@ -50,6 +50,8 @@ class MountingStudy:
     seed: int = 1
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError.at("tolalloc mount", "--seed", self.seed, "0 or a positive integer")
         if not 1 <= self.starts <= MOST_STARTS:
             raise InputError.at("tolalloc mount", "--starts", self.starts, f"1 to {MOST_STARTS}")
 

@@ -20,6 +20,7 @@ def warnings(results: AssemblyResults) -> tuple[str, ...]:
         *_missed(results),
         *((f"Adjusting leaves larger than unadjusted: {', '.join(rose)}.",) if rose else ()),
         *_failed(results),
+        *((f"No angular tolerances are given. {results.unreachable}",) if results.unreachable else ()),
         *(_of_tolerances(results.tolerances) if results.tolerances else ()),
     )
 

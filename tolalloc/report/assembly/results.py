@@ -12,9 +12,9 @@ from tolalloc.allocation.angular.allocation import AngularAllocation
 from tolalloc.allocation.angular.precision import PrecisionCost
 from tolalloc.allocation.angular.retuning import RetunedAllocation
 from tolalloc.allocation.angular.verification import AngularVerification
+from tolalloc.assembly.gains import Gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import PrecisionSweep
-from tolalloc.assembly.regulator import Regulator
 from tolalloc.assembly.trajectory import Trajectory
 from tolalloc.equivalent.contact_pattern import ContactPattern
 from tolalloc.reducer.design import Reducer
@@ -80,7 +80,8 @@ class TransmissionEffect:
     curves
         One output turn of the first assembly at every precision, at rated torque.
     patterns
-        Load of its last disc on the pins at every precision, at rated torque and the same carrier angle.
+        Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
+        which the line load is largest if nothing is turned.
     """
 
     reducer: Reducer
@@ -128,8 +129,8 @@ class AssemblyResults:
     ----------
     plan
         What was asked.
-    regulator
-        What is turned at every step, per angle.
+    gains
+        What is turned at every step, per angle, and what that leaves.
     sweep
         What is to be expected over the precision.
     expected
@@ -140,7 +141,9 @@ class AssemblyResults:
     transmission
         What it does to the transmission, if the chain names a reducer.
     tolerances
-        Cheapest angular tolerances, if the chain states limits and costs.
+        Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep.
+    unreachable
+        Why there are none; empty unless limits are out of reach.
     seed
         Seed of the random numbers [-].
     statuses
@@ -148,11 +151,12 @@ class AssemblyResults:
     """
 
     plan: AssemblyPlan
-    regulator: Regulator
+    gains: Gains
     sweep: PrecisionSweep
     expected: Float[np.ndarray, "step 2 state"]
     measured: MeasuredParts | None
     transmission: TransmissionEffect | None
     tolerances: AngularTolerances | None
+    unreachable: str
     seed: int
     statuses: Mapping[str, int]

@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.gains import tuned_gains
-from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import adjustable
 from tolalloc.report.assembly.results import AssemblyResults, MeasuredParts
 from tolalloc.units import ARCSECOND
@@ -51,7 +49,7 @@ def turns(results: AssemblyResults) -> Float[np.ndarray, "step part 3"]:
     if results.measured is not None:
         return results.measured.sequence.adjustments.reshape(len(results.plan.steps), -1, 3)
     plan = results.plan
-    maps = tuned_gains(plan, plan.precision, plan.tolerances).errors
+    maps = results.gains.errors
     variances = maps.adjustments_by_part**2 @ plan.variances + (maps.adjustments_by_noise**2).sum(axis=-1)
     return np.asarray(3 * np.sqrt(variances).reshape(len(plan.steps), -1, 3))
 
@@ -94,7 +92,7 @@ def characteristic_table(results: AssemblyResults) -> pd.DataFrame:
         columns = {
             "before, 3σ [arcsec]": finals[0],
             "after, 3σ [arcsec]": finals[at],
-            "noise, 3σ [arcsec]": _noise_alone(results.plan),
+            "noise, 3σ [arcsec]": _noise_alone(results),
         }
     names = results.plan.chain.names
     frame = pd.DataFrame(
@@ -111,9 +109,9 @@ def characteristic_table(results: AssemblyResults) -> pd.DataFrame:
     return frame
 
 
-def _noise_alone(plan: AssemblyPlan) -> Float[np.ndarray, " characteristic"]:
+def _noise_alone(results: AssemblyResults) -> Float[np.ndarray, " characteristic"]:
     """Return three standard deviations of tilts, then of rotations, that perfect parts would be left with [arcsec]."""
-    errors = tuned_gains(plan, plan.precision, plan.tolerances).errors
+    errors = results.gains.errors
     return np.concatenate(tilt_and_rotation(3 * np.sqrt(np.diag(errors.noise_covariance)))) / ARCSECOND
 
 
@@ -150,7 +148,7 @@ def gain_table(results: AssemblyResults) -> pd.DataFrame:
     rows = [
         {"step [-]": number, "turned": angles[row]}
         | {f"{name} [-]": float(gain) for name, gain in zip(angles, gains[row], strict=True)}
-        for number, (step, gains) in enumerate(zip(plan.steps, results.regulator.gains, strict=True), start=1)
+        for number, (step, gains) in enumerate(zip(plan.steps, results.gains.regulator.gains, strict=True), start=1)
         for row in np.flatnonzero(np.repeat(adjustable(plan.chain, step), 3))
     ]
     return pd.DataFrame(rows)
