@@ -67,8 +67,8 @@ def test_measured_parts_are_adjusted_and_reported(unit, tmp_path):
     assert measured["norm unadjusted [arcsec]"] == pytest.approx(86.0307, abs=1e-4)
     assert measured["norm adjusted [arcsec]"] == pytest.approx(8.4957, abs=1e-4)
     assert answer["expected rms adjusted [arcsec]"] == pytest.approx(9.7065, abs=1e-4)
-    assert answer["noise floor [arcsec]"] == pytest.approx(9.3220, abs=1e-4)
-    assert tolerances["cost unadjusted [cost units]"] == pytest.approx(189.482, abs=1e-3)
+    assert answer["left however large the precision [arcsec]"] == pytest.approx(9.3220, abs=1e-4)
+    assert tolerances["cost unadjusted [cost units]"] == pytest.approx(148.278, abs=1e-3)
     assert tolerances["cost adjusted [cost units]"] == pytest.approx(19.1306, abs=1e-4)
     assert tolerances["cost re-tuned [cost units]"] == pytest.approx(14.457, abs=1e-3)
     assert "KC1 about x (+52.21″, ±30″)" in answer["warnings"][0]
@@ -110,6 +110,51 @@ def test_a_precision_of_zero_turns_nothing(pump):
     answer = json.loads(result.stdout)
     assert [row["turn"] for row in answer["steps"]] == ["nothing"] * 3
     assert answer["expected rms adjusted [arcsec]"] == answer["expected rms unadjusted [arcsec]"]
+
+
+def test_measured_parts_are_listed_without_measuring_again(pump, tmp_path):
+    parts = errors_file(tmp_path / "seven.csv", ("bracket", "rotor", "cover"), np.full((3, 3), 12.0))
+    result = tolalloc("assemble", pump, "--measured", parts)
+    assert result.returncode == 0, result.stderr
+    said = " ".join(result.stdout.split())
+    assert "Step 2: mount rotor, turn about own axes" in said
+    assert "measure rotor" not in said
+
+
+def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
+    chain = tmp_path / "tight.chain.toml"
+    shipped = Path("tolalloc/assembly/data/bx40e.chain.toml").read_text(encoding="utf-8")
+    tight = shipped.replace("tilt_limit_arcsec = 15\n", "tilt_limit_arcsec = 0.2\n").replace('reducer = "bx40e"', "")
+    chain.write_text(tight, encoding="utf-8")
+    for arguments in (["--measured", unit], []):
+        folder = tmp_path / f"report{len(arguments)}"
+        result = tolalloc("assemble", chain, *arguments, "--out", folder, "--json")
+        assert result.returncode == 0, result.stderr
+        answer = json.loads(result.stdout)
+        assert answer["tolerances"] is None and answer["steps"]
+        assert any("No angular tolerances are given." in warning for warning in answer["warnings"])
+        assert "No angular tolerances are given." in (folder / "report.html").read_text(encoding="utf-8")
+        shown = tolalloc("assemble", chain, *arguments)
+        assert shown.returncode == 0, shown.stderr
+        assert "No angular tolerances are given." in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("assemble", ["[arcsec]"]),
+        ("mount", ["[N·m]"]),
+        ("contact", ["[mm]"]),
+        ("modify", ["[rad]"]),
+        ("diagnose", ["[deg]", "[arcsec]"]),
+        ("allocate", ["[arcsec]"]),
+        ("costs", ["[unit]", "[cost units]"]),
+    ],
+)
+def test_help_names_units_of_measurement(command, words):
+    said = tolalloc(command, "--help", COLUMNS="200").stdout
+    for word in words:
+        assert word in said
 
 
 @pytest.mark.parametrize(

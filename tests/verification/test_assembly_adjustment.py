@@ -11,7 +11,9 @@ from scipy.linalg import solve_discrete_are
 
 from tests.random_assemblies import random_plan
 from tolalloc.assembly.chain import DatumFlowChain, Part
+from tolalloc.assembly.chain_file import load_plan
 from tolalloc.assembly.final_errors import final_errors
+from tolalloc.assembly.gains import tuned_gains
 from tolalloc.assembly.kalman import KalmanFilter, kalman_filter
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
@@ -315,11 +317,13 @@ def test_readings_that_say_the_same_need_noise(first, later, step, scale):
     assert np.isfinite(kalman_filter(plan.space, variances, noise, 0.0, "pair").covariance).all()
 
 
-def test_an_error_that_cannot_be_needs_noise_to_be_measured():
+def test_an_error_that_cannot_be_tells_nothing_when_it_is_measured():
     plan = pair(("KC1",), "KC2")
     variances = np.where(np.arange(6) == 2, 0.0, plan.variances)
-    with pytest.raises(InputError, match="pair, step 1: measure is"):
-        kalman_filter(plan.space, variances, 0.0, 0.0, "pair")
+    exact, close = (kalman_filter(plan.space, variances, noise, 0.0, "pair") for noise in (0.0, 1e-12))
+    assert not exact.gains[0][:, 2].any()
+    for one, other in zip(exact.gains, close.gains, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("later", [("KC2",), ("KC1", "KC2"), ("KC1", "KC2 - KC1"), ()])
@@ -373,3 +377,23 @@ def test_exact_readings_and_adjustments_leave_nothing_at_the_floor():
     )
     sweep = precision_sweep(plan, np.array([0.0, 10.0]))
     assert sweep.noise_floor < 1e-12 * sweep.total[0]
+
+
+@pytest.mark.parametrize("adjust", ["current", "mounted", "all"])
+def test_what_is_not_turned_misses_nothing(adjust):
+    plan = load_plan("bx40e")
+    steps = steps_in_order(plan.chain, adjust, "current", Efforts())
+    found = tuned_gains(replace(plan, steps=steps), 0.0, plan.tolerances).errors
+    parts_alone = (plan.chain.transform * plan.variances) @ plan.chain.transform.T
+    np.testing.assert_allclose(found.covariance(plan.variances), parts_alone, rtol=1e-12, atol=1e-24)
+
+
+def test_turning_fewer_parts_may_leave_less():
+    """Every further turn misses by itself, which no regulator of the turned angles knows."""
+    plan = load_plan("bx40e")
+    total, fewer = (
+        np.sqrt(np.trace(tuned_gains(one, 10.0, one.tolerances).errors.covariance(one.variances))) / ARCSECOND
+        for one in (plan, plan.turning_fewer)
+    )
+    assert [step.adjust for step in plan.turning_fewer.steps] == [("KC1",), ("KC2",), ("KC3",), ("KC4",)]
+    assert (total, fewer) == (pytest.approx(9.7065, abs=1e-4), pytest.approx(8.204, abs=1e-3))

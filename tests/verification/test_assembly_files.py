@@ -327,7 +327,18 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             "precision = 2",
             "precision = 2\n[noise]\nmeasurement_arcsec = -2",
-            "FILE: noise.measurement_arcsec is -2; input should be greater than or equal to 0.",
+            "FILE: noise.measurement_arcsec is -2; allowed are 0 and arcseconds from 0.01 to 3600.",
+        ),
+        (
+            "precision = 2",
+            "precision = 2\n[noise]\nmeasurement_arcsec = 0.0005",
+            "FILE: noise.measurement_arcsec is 0.0005; is that in degrees? "
+            "allowed are 0 and arcseconds from 0.01 to 3600.",
+        ),
+        (
+            "precision = 2",
+            "precision = 2e6",
+            "FILE: precision is 2000000.0; input should be less than or equal to 1000000.",
         ),
         (
             "precision = 2",
@@ -379,7 +390,7 @@ def test_a_file_that_describes_no_assembly_is_refused(tmp_path, old, new, senten
         (
             '"head - column"',
             '"head-column"',
-            "FILE, step 2: part 'head-column' is not known; the nearest known are column, head.",
+            "FILE, step 2: measure is 'head-column'; allowed is one part - another, with spaces around the sign.",
         ),
         (
             '"head - column"',

@@ -17,7 +17,9 @@ from tolalloc.equivalent.contact_pattern import ContactPattern
 from tolalloc.reducer.files import load_reducer
 from tolalloc.report.assembly import tables, tolerance_tables, transmission
 from tolalloc.report.assembly.cautions import assumptions, warnings
+from tolalloc.report.assembly.characteristics import characteristic_table, larger
 from tolalloc.report.assembly.document import assembly_document
+from tolalloc.report.assembly.plan_record import plan_record
 from tolalloc.report.assembly.results import AssemblyResults, TransmissionEffect
 from tolalloc.report.assembly.sentences import answer
 from tolalloc.report.assembly.summary import summary
@@ -126,13 +128,14 @@ def pattern(largest: float) -> ContactPattern:
 
 
 def effect(samples: int) -> TransmissionEffect:
-    """Return made-up answers at Q = 0 and 5: the line load halves, the peak-to-peak rises in all but the last."""
+    """Return made-up answers at Q = 0 and 5: the line load halves, both peak-to-peaks rise, one not in the last."""
     outputs = tuple(name for reading in TRANSMISSION for name in reading.outputs)
     values = np.ones((2, samples, len(outputs)))
     values[0, :, outputs.index(transmission.LINE_LOAD)] = 400.0
     values[1, :, outputs.index(transmission.LINE_LOAD)] = 200.0
     values[1, :, outputs.index(transmission.PEAK_TO_PEAK)] = 3.0
     values[1, -1, outputs.index(transmission.PEAK_TO_PEAK)] = 3.0 if samples == 1 else 0.5
+    values[1, :, outputs.index(transmission.RATED_PEAK_TO_PEAK)] = 2.0
     return TransmissionEffect(
         reducer=load_reducer("bx40e"),
         test_torque=-1.0,
@@ -167,7 +170,13 @@ def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
     sentence = answer(expected)[0]
     assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
-    assert f"noise leaves {floor:.2f}″" in sentence
+    assert f"however large the precision, this plan leaves {floor:.2f}″" in sentence
+    assert "noise" not in sentence
+
+
+def text(results: AssemblyResults, heading: str) -> str:
+    sections = {section.heading: section.paragraphs for section in assembly_document(results).sections}
+    return " ".join(sections[heading])
 
 
 def test_where_another_unit_of_precision_buys_little_is_said(expected):
@@ -183,8 +192,9 @@ def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
 def test_the_line_load_is_said_with_perfect_parts(measured):
     sentences = said(replace(measured, transmission=effect(1)))
     assert "Largest line load at rated torque: 400 → 200 N/mm (perfect parts: 0.8 N/mm)." in sentences
-    assert "Peak-to-peak transmission error at -1 N·m: 1 → 3 arcsec" in sentences
-    assert "Neither need fall with the angles." in sentences
+    rated = "at rated torque: 1 → 2 arcsec (perfect parts: 0.8 arcsec); largest pin force"
+    assert "Peak-to-peak transmission error at -1 N·m: 1 → 3 arcsec (perfect parts: 0.8 arcsec), " + rated in sentences
+    assert "None of these three need fall with the angles." in sentences
 
 
 def test_random_assemblies_are_counted(expected):
@@ -218,7 +228,29 @@ def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected
 
 def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
     share = expected.tolerances.verification.share
-    assert f"Of 2000 random assemblies with the cheapest of these tolerances {share.estimate:.2%} are" in said(expected)
+    best = expected.tolerances.verified.gains.precision
+    which = f"the tolerances for the best precision of {best:.4g}"
+    assert expected.tolerances.verified is expected.tolerances.by_precision.best
+    assert f"Of 2000 random assemblies with {which}, {share.estimate:.2%} are" in said(expected)
+
+
+def test_the_tolerances_of_the_tuned_filter_are_verified_where_effort_has_no_price(plan):
+    free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
+    assert "random assemblies with the tolerances of the tuned filter at a precision of 5, " in said(free)
+    assert "verified, re-tuned, 3σ [arcsec]" in tolerance_tables.limit_table(free.plan, free.tolerances)
+    assert "Verified is “re-tuned”." in text(free, "Angular tolerances")
+
+
+def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expected):
+    first = replace(expected.tolerances.retuned, allocations=(expected.tolerances.adjusted,))
+    same = replace(expected, tolerances=replace(expected.tolerances, retuned=first, verified=first.best))
+    assert "Tuning the filter to what is allocated gains nothing here." in said(same)
+    assert "random assemblies with the tolerances for a precision of 5, " in said(same)
+    document = assembly_document(same)
+    assert "re-tuned" not in " ".join([*document.warnings, *document.answer])
+    for _, frame in document.sections[-1].tables:
+        assert not any("re-tuned" in column for column in frame.columns)
+        assert "re-tuned" not in frame.get("allocation", pd.Series(dtype=object)).tolist()
 
 
 def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
@@ -253,7 +285,7 @@ def test_missed_limits_are_named(expected):
 
 
 def test_a_characteristic_that_rises_is_named(measured):
-    assert not tables.larger(measured)
+    assert not larger(measured)
     swapped = replace(measured.measured, unadjusted=measured.measured.adjusted / 2)
     assert any(
         warning.startswith("Adjusting leaves larger than unadjusted: tilt of bracket (")
@@ -280,7 +312,9 @@ def test_turning_as_listed_gives_what_is_said_to_be_left(measured):
         for part, *turn in rows[["turn", "x [arcsec]", "y [arcsec]", "z [arcsec]"]].itertuples(index=False):
             first = 3 * plan.chain.names.index(part)
             state = state + plan.chain.transform[:, first : first + 3] @ np.array(turn)
-        for part, tilt, rotation in rows.iloc[:, [3, 7, 8]].itertuples(index=False):
+        for part, tilt, rotation in rows[["turn", "tilt left [arcsec]", "rotation left [arcsec]"]].itertuples(
+            index=False
+        ):
             x, y, z = state.reshape(-1, 3)[plan.chain.names.index(part)]
             # Every turn is rounded to 0.005″, and up to nine of them add up.
             assert (tilt, rotation) == pytest.approx((np.hypot(x, y), z), abs=0.1)
@@ -300,14 +334,14 @@ def test_the_last_step_leaves_what_the_sweep_says(expected):
 
 
 def test_noise_alone_is_what_perfect_parts_are_left_with(expected, plan):
-    noise = tables.characteristic_table(expected)["noise, 3σ [arcsec]"].to_numpy()
+    noise = characteristic_table(expected)["noise, 3σ [arcsec]"].to_numpy()
     # A filter that expects the stated tolerances, on parts that have none.
     drawn = assembled(
         plan, tuned_gains(plan, 5.0, plan.tolerances), 0 * plan.tolerances, np.eye(random_numbers(plan.space))
     )
     tilt, rotation = tables.tilt_and_rotation(3 * np.sqrt((drawn.adjusted[:, -1] ** 2).sum(axis=0)) / ARCSECOND)
     np.testing.assert_allclose(noise, [*tilt, *rotation])
-    assert (noise < tables.characteristic_table(expected)["after, 3σ [arcsec]"]).all()
+    assert (noise < characteristic_table(expected)["after, 3σ [arcsec]"]).all()
 
 
 def test_costs_of_single_tolerances_add_up(expected):
@@ -316,10 +350,180 @@ def test_costs_of_single_tolerances_add_up(expected):
 
 
 def test_a_part_without_a_limit_is_neither_kept_nor_missed(expected):
-    frame = tables.characteristic_table(expected)
+    frame = characteristic_table(expected)
     free = frame["limit [arcsec]"].isna()
     assert free.sum() == 4
     assert set(frame.loc[free, "OK"]) == {""} and set(frame.loc[~free, "OK"]) == {"yes"}
+
+
+def limited(results: AssemblyResults, limit: float) -> AssemblyResults:
+    """Return measured parts of which only the tilt of the bracket is limited [arcsec]."""
+    free = np.full(3, np.inf)
+    asked = replace(
+        results.plan.requirements, tilt_limit=np.array([limit * ARCSECOND, np.inf, np.inf]), rotation_limit=free
+    )
+    return replace(results, plan=replace(results.plan, requirements=asked))
+
+
+def test_a_limit_is_in_doubt_where_what_the_turns_miss_reaches_beyond_it(measured):
+    missed = replace(measured.measured, missed=ARCSECOND * np.array([[1.0, 2.0, 0.5], [0, 0, 0], [0, 0, 0]]))
+    known = replace(measured, measured=missed)
+    after = np.hypot(*missed.adjusted[0, :2]) / ARCSECOND
+    for limit, word in ((after + 6.001, "yes"), (after + 5.999, "in doubt"), (after - 0.001, "no")):
+        asked = limited(known, float(limit))
+        row = characteristic_table(asked).iloc[0]
+        assert (row["OK"], row["turns miss, 3σ [arcsec]"]) == (word, 6.0)
+        assert any(f"tilt of bracket ({after:.2f} ± 6.00″" in each for each in warnings(asked)) == (word != "yes")
+        assert any("reach beyond the limit" in each for each in warnings(asked)) == (word == "in doubt")
+
+
+def test_measured_parts_that_miss_limits_are_told_what_keeps_them(measured):
+    asked = limited(measured, 0.01)
+    keeping = replace(asked, measured=replace(asked.measured, keeping=446.68))
+    assert any("Turned as listed for a precision of 446.7, they keep them all." in each for each in warnings(keeping))
+    never = replace(asked, measured=replace(asked.measured, keeping=None))
+    assert any("No precision that was tried keeps them all." in each for each in warnings(never))
+    assert summary(keeping)["measured"]["smallest precision tried that keeps all limits [-]"] == 446.68
+
+
+def test_an_output_that_rises_is_warned_of_with_a_reason(measured):
+    (warning,) = [each for each in warnings(replace(measured, transmission=effect(1))) if "N·m" in each]
+    assert warning.startswith(
+        "Adjusting leaves larger than unadjusted: peak-to-peak transmission error at -1 N·m (1 → 3 arcsec), "
+        "peak-to-peak transmission error, rated torque (1 → 2 arcsec). Discs that are turned against each other"
+    )
+    assert "one carries alone" in warning and "wedges between the pins" in warning
+    assert "one carries alone" in text(replace(measured, transmission=effect(1)), "Transmission")
+
+
+def test_an_output_that_falls_is_not_warned_of(measured):
+    fallen = replace(effect(1), values=effect(1).values[[1, 0]])
+    found = warnings(replace(measured, transmission=fallen))
+    assert any("largest line load, rated torque (200 → 400 N/mm)" in warning for warning in found)
+    assert not any("peak-to-peak" in warning for warning in found)
+
+
+def test_turning_fewer_parts_is_advised_only_where_it_leaves_less(expected):
+    total = expected.sweep.total[tables.at_precision(expected)]
+    better, worse = (warnings(replace(expected, fewer=float(factor * total))) for factor in (0.5, 1.5))
+    shown = f"leaves {total / 2 / ARCSECOND:.2f}″ rms instead of {total / ARCSECOND:.2f}″: every further adjustment "
+    assert f"Turning at every step only the part just mounted {shown}misses by 1″ itself." in better
+    assert not any("just mounted" in warning for warning in worse + warnings(replace(expected, fewer=None)))
+
+
+def test_what_a_larger_precision_buys_is_said_of_the_sweep_itself(expected):
+    falls, heading = "the larger Q, the smaller what is to be expected", "Precision against effort"
+    sweep = replace(
+        expected.sweep,
+        total=np.linspace(3, 2, expected.sweep.total.size) * ARCSECOND,
+        next_unit=np.linspace(0.5, 0.001, expected.sweep.total.size),
+    )
+    falling = replace(expected, sweep=sweep)
+    assert falls in text(falling, heading) and "each unit of Q buys less" in text(falling, heading)
+    uneven = replace(falling, sweep=replace(sweep, next_unit=sweep.next_unit[::-1]))
+    assert falls in text(uneven, heading) and "each unit of Q buys less" not in text(uneven, heading)
+    total = sweep.total.copy()
+    total[3] = ARCSECOND
+    rising = replace(expected, sweep=replace(sweep, total=total))
+    assert falls not in text(rising, heading)
+    assert f"Q = {sweep.precisions[3]:g} leaves least of all angles together, 1.00″ rms" in text(rising, heading)
+    assert "None of 6 tilts and rotations are larger than unadjusted at Q = 5." in text(expected, heading)
+
+
+def test_a_unit_of_precision_that_adds_is_not_said_to_take_off(expected):
+    sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, -0.2))
+    added = said(replace(expected, sweep=sweep))
+    assert "From a precision of 0 on, another unit takes less than 1% off" in added
+    assert "all final angles, and at 0 it adds to it." in added
+    assert "adds" not in said(replace(expected, sweep=replace(sweep, next_unit=-sweep.next_unit * 0.01)))
+
+
+def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
+    errors = ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]])
+    weighted = run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), errors)
+    assert "The weighted norm of all angles falls, a single angle need not" in " ".join(
+        assembly_document(weighted).sections[0].paragraphs
+    )
+
+
+def test_turns_of_measured_parts_come_from_the_file(measured, expected):
+    assert "measure" not in tables.step_table(measured) and "measure" in tables.step_table(expected)
+    heading = "How errors build up and are adjusted"
+    assert "A part is mounted, then the parts of that step are turned" in text(measured, heading)
+    assert "A part is mounted, then measured, then the parts" in text(expected, heading)
+
+
+def test_the_summary_holds_all_that_was_asked(expected):
+    asked = summary(expected)["plan"]
+    assert asked["measurement noise, σ [arcsec]"] == 2 and asked["adjustment noise, σ [arcsec]"] == 1
+    assert asked["precision [-]"] == 5 and asked["datum"] == "base" and asked["reducer"] is None
+    assert asked["parts"][1] == {
+        "part": "rotor",
+        "on": "bracket",
+        "turned [deg]": [0, 0, 90],
+        "position [mm]": [0, 0, 0],
+        "tilts": [],
+        "rotates": [],
+        "tolerance, ± [arcsec]": [40, 40, 40],
+        "weight [-]": 1,
+        "tilt limit, 3σ [arcsec]": None,
+        "rotation limit, 3σ [arcsec]": 15,
+        "cost factor [cost units·arcsec]": [70, 70, 90],
+        "cost fixed [cost units]": [0, 0, 0],
+    }
+    assert asked["steps"][1] == {
+        "step [-]": 2,
+        "mount": "rotor",
+        "effort of what may be turned [-]": {"bracket": 10, "rotor": 1},
+        "measure": ["rotor"],
+    }
+    assert asked["tolerances"] == {
+        "smallest [arcsec]": 3,
+        "largest [arcsec]": 120,
+        "cost form": "reciprocal",
+        "effort price [cost units/arcsec²]": 0.02,
+    }
+    assert asked["assumptions"] == ["the base is rigid"]
+
+
+def test_costs_that_are_no_reciprocals_keep_their_scale(plan):
+    scale = ARCSECOND * np.full((3, 3), 20.0)
+    asked = replace(plan.requirements, form="exponential", factor=np.full((3, 3), 7.0), scale=scale)
+    part = plan_record(replace(plan, requirements=asked))["parts"][0]
+    assert part["cost factor [cost units]"] == [7, 7, 7] and part["cost scale [arcsec]"] == [20, 20, 20]
+
+
+def test_digits_that_mean_nothing_are_cut(measured, expected):
+    frame = tables.rounded(pd.DataFrame({"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}))
+    assert list(map(repr, frame["x"].tolist())) == ["0.0", "0.0", "14.0", "0.0"]
+    for results, samples in ((measured, 1), (expected, 10)):
+        for section in assembly_document(replace(results, transmission=effect(samples))).sections:
+            for name, table in section.tables:
+                for column in table.select_dtypes("float"):
+                    values = table[column].dropna().to_numpy()
+                    assert (values == np.round(values, 6)).all(), (name, column)
+                    assert not (np.signbit(values) & (values == 0)).any(), (name, column)
+
+
+def test_without_limits_nothing_is_said_of_tolerances(expected):
+    free = np.full(3, np.inf)
+    asked = replace(expected.plan.requirements, tilt_limit=free, rotation_limit=free)
+    unlimited = replace(expected, plan=replace(expected.plan, requirements=asked))
+    document = assembly_document(unlimited)
+    assert "Angular tolerances" not in [section.heading for section in document.sections]
+    assert "cost units" not in " ".join(document.answer)
+    assert document.summary["tolerances"] is None
+    assert "No limits are stated, so no angular tolerances are given." in document.warnings
+    assert "OK" not in characteristic_table(unlimited)
+
+
+@pytest.mark.parametrize("errors", [None, ERRORS])
+def test_limits_that_no_tolerances_keep_leave_everything_else(plan, errors):
+    tight = replace(plan.requirements, tilt_limit=ARCSECOND * np.array([0.2, np.inf, np.inf]))
+    document = assembly_document(run(replace(plan, requirements=tight), errors))
+    assert any(warning.startswith("No angular tolerances are given. pump: ") for warning in document.warnings)
+    assert "Angular tolerances" not in [section.heading for section in document.sections]
+    json.dumps(document.summary, allow_nan=False)
 
 
 def test_what_is_drawn_over_the_precision_is_computed():
@@ -363,7 +567,9 @@ def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
 
 
 def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, expected):
-    exactly = "all parts are measured before the first is mounted, exactly, and turned exactly as listed"
+    exactly = (
+        "all parts are measured before the first is mounted, exactly, and turned as listed, without measuring again"
+    )
     assert exactly in assumptions(measured)
     assert exactly not in assumptions(expected)
 
@@ -375,7 +581,7 @@ def test_a_single_angle_that_rises_is_counted(plan):
     found = results.measured
     rose = int((np.abs(found.adjusted) > np.abs(found.unadjusted)).sum())
     assert rose > 0
-    assert f"{rose} of 9 are larger adjusted than unadjusted" in paragraphs
+    assert f"Larger adjusted than unadjusted: {rose} of 9, " in paragraphs
 
 
 def test_finite_rotations_are_compared(measured):

@@ -152,3 +152,9 @@ def test_adjusting_lowers_the_largest_line_load_of_every_assembly(response, plan
     assert (load[:, -1] < load[:, 0]).all()
     # From Q to Q one disc may tilt more than before: of 4000 steps 14 went up; 7 of 200 would be seven standard errors.
     assert np.count_nonzero(np.diff(load, axis=1) >= 0) < 7
+
+
+def test_a_length_is_no_angle(response):
+    chain = DatumFlowChain(datum="KC0", parts=(Part(name="KC1", on="KC0", rotates=("disc2.bore1.position.x",)),))
+    with pytest.raises(InputError, match=r"column is 'disc2.bore1.position.x'; allowed is an angle, whose source ends"):
+        OrientationResponse(model=response.model, chain=chain, torque=response.torque)

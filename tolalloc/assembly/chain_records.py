@@ -9,12 +9,15 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.assembly.chain import Part
+from tolalloc.assembly.plan import LARGEST_PRECISION
 from tolalloc.assembly.steps import Choice, Efforts, Step
 from tolalloc.files import Record
 from tolalloc.units import DEGREE, MILLIMETRE
 
 SMALLEST, LARGEST = 0.1, 3600.0
 """Smallest and largest tolerance and limit that is believed; a smaller one was meant in degrees [arcsec]."""
+QUIETEST = 0.01
+"""Smallest noise that is believed, unless there is none [arcsec]."""
 
 
 def _three(values: object) -> object:
@@ -41,6 +44,13 @@ def _each_believed(values: tuple[float, float, float]) -> tuple[float, float, fl
     return values
 
 
+def _noise(value: float) -> float:
+    if value and not QUIETEST <= value <= LARGEST:
+        question = "is that in degrees? " if 0 < value < QUIETEST else ""
+        raise ValueError(f"{question}allowed are 0 and arcseconds from {QUIETEST:g} to {LARGEST:g}")
+    return value
+
+
 def _name(text: str) -> str:
     if not text or text != text.strip() or " - " in text:
         raise ValueError("allowed is a name without spaces at its ends and without ' - ', which parts two names")
@@ -53,7 +63,7 @@ Degrees = Annotated[float, Field(ge=-360, le=360)]
 Millimetres = Annotated[float, Field(ge=-10000, le=10000)]
 Weight = Annotated[float, Field(ge=0, le=1e9)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
-Noise = Annotated[float, Field(ge=0, le=LARGEST)]
+Noise = Annotated[float, AfterValidator(_noise)]
 Three = BeforeValidator(_three)
 
 
@@ -169,7 +179,7 @@ class ChainRecord(Record):
     assumptions: tuple[str, ...] = ()
     datum: Name
     reducer: str = ""
-    precision: Weight
+    precision: Annotated[float, Field(ge=0, le=LARGEST_PRECISION)]
     adjust: Choice | None = None
     measure: Literal["current", "mounted"] | None = None
     effort: EffortsRecord | None = None

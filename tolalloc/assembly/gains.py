@@ -27,6 +27,8 @@ class Gains:
         The adjustments.
     kalman
         The estimator.
+    adjustment_noise
+        Standard deviation of what an adjustment misses; 0 where nothing is turned [rad].
     errors
         What parts and noise leave with these gains.
     """
@@ -34,6 +36,7 @@ class Gains:
     precision: float
     regulator: Regulator
     kalman: KalmanFilter
+    adjustment_noise: float
     errors: FinalErrors
 
 
@@ -56,13 +59,15 @@ def tuned_gains(plan: AssemblyPlan, precision: float, tolerances: Float[np.ndarr
     """
     if not 0 <= precision < np.inf:
         raise InputError.at(plan.name, "precision", precision, "0 or above")
-    noise = (plan.measurement_noise, plan.adjustment_noise)
+    # At a precision of 0 nothing is turned, and what is not turned misses nothing.
+    noise = (plan.measurement_noise, plan.adjustment_noise if precision > 0 else 0.0)
     adjusting = regulator(plan.space, plan.final_weight(precision))
     kalman = kalman_filter(plan.space, (tolerances / 3).ravel() ** 2, *noise, plan.name)
     return Gains(
         precision=precision,
         regulator=adjusting,
         kalman=kalman,
+        adjustment_noise=noise[1],
         errors=final_errors(plan.space, adjusting, kalman, *noise),
     )
 
@@ -86,7 +91,7 @@ def assembled(
     standard
         `tolalloc.assembly.trajectory.random_numbers` per assembly [-].
     """
-    deviations = (tolerances.ravel() / 3, plan.measurement_noise, plan.adjustment_noise)
+    deviations = (tolerances.ravel() / 3, plan.measurement_noise, gains.adjustment_noise)
     return drawn(plan.space, gains.regulator, gains.kalman, deviations, standard)
 
 

@@ -65,14 +65,19 @@ def kalman_filter(
         noise = measurement_noise**2 * np.eye(len(observing))
         covariance, unmeasured = covariance + entering, unmeasured + entering
         innovation = observing @ covariance @ observing.T + noise
-        if not _tells_something_new(innovation, observing @ unmeasured @ observing.T + noise):
+        scale = np.sqrt(np.diag(observing @ unmeasured @ observing.T + noise))
+        telling = np.flatnonzero(scale > 0)  # what never varies and is read without noise has nothing to tell
+        if not _tells_something_new(innovation[np.ix_(telling, telling)], scale[telling]):
             raise InputError.at(
                 f"{place}, step {step + 1}",
                 "measure",
                 "a reading that is known without being taken",
                 "readings that each tell something new, or a measurement noise above 0",
             )
-        gain = solve(innovation, observing @ covariance, assume_a="pos").T
+        gain = np.zeros((space.states, len(observing)))
+        gain[:, telling] = solve(
+            innovation[np.ix_(telling, telling)], observing[telling] @ covariance, assume_a="pos"
+        ).T
         left = identity - gain @ observing
         # Joseph's form stays symmetric and positive semidefinite whatever rounding does to the gain.
         covariance = left @ covariance @ left.T + gain @ noise @ gain.T + missed
@@ -83,12 +88,7 @@ def kalman_filter(
 
 
 def _tells_something_new(
-    innovation: Float[np.ndarray, "reading reading"], unmeasured: Float[np.ndarray, "reading reading"]
+    innovation: Float[np.ndarray, "reading reading"], scale: Float[np.ndarray, " reading"]
 ) -> bool:
     """Return whether no combination of readings is known before, judged on each reading's own scale."""
-    scale = np.sqrt(np.diag(unmeasured))
-    if not scale.size:
-        return True
-    if not scale.all():
-        return False
-    return bool(eigvalsh(innovation / np.outer(scale, scale))[0] > _NOTHING_NEW)
+    return not scale.size or bool(eigvalsh(innovation / np.outer(scale, scale))[0] > _NOTHING_NEW)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,9 @@ from jaxtyping import Float
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.assembly.state_space import StateSpace, state_space
 from tolalloc.assembly.steps import Step
+
+LARGEST_PRECISION = 1e6
+"""Largest precision that may be asked for: far beyond, gains lose their digits [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,3 +112,9 @@ class AssemblyPlan:
         """
         own = self.precision if precision is None else precision
         return np.diag(own * np.repeat(self.weights, 3))
+
+    @property
+    def turning_fewer(self) -> AssemblyPlan:
+        """The same assembly in which every step turns the part that it mounts, and no other."""
+        steps = tuple(replace(step, adjust=tuple(set(step.adjust) & {step.mount})) for step in self.steps)
+        return replace(self, steps=steps)

@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.final_errors import FinalErrors, final_errors
+from tolalloc.assembly.gains import tuned_gains
 from tolalloc.assembly.kalman import kalman_filter
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.regulator import Regulator, limiting_regulator, regulator
+from tolalloc.assembly.regulator import limiting_regulator, regulator
 from tolalloc.assembly.trajectory import foreseen
 
 
@@ -77,26 +78,23 @@ def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precisio
 
     Notes
     -----
-    The estimator does not depend on Q (separation), so it is the same at all of them.
+    The estimator does not depend on Q (separation). At Q = 0 nothing is turned, so nothing is missed.
     """
     noise = plan.measurement_noise, plan.adjustment_noise
     kalman = kalman_filter(plan.space, plan.variances, *noise, plan.name)
+    limit = final_errors(plan.space, limiting_regulator(plan.space, plan.final_weight(1.0)), kalman, *noise)
 
-    def under(adjustments: Regulator) -> FinalErrors:
-        return final_errors(plan.space, adjustments, kalman, *noise)
-
-    def weighed(weight: Float[np.ndarray, "state state"]) -> FinalErrors:
-        return under(regulator(plan.space, weight))
+    def at(precision: float) -> FinalErrors:
+        return tuned_gains(plan, float(precision), plan.tolerances).errors
 
     def angles(found: FinalErrors) -> Float[np.ndarray, "part 3"]:
         return np.diag(found.covariance(plan.variances)).reshape(-1, 3)
 
-    weights = [plan.final_weight(float(precision)) for precision in precisions]
-    maps = [weighed(weight) for weight in weights]
+    maps = [at(precision) for precision in precisions]
     variances = np.array([angles(each) for each in maps])
-    unit = plan.final_weight(1.0)
-    following = np.array([angles(weighed(weight + unit)) for weight in weights])
+    following = np.array([angles(at(precision + 1)) for precision in precisions])
     total, next_total = (np.sqrt(each.sum(axis=(1, 2))) for each in (variances, following))
+    weights = [plan.final_weight(float(precision)) for precision in precisions]
     return PrecisionSweep(
         precisions=precisions,
         total=total,
@@ -105,7 +103,7 @@ def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precisio
         effort=np.array([each.expected_effort(plan.variances) for each in maps]),
         cost=np.array([each.expected_cost(plan.variances, weight) for each, weight in zip(maps, weights, strict=True)]),
         next_unit=1 - next_total / np.where(total > 0, total, 1.0),
-        noise_floor=float(np.sqrt(angles(under(limiting_regulator(plan.space, unit))).sum())),
+        noise_floor=float(np.sqrt(angles(limit).sum())),
     )
 
 

@@ -158,6 +158,12 @@ def _check_names_and_efforts(chain: DatumFlowChain, step: Step, where: str) -> N
     """Refuse unknown names, efforts that are not positive and measurements that are none."""
     for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
         if name not in chain.names:
+            if name == chain.datum:
+                raise InputError.at(
+                    where, "measure", name, f"parts alone: everything is measured against {name} anyway"
+                )
+            if "-" in name and all(each.strip() in chain.names for each in name.split("-")):
+                raise InputError.at(where, "measure", name, "one part - another, with spaces around the sign")
             raise UnknownNameError.among(where, "part", name, chain.names)
     for name, effort in step.effort.items():
         if not 0 < effort < np.inf:

@@ -25,8 +25,9 @@ def assemble(
     """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.cli.document_script import written
+    from tolalloc.report.assembly.characteristics import characteristic_table
     from tolalloc.report.assembly.document import assembly_document
-    from tolalloc.report.assembly.tables import characteristic_table, step_table
+    from tolalloc.report.assembly.tables import step_table
     from tolalloc.study.assembly import AssemblyStudy, prepare_assembly
     from tolalloc.study.assembly import assemble as assembled
     from tolalloc.study.run_folder import require_usable
@@ -45,8 +46,11 @@ def assemble(
         print_json(document.summary)
         return
     name = prepared.name or prepared.plan.name
-    for (step, mount, measure), rows in step_table(results).groupby(["step [-]", "mount", "measure"], sort=False):
-        print_table(rows.iloc[:, 3:], f"Step {step}: mount {mount}, measure {measure}, turn about own axes")
+    listed = step_table(results)
+    said = [name for name in ("step [-]", "mount", "measure") if name in listed]
+    for (step, *done), rows in listed.groupby(said, sort=False):
+        work = ", ".join(f"{verb} {what}" for verb, what in zip(said[1:], done, strict=True))
+        print_table(rows.drop(columns=said), f"Step {step}: {work}, turn about own axes")
     print_table(
         characteristic_table(results),
         f"{name}: final angles against {prepared.plan.chain.datum}, before and after adjusting",

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
     no_args_is_help=True,
+    rich_markup_mode="markdown",  # rich's own markup would swallow [mm]
     add_completion=False,
     pretty_exceptions_enable=False,
 )

@@ -9,6 +9,7 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.equivalent.columns import source_name
 from tolalloc.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.equivalent.outputs import Solved
@@ -17,6 +18,7 @@ from tolalloc.response.chunks import Mapper
 from tolalloc.response.interface import Evaluation
 from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse, Observer
 from tolalloc.response.outputs import Answer, OutputsResponse, Reading
+from tolalloc.uncertainty.sources import ANGULAR
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 
 _AT_ONCE = 64
@@ -171,6 +173,8 @@ class OrientationResponse:
             raise InputError.at(place, "columns that its parts move", [], "at least one column of the reducer's model")
         for name in moved:
             if name in self.model.columns:
+                if source_name(name).rpartition(".")[2] not in ANGULAR:
+                    raise InputError.at(place, "column", name, f"an angle, whose source ends in {' or '.join(ANGULAR)}")
                 continue
             if LAWS[law] != LINEAR and name.rpartition(".")[0] in _disc_tilts(reducer.disc_count):
                 linear = " or ".join(known for known in LAWS if LAWS[known] == LINEAR)

@@ -9,13 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.angular.allocation import AngularAllocation, allocate_angles
+from tolalloc.allocation.angular.limits import angular_limits
 from tolalloc.allocation.angular.precision import best_precision
 from tolalloc.allocation.angular.retuning import retuned_allocation
 from tolalloc.allocation.angular.verification import verify_angles
 from tolalloc.assembly.chain_file import load_plan
 from tolalloc.assembly.errors_file import load_errors
 from tolalloc.assembly.gains import expected_angles, tuned_gains
-from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
@@ -51,7 +52,8 @@ SWEPT = (
 """Precisions over which the expected errors are drawn [-]."""
 SHOWN = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Precisions at which the transmission is solved; zhang2025 shows some of them [-]."""
-LARGEST_PRECISION = 1e6
+TRIED = np.geomspace(0.01, LARGEST_PRECISION, 161)
+"""Precisions among which one that keeps all limits is looked for [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +156,7 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
         gains = tuned_gains(plan, plan.precision, plan.tolerances)
         swept = np.array(sorted({*SWEPT, plan.precision}))
         sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
+        fewer = _fewer(plan)
         measured = None if prepared.errors is None else _measured(plan, prepared.name, prepared.errors, swept)
     with record.stage("tolerances"):
         tolerances, unreachable = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
@@ -170,6 +173,7 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
         gains=gains,
         sweep=sweep,
         expected=expected,
+        fewer=fewer,
         measured=measured,
         transmission=transmission,
         tolerances=tolerances,
@@ -182,15 +186,40 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
 def _measured(
     plan: AssemblyPlan, name: str, errors: Float[np.ndarray, "part 3"], precisions: Float[np.ndarray, " precision"]
 ) -> MeasuredParts:
-    adjusting = regulator(plan.space, plan.final_weight())
+    sequence = foreseen(plan.space, regulator(plan.space, plan.final_weight()), errors.ravel())
+    turned = plan.space.adjusting * (sequence.adjustments != 0)[:, np.newaxis]
     return MeasuredParts(
         name=name,
         errors=errors,
-        sequence=foreseen(plan.space, adjusting, errors.ravel()),
+        sequence=sequence,
+        # Nobody measures again after the turns as listed, so what they miss stays.
+        missed=plan.adjustment_noise * np.sqrt((turned**2).sum(axis=(0, 2))).reshape(-1, 3),
         unadjusted=(plan.chain.transform @ errors.ravel()).reshape(-1, 3),
         exact=plan.chain.finite(errors),
         norms=norms(plan, errors.ravel(), precisions),
+        keeping=_smallest_keeping(plan, errors),
     )
+
+
+def _smallest_keeping(plan: AssemblyPlan, errors: Float[np.ndarray, "part 3"]) -> float | None:
+    """Return the smallest of the tried precisions at which the measured parts keep all limits, if any does."""
+    if plan.requirements is None:
+        return None
+    limits = angular_limits(plan)
+    for precision in TRIED:
+        final = foreseen(plan.space, regulator(plan.space, plan.final_weight(float(precision))), errors.ravel())
+        if (limits.counted @ final.adjusted[-1] ** 2 <= limits.values**2).all():
+            return float(precision)
+    return None
+
+
+def _fewer(plan: AssemblyPlan) -> float | None:
+    """Return the total that is left if every step turns the part that it mounts alone, unless it does anyway [rad]."""
+    fewer = plan.turning_fewer
+    if [step.adjust for step in fewer.steps] == [step.adjust for step in plan.steps]:
+        return None
+    gains = tuned_gains(fewer, fewer.precision, fewer.tolerances)
+    return float(np.sqrt(np.trace(gains.errors.covariance(fewer.variances))))
 
 
 def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> tuple[AngularTolerances | None, str]:
@@ -198,15 +227,18 @@ def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> tuple[A
     if plan.requirements is None:
         return None, ""
     try:
-        retuned = retuned_allocation(plan)
+        retuned, by_precision = retuned_allocation(plan), best_precision(plan)
     except InputError as error:  # who wants to know what to turn must not be kept from it
         return None, str(error)
+    # Without a price on effort the best precision is the end of the range, which nobody asked for.
+    verified = by_precision.best if plan.requirements.effort_price > 0 else retuned.best
     found = AngularTolerances(
         adjusted=retuned.allocations[0],
         unadjusted=_without_adjusting(plan),
         retuned=retuned,
-        verification=verify_angles(plan, retuned.best, seeds, assemblies),
-        by_precision=best_precision(plan),
+        verified=verified,
+        verification=verify_angles(plan, verified, seeds, assemblies),
+        by_precision=by_precision,
     )
     return found, ""
 

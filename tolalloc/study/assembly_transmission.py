@@ -61,11 +61,11 @@ def transmission_effect(
     perfect = response(np.zeros((1, final.shape[2])))
     found = response(final.reshape(-1, final.shape[2]))
     good = np.asarray(found.good.reshape(final.shape[:2]).all(axis=0))
-    if not (perfect.good.all() and good[0] and (~good).mean() <= LARGEST_FAILED_SHARE):
+    if not (perfect.good.all() and good.any() and (~good).mean() <= LARGEST_FAILED_SHARE):
         raise SolveError(
             f"{plan.name}: {int((~good).sum())} of {good.size} assemblies have no equilibrium at some angle."
         )
-    shown = response.errors(np.concatenate([np.zeros((1, final.shape[2])), final[:, 0]]))
+    shown = response.errors(np.concatenate([np.zeros((1, final.shape[2])), final[:, np.argmax(good)]]))
     rated = float(np.copysign(reducer.load.rated_torque, torque))
     discs = [contact_pattern(model, shown[1], rated, disc + 1) for disc in range(reducer.disc_count)]
     worst = max(discs, key=lambda pattern: float(pattern.line_load.max()))

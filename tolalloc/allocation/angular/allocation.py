@@ -127,12 +127,10 @@ def _refusal(plan: AssemblyPlan, gains: Gains) -> InputError:
     made = f"the noise alone makes {alone:.4g} arcsec"
     if not too_noisy:
         made = f"the smallest tolerances of {least:g} arcsec make {left:.4g} arcsec, the noise alone {alone:.4g}"
-    remedy = (
-        "measure and adjust better, lower the precision"
-        if too_noisy
-        else "allow smaller tolerances, raise the precision"
-    )
+    # Which of these helps depends on the plan; none is promised.
+    remedy = "measure or adjust better, expect smaller errors" if too_noisy else "allow smaller tolerances"
     return InputError(
         f"{plan.name}: three standard deviations of the {limits.names[at]} may be {limit:g} arcsec, but at a precision "
-        f"of {gains.precision:g} {made}; {remedy}, or widen the limit."
+        f"of {gains.precision:g}, with a filter that expects the stated tolerances, {made}; {remedy}, try another "
+        "precision, or widen the limit."
     )

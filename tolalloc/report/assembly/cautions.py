@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from tolalloc.report.assembly.results import AngularTolerances, AssemblyResults
-from tolalloc.report.assembly.tables import characteristic_table, larger
+from tolalloc.report.assembly.characteristics import MISSED, characteristic_table, has_limits, larger
+from tolalloc.report.assembly.results import AngularTolerances, AssemblyResults, MeasuredParts
+from tolalloc.report.assembly.tables import at_precision
+from tolalloc.report.assembly.tolerance_tables import is_retuned, limited_tolerances
+from tolalloc.report.assembly.transmission import risen
 from tolalloc.units import ARCSECOND
+
+WHY_LARGER = (
+    "Discs that are turned against each other share the load unequally: at a small torque one carries alone and hides "
+    "the errors of the other. A tilted disc wedges between the pins, so that more of them carry. Smaller angles end "
+    "both, and transmission error and forces can rise."
+)
+_SAME = 1e-6
+"""Share by which totals may differ by rounding [-]."""
 
 
 def warnings(results: AssemblyResults) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
-    rose = larger(results)
+    rose, tolerances = larger(results), limited_tolerances(results)
     return (
         *_not_there(results),
         *_beyond(results),
         *_missed(results),
         *((f"Adjusting leaves larger than unadjusted: {', '.join(rose)}.",) if rose else ()),
+        *_fewer(results),
+        *_risen(results),
         *_failed(results),
+        *_unlimited(results),
         *((f"No angular tolerances are given. {results.unreachable}",) if results.unreachable else ()),
-        *(_of_tolerances(results.tolerances) if results.tolerances else ()),
+        *(_of_tolerances(tolerances) if tolerances else ()),
     )
 
 
@@ -49,16 +65,62 @@ def _beyond(results: AssemblyResults) -> tuple[str, ...]:
 
 
 def _missed(results: AssemblyResults) -> tuple[str, ...]:
-    """Return which limits are not kept, by the measured parts or by the stated tolerances."""
+    """Return which limits are not kept, by the measured parts or by the stated tolerances, and what would keep them."""
     frame = characteristic_table(results)
     if "OK" not in frame:
         return ()
-    missed = [
-        f"{row['angle']} of {row['characteristic']} ({abs(row.iloc[3]):.2f}″, limit {row['limit [arcsec]']:g}″)"
-        for _, row in frame[frame["OK"] == "no"].iterrows()
-    ]
+    missed, doubted = (
+        ", ".join(map(_limited, frame[frame["OK"] == word].to_dict("records"))) for word in ("no", "in doubt")
+    )
     by = "Adjusted, these parts" if results.measured else "Three standard deviations under the stated tolerances"
-    return (f"{by} miss limits: {', '.join(missed)}.",) if missed else ()
+    remedy = f" {_remedy(results.measured)}" if results.measured else ""
+    doubt = "Kept as listed, but three standard deviations of what the turns miss reach beyond the limit"
+    return (
+        *((f"{by} miss limits: {missed}.{remedy}",) if missed else ()),
+        *((f"{doubt}: {doubted}.",) if doubted else ()),
+    )
+
+
+def _limited(row: dict[Hashable, Any]) -> str:
+    after = abs(row.get("after [arcsec]", row.get("after, 3σ [arcsec]", 0.0)))
+    missed = f" ± {row[MISSED]:.2f}" if MISSED in row else ""
+    return f"{row['angle']} of {row['characteristic']} ({after:.2f}{missed}″, limit {row['limit [arcsec]']:g}″)"
+
+
+def _remedy(measured: MeasuredParts) -> str:
+    if measured.keeping is None:
+        return "No precision that was tried keeps them all."
+    return f"Turned as listed for a precision of {measured.keeping:.4g}, they keep them all."
+
+
+def _fewer(results: AssemblyResults) -> tuple[str, ...]:
+    """Return whether it is better to leave alone what was adjusted before."""
+    total = results.sweep.total[at_precision(results)]
+    if results.fewer is None or results.fewer >= total * (1 - _SAME):
+        return ()
+    noise = results.plan.adjustment_noise / ARCSECOND
+    why = f": every further adjustment misses by {noise:g}″ itself" if noise else ""
+    return (
+        f"Turning at every step only the part just mounted leaves {results.fewer / ARCSECOND:.2f}″ rms instead of "
+        f"{total / ARCSECOND:.2f}″{why}.",
+    )
+
+
+def _risen(results: AssemblyResults) -> tuple[str, ...]:
+    """Return which outputs of the transmission adjusting leaves larger, and how that can be."""
+    effect = results.transmission
+    rose = risen(effect, results.plan.precision) if effect else ()
+    if effect is None or not rose:
+        return ()
+    of_them = "" if effect.good.size == 1 else f", medians of {int(effect.good.sum())} random assemblies"
+    return (f"Adjusting leaves larger than unadjusted{of_them}: {', '.join(rose)}. {WHY_LARGER}",)
+
+
+def _unlimited(results: AssemblyResults) -> tuple[str, ...]:
+    """Return that costs alone make no tolerances."""
+    if results.plan.requirements is None or has_limits(results):
+        return ()
+    return ("No limits are stated, so no angular tolerances are given.",)
 
 
 def _failed(results: AssemblyResults) -> tuple[str, ...]:
@@ -72,7 +134,7 @@ def _of_tolerances(tolerances: AngularTolerances) -> tuple[str, ...]:
     found = []
     if isinstance(tolerances.unadjusted, str):
         found.append(f"Without adjusting: {tolerances.unadjusted}")
-    if tolerances.retuned.best.total < tolerances.adjusted.total:
+    if is_retuned(tolerances):
         found.append(
             "The lower bound of the re-tuned tolerances holds for their own gains: that no other filter allows cheaper "
             "ones is not proven."
@@ -94,13 +156,16 @@ def assumptions(results: AssemblyResults) -> tuple[str, ...]:
         "adjustments are those of a linear-quadratic regulator: they weigh final angles against effort and know no "
         "smallest turn",
         *(
-            ("all parts are measured before the first is mounted, exactly, and turned exactly as listed",)
+            (
+                "all parts are measured before the first is mounted, exactly, and turned as listed, without measuring "
+                "again",
+            )
             if results.measured
             else ()
         ),
         *(
             ("the certificates hold for fixed gains; the filter of the adjusted tolerances expects the stated ones",)
-            if results.tolerances
+            if limited_tolerances(results)
             else ()
         ),
         *(("every error of the reducer but these angles is zero",) if transmission else ()),

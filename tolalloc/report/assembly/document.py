@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.report.assembly import figures, tables, tolerance_tables, transmission
-from tolalloc.report.assembly.cautions import assumptions, warnings
+from tolalloc.report.assembly.cautions import WHY_LARGER, assumptions, warnings
+from tolalloc.report.assembly.characteristics import characteristic_table, larger
 from tolalloc.report.assembly.results import AngularTolerances, AssemblyResults, MeasuredParts, TransmissionEffect
 from tolalloc.report.assembly.sentences import answer
 from tolalloc.report.assembly.summary import finite_difference, summary
@@ -17,6 +18,12 @@ _EXPECTED = (
     "what perfect parts would be left with."
 )
 
+_MISSED = (
+    "All turns follow from the errors in the file and are made as listed, without measuring again; each misses by the "
+    "adjustment noise. A limit is kept (yes) where three standard deviations of that still fit below it, in doubt "
+    "where they do not, and missed (no) where the angle as listed is beyond it. Of a tilt the larger axis counts."
+)
+
 
 def _steps(results: AssemblyResults) -> Section:
     """Return how errors build up and are adjusted."""
@@ -25,15 +32,15 @@ def _steps(results: AssemblyResults) -> Section:
     return Section(
         heading="How errors build up and are adjusted",
         paragraphs=(
-            "A part is mounted, then measured, then the parts of that step are turned about their own axes, positive "
-            "by the right hand. Tilt is √(x² + y²) and rotation z of a characteristic against "
+            f"A part is mounted, {'' if measured else 'then measured, '}then the parts of that step are turned about "
+            "their own axes, positive by the right hand. Tilt is √(x² + y²) and rotation z of a characteristic against "
             f"{results.plan.chain.datum}.",
-            *(_larger_angles(results, measured) if measured else (_EXPECTED,)),
+            *((_MISSED, *_larger_angles(results, measured)) if measured else (_EXPECTED,)),
         ),
         figures=figures.step_figures(results),
         tables=(
             ("steps", tables.step_table(results)),
-            ("characteristics", tables.characteristic_table(results)),
+            ("characteristics", characteristic_table(results)),
             *angles,
             ("gains", tables.gain_table(results)),
         ),
@@ -51,23 +58,37 @@ def _larger_angles(results: AssemblyResults, measured: MeasuredParts) -> tuple[s
         for at, axis in rose
     )
     return (
-        f"The sum of squares falls, a single angle need not: {len(rose)} of {before.size} are larger adjusted than "
-        f"unadjusted, {named}.",
+        f"The {tables.norm_of(results)} of all angles falls, a single angle need not. Larger adjusted than unadjusted: "
+        f"{len(rose)} of {before.size}, {named}.",
     )
 
 
 def _sweep(results: AssemblyResults) -> Section:
-    rose = tables.larger(results)
+    rose = larger(results)
     return Section(
         heading="Precision against effort",
         paragraphs=(
-            "The larger the precision Q, the smaller what is left of all angles together and the larger the effort of "
-            "turning; each unit of Q buys less than the one before. A single characteristic may rise meanwhile: at "
-            f"Q = {results.plan.precision:g}, {len(rose) or 'none'} of {2 * len(results.plan.chain.names)} tilts and "
-            "rotations are larger than unadjusted.",
+            f"{_bought(results)} {len(rose) or 'None'} of {2 * len(results.plan.chain.names)} tilts and rotations "
+            f"{'is' if len(rose) == 1 else 'are'} larger than unadjusted at Q = {results.plan.precision:g}.",
         ),
         figures=figures.sweep_figures(results),
         tables=(("sweep", tables.sweep_table(results)),),
+    )
+
+
+def _bought(results: AssemblyResults) -> str:
+    """Return what a larger precision does to all angles together, as far as the sweep shows."""
+    sweep = results.sweep
+    least = int(np.argmin(sweep.total))
+    if (np.diff(sweep.total) <= 0).all() and sweep.total[least] < sweep.total[0]:
+        each = "; each unit of Q buys less than the one before" if (np.diff(sweep.next_unit) <= 0).all() else ""
+        return (
+            "Over the precisions tried, the larger Q, the smaller what is to be expected of all angles together and "
+            f"the larger the effort of turning{each}. A single characteristic may rise meanwhile."
+        )
+    return (
+        f"Of the precisions tried, Q = {sweep.precisions[least]:g} leaves least of all angles together, "
+        f"{sweep.total[least] / ARCSECOND:.2f}″ rms; the effort of turning grows with Q."
     )
 
 
@@ -78,8 +99,8 @@ def _transmission(results: AssemblyResults, effect: TransmissionEffect) -> Secti
         heading="Transmission",
         paragraphs=(
             "A tilted disc loads one end of its teeth: as tilts fall, so does the largest line load, mostly. "
-            "Transmission error and the largest pin force need not: a wedge between disc and pins can bring more pins "
-            f"to carry. Where no torque is named, it is the test torque of {effect.test_torque:g} N·m.",
+            f"Transmission error and the largest pin force need not. {WHY_LARGER} Where no torque is named, it is the "
+            f"test torque of {effect.test_torque:g} N·m.",
             f"Curves and pins are those of {which}. All pins are shown at one carrier angle, where the line load of "
             "the unadjusted disc is largest.",
         ),
@@ -98,18 +119,29 @@ def _transmission(results: AssemblyResults, effect: TransmissionEffect) -> Secti
 
 
 def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> Section:
+    tuned = (
+        "Re-tuned: it expects what is allocated with it."
+        if tolerance_tables.is_retuned(tolerances)
+        else "Tuning it to what is allocated gains nothing here."
+    )
+    best = (
+        " Best precision: the filter of the stated tolerances, at the precision that costs least."
+        if tolerance_tables.is_priced(results.plan)
+        else ""
+    )
     return Section(
         heading="Angular tolerances",
         paragraphs=(
-            "Adjusted: the filter expects parts of the stated tolerances. Re-tuned: it expects what is allocated with "
-            "it. A lower bound takes no solver's word and holds for the gains of its own row.",
-            "Verified are the re-tuned tolerances. An assembly is within a limit where its own tilt or rotation is; "
-            "three standard deviations of x and y together promise between 99.73 % and 99.99 % of that.",
+            f"Adjusted: the filter expects parts of the stated tolerances. {tuned}{best} A lower bound takes no "
+            "solver's word and holds for the gains of its own row.",
+            f"Verified is “{tolerance_tables.verified_name(results.plan, tolerances)}”. An assembly is within a limit "
+            "where its own tilt or rotation is; three standard deviations of x and y together promise between 99.73 % "
+            "and 99.99 % of that.",
         ),
         figures=(figures.cost_figure(results.plan, tolerances),),
         tables=(
             ("angular tolerances", tolerance_tables.tolerance_table(results.plan, tolerances)),
-            ("limits", tolerance_tables.limit_table(tolerances)),
+            ("limits", tolerance_tables.limit_table(results.plan, tolerances)),
             ("certificates", tolerance_tables.certificate_table(results.plan, tolerances)),
             ("cost by precision", tolerance_tables.precision_table(tolerances)),
         ),
@@ -129,6 +161,7 @@ def _finite(measured: MeasuredParts) -> Section:
 def assembly_document(results: AssemblyResults) -> Document:
     """Return the report."""
     plan, measured = results.plan, results.measured
+    tolerances = tolerance_tables.limited_tolerances(results)
     parts = measured.name if measured else "parts within the stated tolerances"
     return Document(
         title=f"Assembly of {plan.name}",
@@ -139,7 +172,7 @@ def assembly_document(results: AssemblyResults) -> Document:
             _steps(results),
             _sweep(results),
             *((_transmission(results, results.transmission),) if results.transmission else ()),
-            *((_tolerances(results, results.tolerances),) if results.tolerances else ()),
+            *((_tolerances(results, tolerances),) if tolerances else ()),
             *((_finite(measured),) if measured else ()),
         ),
         assumptions=assumptions(results),

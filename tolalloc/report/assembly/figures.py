@@ -28,8 +28,7 @@ def _over_steps(results: AssemblyResults, name: str, y_label: str, angles: Float
     where = np.arange(1, len(mounted) + 1)[:, np.newaxis] + [0.0, 0.5]
     return Figure(
         name=name,
-        title=f"{name.capitalize()} of every characteristic: at the number of a step its part is mounted, half a step "
-        "on all is adjusted",
+        title=f"{name.capitalize()} of every characteristic: at each step as mounted, half a step on as adjusted",
         x_label="step [-]",
         y_label=y_label,
         series=tuple(
@@ -59,7 +58,7 @@ def sweep_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
     return (
         Figure(
             name="precision",
-            title="What is left of the angles over the precision; dashed: noise leaves that much of what is expected",
+            title="What is left of the angles over the precision; dashed: to be expected however large it is",
             x_label="precision Q [-]",
             y_label="all final angles together [arcsec]",
             series=(expected, *measured, *_asked(results)),
@@ -68,7 +67,7 @@ def sweep_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
         ),
         Figure(
             name="effort",
-            title="Effort against accuracy, from nothing turned to the largest precision; dashed: what noise leaves",
+            title="Effort against accuracy; dashed: what this plan leaves however large the precision",
             x_label="expected effort, Σ uᵀRu [arcsec²]",
             y_label="all final angles together, rms [arcsec]",
             series=(Series(label="to be expected", kind="line", x=list(sweep.effort / ARCSECOND**2), y=list(total)),),

@@ -37,8 +37,12 @@ class MeasuredParts:
         Final state if nothing is turned [rad].
     exact
         The same by finite rotations [rad].
+    missed
+        Standard deviation of what the listed turns miss in the end [rad].
     norms
         Weighted norm of the final errors over the precisions of the sweep [rad].
+    keeping
+        Smallest precision tried at which they keep all limits; none if none of them does, or nothing is limited [-].
     """
 
     name: str
@@ -46,7 +50,9 @@ class MeasuredParts:
     sequence: Trajectory
     unadjusted: Float[np.ndarray, "part 3"]
     exact: Float[np.ndarray, "part 3"]
+    missed: Float[np.ndarray, "part 3"]
     norms: Float[np.ndarray, " precision"]
+    keeping: float | None
 
     @property
     def adjusted(self) -> Float[np.ndarray, "part 3"]:
@@ -78,7 +84,7 @@ class TransmissionEffect:
     perfect_curves
         One output turn without any angular error, at rated torque.
     curves
-        One output turn of the first assembly at every precision, at rated torque.
+        One output turn of the first good assembly at every precision, at rated torque.
     patterns
         Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
         which the line load is largest if nothing is turned.
@@ -108,8 +114,10 @@ class AngularTolerances:
         The same if nothing is turned, or why there are none.
     retuned
         With the filter tuned again to what was allocated.
+    verified
+        The cheapest of them: with priced effort that at the best precision.
     verification
-        Assemblies at random with the cheapest of them.
+        Assemblies at random with it.
     by_precision
         Costs over the precision, effort included.
     """
@@ -117,6 +125,7 @@ class AngularTolerances:
     adjusted: AngularAllocation
     unadjusted: AngularAllocation | str
     retuned: RetunedAllocation
+    verified: AngularAllocation
     verification: AngularVerification
     by_precision: PrecisionCost
 
@@ -136,6 +145,9 @@ class AssemblyResults:
     expected
         Standard deviation of every angle after each step, step by step: with the part as mounted, and as adjusted
         [rad].
+    fewer
+        Root of the sum of the variances of all final angles if every step turned the part that it mounts alone; none if
+        the plan does that [rad].
     measured
         Parts whose errors are known, if any are.
     transmission
@@ -154,6 +166,7 @@ class AssemblyResults:
     gains: Gains
     sweep: PrecisionSweep
     expected: Float[np.ndarray, "step 2 state"]
+    fewer: float | None
     measured: MeasuredParts | None
     transmission: TransmissionEffect | None
     tolerances: AngularTolerances | None

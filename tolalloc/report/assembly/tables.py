@@ -10,11 +10,21 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.assembly.steps import adjustable
-from tolalloc.report.assembly.results import AssemblyResults, MeasuredParts
+from tolalloc.report.assembly.results import AssemblyResults
 from tolalloc.units import ARCSECOND
 
-_READ = 2
+READ = 2
 """Digits behind the point of an arcsecond that a bench can turn or read [-]."""
+_KEPT = 6
+"""Digits behind the point of a number in a report, whatever its unit; the others are rounding errors [-]."""
+
+
+def rounded(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a table without digits that mean nothing, and without −0."""
+    found = frame.round(_KEPT)
+    numbers = found.select_dtypes("float").columns
+    found[numbers] = found[numbers] + 0.0
+    return found
 
 
 def at_precision(results: AssemblyResults) -> int:
@@ -58,8 +68,8 @@ def step_table(results: AssemblyResults) -> pd.DataFrame:
     """Return one row per step and turned part; a part that is turned by less than can be read has none."""
     chain, kind = results.plan.chain, "" if results.measured else ", 3σ"
     rows = []
-    turned = np.round(turns(results) / ARCSECOND, _READ) + 0.0  # no −0
-    tilt, rotation = (np.round(each[:, 1] / ARCSECOND, _READ) for each in tilt_and_rotation(states(results)))
+    turned = np.round(turns(results) / ARCSECOND, READ) + 0.0  # no −0
+    tilt, rotation = (np.round(each[:, 1] / ARCSECOND, READ) + 0.0 for each in tilt_and_rotation(states(results)))
     for number, step in enumerate(results.plan.steps):
         moved = np.flatnonzero(adjustable(chain, step) & turned[number].any(axis=1))
         for at in moved if moved.size else [None]:
@@ -69,7 +79,8 @@ def step_table(results: AssemblyResults) -> pd.DataFrame:
                 {
                     "step [-]": number + 1,
                     "mount": step.mount,
-                    "measure": ", ".join(step.measure) or "nothing",
+                    # Turns of measured parts follow from the file; what is measured meanwhile changes nothing.
+                    **({} if results.measured else {"measure": ", ".join(step.measure) or "nothing"}),
                     "turn": "nothing" if at is None else chain.names[at],
                     f"x{kind} [arcsec]": float(x),
                     f"y{kind} [arcsec]": float(y),
@@ -79,49 +90,6 @@ def step_table(results: AssemblyResults) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows)
-
-
-def characteristic_table(results: AssemblyResults) -> pd.DataFrame:
-    """Return tilt and rotation of every characteristic before and after adjusting, and its limits if any are stated."""
-    if results.measured:
-        before, after = _measured_finals(results.measured)
-        columns = {"before [arcsec]": before, "after [arcsec]": after}
-    else:
-        sweep, at = results.sweep, at_precision(results)
-        finals = 3 * np.concatenate([sweep.tilt, sweep.rotation], axis=1) / ARCSECOND
-        columns = {
-            "before, 3σ [arcsec]": finals[0],
-            "after, 3σ [arcsec]": finals[at],
-            "noise, 3σ [arcsec]": _noise_alone(results),
-        }
-    names = results.plan.chain.names
-    frame = pd.DataFrame(
-        {"characteristic": names * 2, "angle": ["tilt"] * len(names) + ["rotation"] * len(names), **columns}
-    )
-    required = results.plan.requirements
-    if required is not None:
-        limits = np.concatenate([required.tilt_limit, required.rotation_limit]) / ARCSECOND
-        frame["limit [arcsec]"] = np.where(np.isfinite(limits), limits, np.nan)
-        kept = np.abs(frame.iloc[:, 3]) <= limits
-        frame["OK"] = [
-            "" if np.isinf(limit) else ("yes" if good else "no") for limit, good in zip(limits, kept, strict=True)
-        ]
-    return frame
-
-
-def _noise_alone(results: AssemblyResults) -> Float[np.ndarray, " characteristic"]:
-    """Return three standard deviations of tilts, then of rotations, that perfect parts would be left with [arcsec]."""
-    errors = results.gains.errors
-    return np.concatenate(tilt_and_rotation(3 * np.sqrt(np.diag(errors.noise_covariance)))) / ARCSECOND
-
-
-def _measured_finals(
-    measured: MeasuredParts,
-) -> tuple[Float[np.ndarray, " characteristic"], Float[np.ndarray, " characteristic"]]:
-    """Return tilts before rotations, unadjusted and adjusted [arcsec]."""
-    pairs = (tilt_and_rotation(each.ravel()) for each in (measured.unadjusted, measured.adjusted))
-    unadjusted, adjusted = (np.concatenate(pair) / ARCSECOND for pair in pairs)
-    return unadjusted, adjusted
 
 
 def angle_table(results: AssemblyResults) -> pd.DataFrame:
@@ -135,10 +103,11 @@ def angle_table(results: AssemblyResults) -> pd.DataFrame:
         "unadjusted [arcsec]": measured.unadjusted,
         "unadjusted, finite rotations [arcsec]": measured.exact,
         "adjusted [arcsec]": measured.adjusted,
+        "turns miss, 3σ [arcsec]": 3 * measured.missed,
     }
     part, axis = zip(*product(results.plan.chain.names, "xyz"), strict=True)
     values = {name: each.ravel() / ARCSECOND for name, each in columns.items()}
-    return pd.DataFrame({"part": part, "axis": axis, **values})
+    return rounded(pd.DataFrame({"part": part, "axis": axis, **values}))
 
 
 def gain_table(results: AssemblyResults) -> pd.DataFrame:
@@ -151,7 +120,7 @@ def gain_table(results: AssemblyResults) -> pd.DataFrame:
         for number, (step, gains) in enumerate(zip(plan.steps, results.gains.regulator.gains, strict=True), start=1)
         for row in np.flatnonzero(np.repeat(adjustable(plan.chain, step), 3))
     ]
-    return pd.DataFrame(rows)
+    return rounded(pd.DataFrame(rows))
 
 
 def sweep_table(results: AssemblyResults) -> pd.DataFrame:
@@ -167,16 +136,9 @@ def sweep_table(results: AssemblyResults) -> pd.DataFrame:
         columns[f"{norm_of(results)} of {results.measured.name} [arcsec]"] = results.measured.norms / ARCSECOND
     for kind, values in (("tilt", sweep.tilt), ("rotation", sweep.rotation)):
         columns |= {f"{kind} of {name}, 3σ [arcsec]": 3 * values[:, at] / ARCSECOND for at, name in enumerate(names)}
-    return pd.DataFrame(columns)
+    return rounded(pd.DataFrame(columns))
 
 
 def norm_of(results: AssemblyResults) -> str:
     """Return what the norm of measured parts is called."""
     return "norm" if (results.plan.weights == 1).all() else "weighted norm"
-
-
-def larger(results: AssemblyResults) -> tuple[str, ...]:
-    """Return which tilts and rotations adjusting leaves larger, with both values."""
-    frame = characteristic_table(results)
-    rose = frame.iloc[:, 3].abs().round(_READ) > frame.iloc[:, 2].abs().round(_READ)
-    return tuple(f"{row[1]} of {row[0]} ({row[2]:.2f} → {row[3]:.2f}″)" for row in frame[rose].itertuples(index=False))

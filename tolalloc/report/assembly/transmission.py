@@ -9,18 +9,24 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.report.assembly.results import TransmissionEffect
+from tolalloc.report.assembly.tables import rounded
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.heat_map import HeatMap
 from tolalloc.response.kernel import PEAK_TO_PEAK
 from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
+RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
 PIN_FORCE = "largest pin force, rated torque [N]"
 DISC_FORCE = "largest sum of pin forces of a disc, rated torque [N]"
 LINE_LOAD = "largest line load, rated torque [N/mm]"
+PRESSURE = "peak pressure, rated torque [MPa]"
 DRAWN = {"peak_to_peak": PEAK_TO_PEAK, "pin_force": PIN_FORCE, "disc_force": DISC_FORCE, "line_load": LINE_LOAD}
 """Figure name → output that is drawn over the precision."""
+_BETTER_SMALL = (PEAK_TO_PEAK, RATED_PEAK_TO_PEAK, PIN_FORCE, DISC_FORCE, LINE_LOAD, PRESSURE)
 BAND = (5.0, 95.0)
 """Percentiles around the median of random assemblies [%]."""
+_SAME = 1e-6
+"""Share by which solutions of the same angles may differ [-]."""
 _CRANK_TURNS = 2
 """Turns of the crank that a curve shows; a whole output turn is too many to read [-]."""
 _EVERY = 4
@@ -37,6 +43,43 @@ def perfect(effect: TransmissionEffect, output: str) -> float:
     return float(effect.perfect[effect.outputs.index(output)])
 
 
+def change(effect: TransmissionEffect, output: str, precision: float) -> tuple[float, float]:
+    """Return an output unadjusted and adjusted, the median of random assemblies [as the name says].
+
+    Parameters
+    ----------
+    effect
+        What the final angles do.
+    output
+        Its name.
+    precision
+        Precision of the adjusted assembly, one of the solved ones [-].
+    """
+    at = int(np.flatnonzero(effect.precisions == precision)[0])
+    before, after = np.median(answers(effect, output)[[0, at]], axis=1)
+    return float(before), float(after)
+
+
+def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
+    """Return which outputs adjusting leaves larger, with both values.
+
+    Parameters
+    ----------
+    effect
+        What the final angles do.
+    precision
+        Precision of the adjusted assembly, one of the solved ones [-].
+    """
+    found = []
+    for output in _BETTER_SMALL:
+        before, after = change(effect, output, precision)
+        if after > before * (1 + _SAME):
+            name, unit = output.removesuffix("]").split(" [")
+            at = f" at {effect.test_torque:g} N·m" if output == PEAK_TO_PEAK else ""
+            found.append(f"{name}{at} ({before:.4g} → {after:.4g} {unit})")
+    return tuple(found)
+
+
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
     names = ["perfect parts", *(f"{precision:g}" for precision in effect.precisions)]
@@ -44,7 +87,7 @@ def value_table(effect: TransmissionEffect) -> pd.DataFrame:
         output: [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
         for output in effect.outputs
     }
-    return pd.DataFrame({"precision Q [-]": names, **values})
+    return rounded(pd.DataFrame({"precision Q [-]": names, **values}))
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
@@ -55,7 +98,7 @@ def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
         if ideal > 0:
             above = 100 * (np.median(answers(effect, output), axis=1) / ideal - 1)
             columns[f"{output.split(' [')[0]}, above perfect parts [%]"] = above
-    return pd.DataFrame(columns)
+    return rounded(pd.DataFrame(columns))
 
 
 def fallen_table(effect: TransmissionEffect) -> pd.DataFrame:
@@ -68,7 +111,7 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame:
         for output in effect.outputs
         if perfect(effect, output) > 0
     }
-    return pd.DataFrame({"precision Q [-]": effect.precisions[1:], **shares})
+    return rounded(pd.DataFrame({"precision Q [-]": effect.precisions[1:], **shares}))
 
 
 def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
@@ -114,9 +157,10 @@ def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figur
     values, many = answers(effect, output), effect.good.size > 1
     low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
     label = f"median and band from {BAND[0]:g} to {BAND[1]:g} % of random assemblies" if many else "measured parts"
+    short = f"median, {BAND[0]:g} to {BAND[1]:g} %" if many else label
     return Figure(
         name=name,
-        title=f"{output.split(' [')[0].capitalize()}: {label}; dashed: perfect parts",
+        title=f"{output.split(' [')[0].capitalize()}: {short}; dashed: perfect parts",
         x_label="precision Q [-]",
         y_label=output,
         series=(
