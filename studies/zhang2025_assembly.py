@@ -46,7 +46,7 @@ def parts_drawn() -> np.ndarray:
 def build(quick: bool) -> Document:
     """Return the report."""
     asked = AssemblyStudy(chain="bx40e", assemblies=10_000 if quick else 100_000, seed=1)
-    prepared = replace(prepare_assembly(asked), name="parts drawn within ±60″", errors=parts_drawn())
+    prepared = replace(prepare_assembly(asked), name="Parts drawn within ±60″", errors=parts_drawn())
     results = assemble(prepared, Silent())
     document = assembly_document(results)
     plan = results.plan
