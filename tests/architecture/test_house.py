@@ -24,6 +24,7 @@ DOORS = {
     "openpyxl": "report",
     "numba": ("compiled.py", "equivalent", "study"),
     "ezdxf": "report",
+    "exudyn": "multibody",
     "typer": "cli",
     "rich": "cli",
 }

@@ -110,7 +110,7 @@ def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
     return columns_of(reducer, bilateral_groups(Positions(reducer, np.zeros(1), orders)), orders)
 
 
-def _rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
+def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
     """Return the lever by which each coordinate is divided so that all are lengths [m or 1]."""
     scale = np.ones(coordinates.count)
     for crank in range(reducer.crank_count):
@@ -121,7 +121,7 @@ def _rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndar
     return scale
 
 
-def _kept(reducer: Reducer, coordinates: Coordinates, groups: list[SpringGroup]) -> Int[np.ndarray, " kept"]:
+def kept_coordinates(reducer: Reducer, coordinates: Coordinates, groups: list[SpringGroup]) -> Int[np.ndarray, " kept"]:
     """Return the coordinates that pins or elements with play touch, the discs' first."""
     disc = np.arange(coordinates.disc(0), coordinates.disc(reducer.disc_count))
     touched = [np.any(group.displacement != 0.0, axis=(0, 1)) for group in groups if group.contact == "play"]
@@ -168,7 +168,7 @@ def _contact_by_error(contact: PinContact, orders: tuple[int, ...]) -> Float[np.
 def _condense_some(at: Positions) -> CondensedAngles:
     """Return the condensed model at a few angles; memory grows with their number."""
     reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
-    scale, groups, contact = _rotation_scale(reducer, coordinates), bilateral_groups(at), pin_contact(at)
+    scale, groups, contact = rotation_scale(reducer, coordinates), bilateral_groups(at), pin_contact(at)
     size, loads = coordinates.count, sum(len(group.columns) for group in groups) + 1
     rows, errors, stiffnesses, first = [], [], [], 0
     for group in groups:
@@ -184,7 +184,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
     stiffness, load = weighted @ row, -(weighted @ error)
     rotation = coordinates.carrier + 2
     load[:, rotation, -1] = scale[rotation]
-    kept = _kept(reducer, coordinates, groups)
+    kept = kept_coordinates(reducer, coordinates, groups)
     rest = np.setdiff1d(np.arange(size), kept)
     # Displacement of all coordinates per kept coordinate and per load, the kept ones fixed.
     by_kept, by_load = np.zeros((angles, size, kept.size)), np.zeros((angles, size, loads))

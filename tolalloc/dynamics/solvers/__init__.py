@@ -1,0 +1,1 @@
+"""Compiled time steps of many samples."""
