@@ -126,9 +126,17 @@ def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "study", ["xi2015_contact", "song2019_modification", "li2018_modification", "published_benchmarks"]
+    "study",
+    [
+        "xi2015_contact",
+        "song2019_modification",
+        "li2018_modification",
+        "published_benchmarks",
+        "zhang2025_assembly",
+        "xi2015_virtual_prototype",
+    ],
 )
-def test_studies_of_the_cycloid_stage(study, tmp_path):
+def test_studies_that_make_one_report(study, tmp_path):
     script, folder = ROOT / "studies" / f"{study}.py", tmp_path / "run"
     command = [sys.executable, str(script), "--quick", "--out", str(folder)]
     result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)

@@ -28,6 +28,7 @@ from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.rank import rank
+from tolalloc.cli.simulate import simulate
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
 from tolalloc.exceptions import TolallocError
@@ -243,6 +244,7 @@ app.command()(identify)
 app.command()(diagnose)
 app.command()(assemble)
 app.command()(mount)
+app.command()(simulate)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,13 @@ from tolalloc.dynamics.motion import Motion
 from tolalloc.dynamics.solvers.stepping import Parts, Record, Scheme, State, advance
 from tolalloc.dynamics.tables import Steps
 from tolalloc.equivalent.model import EquivalentModel
+
+Progress = Callable[[float], None]
+"""Told how much of the time is simulated, from 0 to 1."""
+
+
+def _untold(share: float) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +112,7 @@ def simulate(
     damping: Damping,
     integrator: Integrator,
     observe: Int[np.ndarray, " observed"] | None = None,
+    progress: Progress = _untold,
 ) -> Simulated:
     """Return what every sample does over time.
 
@@ -121,6 +130,8 @@ def simulate(
         `tolalloc.dynamics.integrator.newmark` or `tolalloc.dynamics.integrator.generalised_alpha`.
     observe
         Numbers of the steps at which the whole state is given, each once; none unless given [-].
+    progress
+        Told the share of the time that is simulated [-].
 
     Raises
     ------
@@ -144,6 +155,7 @@ def simulate(
     scheme = Scheme(integrator.alpha_m, integrator.alpha_f, integrator.beta, integrator.gamma, motion.step)
     for first, angles, tables in steps.parts():
         advance(first, angles, tables, parts, scheme, columns.layout, columns.map, model.design, given, state, record)
+        progress((first + len(angles.stiffness)) / motion.time.size)
     return Simulated(
         time=motion.time,
         carrier_angle=motion.carrier_angle,

@@ -1,0 +1,132 @@
+"""The command ``tolalloc simulate``."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib.util import find_spec
+
+import numpy as np
+import pandas as pd
+import pytest
+from command import refused, tolalloc
+
+from tolalloc.exceptions import TolallocError
+from tolalloc.study.simulation_definition import SimulationStudy, prepare_simulation
+
+# Ten times the speed of xi2015: a crank turn takes 24 ms. One pin pass takes 0.6 ms.
+SHORT = ("--speed", "5250", "--ramp", "0.02", "--duration", "0.06", "--step", "1e-5")
+INSTALLED = pytest.mark.skipif(find_spec("exudyn") is None, reason="the optional extra is not installed")
+
+
+def test_a_run_is_reported_with_its_series(tmp_path):
+    folder = tmp_path / "report"
+    said = tolalloc("simulate", *SHORT, "--torque", "572", "--out", folder)
+    assert said.returncode == 0, said.stderr
+    words = " ".join(said.stdout.split())
+    assert "ratio of 81.0000" in words
+    assert "64.8" in words  # rpm
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["crank turns of the steady part [-]"] == 1
+    series = pd.read_csv(folder / "series.csv")
+    assert len(series) == 6001
+    last = series.iloc[-1]
+    assert last["input speed [rpm]"] == pytest.approx(5250)
+    assert last["output torque [N·m]"] == pytest.approx(-572)
+    assert last["carrier angle [deg]"] == pytest.approx(5250 * 6 / 81 * 0.05)  # half of the ramp is lost
+    steady = series[series["time [s]"] > 0.06 - 81 / 87.5 / 39 + 1e-9]
+    moving = summary["in motion"]
+    assert steady["output speed [rpm]"].mean() == pytest.approx(moving["output speed [rpm]"], rel=1e-6)
+    counts = moving["pins in contact, disc 1 [-]"].split("…")
+    found = steady["pins in contact, disc 1 [-]"]
+    assert [int(counts[0]), int(counts[-1])] == [found.min(), found.max()]
+    power = (steady["input torque [N·m]"] * steady["input speed [rpm]"]).mean() * 2 * np.pi / 60
+    assert power == pytest.approx(summary["input power [W]"], rel=1e-5)
+    assert {path.stem for path in (folder / "figures").iterdir()} == {
+        "transmission_error",
+        "input_speed",
+        "output_speed",
+        "input_acceleration",
+        "output_acceleration",
+        "contacts",
+    }
+
+
+def test_the_compliance_decides_how_many_pins_carry():
+    options = ("--pin-stiffness", "3.67e7", "--json")
+    answer = json.loads(tolalloc("simulate", *SHORT, *options).stdout)
+    assert answer["at rest"]["pins in contact, disc 1 [-]"] == "16…17"
+    assert answer["load on the carrier [N·m]"] == 572
+    assert answer["lowest natural frequency [Hz]"] > 0
+
+
+@INSTALLED
+def test_the_prototype_turns_with_the_same_ratio():
+    answer = json.loads(tolalloc("simulate", *SHORT, "--engine", "exudyn", "--json").stdout)
+    assert answer["in motion"]["ratio [-]"] == pytest.approx(81, rel=1e-5)
+    assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
+        answer["at rest"]["mean transmission error [arcsec]"], abs=1.5
+    )
+
+
+UNIT = """
+name = "bored"
+source = "own"
+neglected = ["*"]
+
+[lengths] # µm
+"modification.equidistant" = 10
+"modification.shift" = -10
+
+[vectors] # magnitude in µm, direction in degrees
+"carrier.bore1.position" = [4.0, 90]
+"""
+
+
+@INSTALLED
+def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
+    path = tmp_path / "bored.toml"
+    path.write_text(UNIT, encoding="utf-8")
+    run = ("simulate", *SHORT, "--unit", path, "--engine", "exudyn", "--json")
+    answer = json.loads(tolalloc(*run).stdout)
+    assert answer["at rest"]["mean transmission error [arcsec]"] < -40  # the wider gap
+    assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
+        answer["at rest"]["mean transmission error [arcsec]"], rel=0.05
+    )
+    refused(tolalloc("simulate", "--unit", "table4", "--engine", "exudyn"), "error column", "pitch")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--engine", "newmrk"), ("engine 'newmrk' is not known", "newmark")),
+        (("--duration", "1.6"), ("--duration is 1.6; allowed is 1.737 s or more",)),
+        (("--torque", "0"), ("--torque is 0.0; allowed is above 0 to 5720 N·m",)),
+    ],
+)
+def test_a_wrong_option_is_refused(options, words):
+    refused(tolalloc("simulate", *options), *words)
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ({"speed_rpm": 0.0}, "--speed is 0.0; allowed is a number above 0"),
+        ({"duration": -1.0}, "--duration is -1.0"),
+        ({"step": 3.0}, "--step is 3.0; allowed is 1e-05 s to the duration of 2 s"),
+        ({"step": 1e-7}, "--step is 1e-07"),
+        ({"torque_nm": 6000.0}, "--torque is 6000.0"),
+        ({"damping": -1.0}, "--damping is -1.0; allowed is 0 or a positive number"),
+        ({"pin_stiffness": float("nan")}, "--pin-stiffness is nan"),
+        ({"reducer": "rv41e"}, "'rv41e' is not known"),
+        ({"unit": "tabel4"}, "'tabel4' is not known; the nearest known are table4"),
+    ],
+)
+def test_a_number_or_name_out_of_range_is_refused(option, words):
+    with pytest.raises(TolallocError, match=re.escape(words)):
+        prepare_simulation(SimulationStudy(**option))
+
+
+def test_a_missing_engine_is_said_in_one_sentence(tmp_path):
+    (tmp_path / "exudyn.py").write_text("raise ImportError\n", encoding="utf-8")
+    refused(tolalloc("simulate", "--engine", "exudyn", PYTHONPATH=str(tmp_path)), "pip install tolalloc[multibody]")

@@ -1,0 +1,139 @@
+"""Sentences, tables and figures of the report on a simulated reducer: made-up series with known numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tolalloc.reducer.files import load_reducer
+from tolalloc.report.simulation.document import simulation_document
+from tolalloc.report.simulation.figures import error_figure, line
+from tolalloc.report.simulation.results import RPM, AtRest, SimulationResults, TimeSeries
+from tolalloc.report.simulation.sentences import answer, warnings
+from tolalloc.report.simulation.tables import range_text, series_table, steady_table
+from tolalloc.units import ARCSECOND
+
+RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
+TIMES = 5001
+PASS = 525 / 60 / RATIO * 39 * 40
+
+
+def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: float = 0.0) -> SimulationResults:
+    """Steady throughout; the transmission error is a pin pass of 0.2″ with a little added by motion."""
+    time = STEP * np.arange(TIMES)
+    wave, ones = 0.1 * np.sin(2 * np.pi * PASS * time) * ARCSECOND, np.ones(TIMES)
+    alternating = wobble * (-1.0) ** np.arange(TIMES) * ARCSECOND
+    pins = np.zeros((TIMES, 2, 40))
+    pins[:, 0, :4], pins[:, 1, :5] = 900.0, 1000.0
+    pins[::7, 0, 4] = 10.0
+    at_rest = pins[2501:].copy()
+    pins[4000, 1, 0] += spike
+    series = TimeSeries(
+        time=time,
+        carrier_angle=SPEED / RATIO * time,
+        input_speed=SPEED * ones,
+        input_acceleration=0 * ones,
+        output_speed=SPEED / RATIO * ones,
+        output_acceleration=np.cos(2 * np.pi * PASS * time),
+        transmission_error=wave + added * ARCSECOND + alternating,
+        input_torque=LOAD / RATIO / (1 - lost) * ones,
+        output_torque=-LOAD * ones,
+        pin_forces=pins,
+    )
+    return SimulationResults(
+        reducer=load_reducer("rv40e"),
+        engine="newmark",
+        unit="exact",
+        speed=SPEED,
+        load=LOAD,
+        series=series,
+        steady=slice(2501, TIMES),
+        crank_turns=1,
+        at_rest=AtRest(steps=np.arange(2501, TIMES), transmission_error=wave[2501:], pin_forces=at_rest, seconds=0.1),
+        natural_frequency=4500.0,
+        seconds=1.0,
+        assumptions=("steel",),
+    )
+
+
+def test_numbers_of_the_steady_part():
+    found = results(lost=0.02, added=0.05, spike=25.0)
+    assert found.ratio == pytest.approx(RATIO)
+    assert found.output_speed / RPM == pytest.approx(525 / 81)
+    assert found.output_power / found.input_power == pytest.approx(0.98)
+    assert found.output_power == pytest.approx(LOAD * SPEED / RATIO)
+    assert found.peak_to_peak == pytest.approx([0.2 * ARCSECOND, 0.2 * ARCSECOND], rel=1e-3)
+    assert np.abs(found.difference).max() == pytest.approx(0.05 * ARCSECOND)
+    assert found.largest_force == (1025.0, 1000.0)
+    assert found.contacts == ((4, 5), (5, 5)) == found.contacts_at_rest
+    assert found.pin_pass == pytest.approx(168.5, abs=0.02)
+
+
+def test_the_answer_says_what_is_found_and_why():
+    said = " ".join(answer(results(lost=0.02, added=0.05, spike=25.0)))
+    for words in (
+        "6.4815 rpm, a ratio of 81.0000",
+        "98.000 % leave",
+        "disc 1: 4…5; disc 2: 5.",
+        "1025.0 N, in the static model 1000.0 N",
+        "differ by 0.05″ rms and 0.05″ at most",
+        "4500 Hz, 26.7 times that: far below any resonance",
+        "inertia and damping alone",
+    ):
+        assert words in said
+    near = " ".join(answer(replace(results(), natural_frequency=200.0)))
+    assert "near a resonance" in near
+    assert "of constant stiffness" in " ".join(answer(replace(results(), natural_frequency=None)))
+    assert "not motion alone" in " ".join(answer(replace(results(), engine="exudyn")))
+
+
+def test_vibrations_of_the_step_are_not_taken_for_the_reducers():
+    assert warnings(results()) == ()
+    assert "Do not use the transmission error" in warnings(results(wobble=0.02))[0]
+    calm = results()
+    turning = replace(calm.series, output_acceleration=(-1.0) ** np.arange(TIMES))
+    assert "Do not use the output acceleration" in warnings(replace(calm, series=turning))[0]
+
+
+def test_a_short_stretch_is_said_for_a_unit_with_errors():
+    found = warnings(replace(results(), unit="table4"))
+    assert len(found) == 1
+    assert "9.3 s" in found[0]
+
+
+def test_tables_have_every_step_and_both_sides():
+    found = results()
+    series = series_table(found)
+    assert len(series) == TIMES
+    assert all("[" in name for name in series)
+    assert series["transmission error [arcsec]"].abs().max() == pytest.approx(0.1, rel=1e-3)
+    steady = steady_table(found).set_index("quantity")
+    assert steady.loc["largest pin force [N]"].tolist() == [1000.0, 1000.0]
+    assert steady.loc["ratio [-]", "at rest"] == ""
+    assert (range_text(4, 4), range_text(4, 5)) == ("4", "4…5")
+
+
+def test_a_thinned_line_keeps_every_peak():
+    x, y = np.arange(50_000.0), np.zeros(50_000)
+    y[31_234] = 1.0
+    thin = line("peak", x, y)
+    assert len(thin.x) <= 2000
+    assert max(thin.y) == 1.0
+    assert thin.x[int(np.argmax(thin.y))] == 31_234.0
+
+
+def test_figures_show_as_many_pin_passes_as_asked():
+    figure = error_figure({"newmark": results()}, passes=3)
+    assert [series.label for series in figure.series] == ["newmark", "at rest"]
+    span = figure.series[0].x[-1] - figure.series[0].x[0]
+    assert span == pytest.approx(3 * 360 / 39 / 40, rel=0.02)
+
+
+def test_the_document_names_its_load_and_engine():
+    document = simulation_document(results())
+    assert "525 rpm" in document.subtitle
+    assert "572 N·m" in document.subtitle
+    assert document.summary["in motion"]["engine"] == "newmark"
+    assert [figure.name for figure in document.sections[1].figures][-1] == "contacts"

@@ -1,0 +1,77 @@
+"""The command ``tolalloc simulate``: a reducer through a speed and a torque profile."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+
+
+def simulate(
+    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv40e",
+    unit: Annotated[str, typer.Option(help="Shipped unit (exact, table4 of an RV-20E) or TOML file.")] = "exact",
+    speed: Annotated[float, typer.Option(help="Input speed that is reached [rpm].")] = 525.0,
+    torque: Annotated[
+        float | None, typer.Option(help="Load against the carrier's rotation [N·m]; the rated one unless given.")
+    ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(help="generalised-alpha or newmark (equivalent model), exudyn (exact profile, optional extra)."),
+    ] = "generalised-alpha",
+    duration: Annotated[float, typer.Option(help="Simulated time [s].")] = 2.0,
+    ramp: Annotated[
+        float, typer.Option(help="Time in which the speed rises [s]; the load rises in half of it afterwards.")
+    ] = 1.0,
+    step: Annotated[float, typer.Option(help="Time step [s].")] = 5e-5,
+    output_inertia: Annotated[
+        float, typer.Option(help="Moment of inertia that the carrier turns besides its own [kg·m²].")
+    ] = 0.0,
+    damping: Annotated[float, typer.Option(help="Damping over stiffness of meshes and bearings [s].")] = 1e-5,
+    mass_damping: Annotated[
+        float, typer.Option(help="Damping over mass of all parts; exudyn: of the carrier's rotation [1/s].")
+    ] = 500.0,
+    pin_stiffness: Annotated[
+        float | None, typer.Option(help="One stiffness for every pin contact [N/m]; the reducer's law unless given.")
+    ] = None,
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
+    # The report's libraries take half a second to import; a misspelt option need not wait for them.
+    from tolalloc.cli.document_script import written
+    from tolalloc.report.simulation.document import simulation_document
+    from tolalloc.report.simulation.tables import series_table, steady_table
+    from tolalloc.study.run_folder import require_usable
+    from tolalloc.study.simulation import simulate as simulated
+    from tolalloc.study.simulation_definition import SimulationStudy, prepare_simulation
+
+    asked = SimulationStudy(
+        reducer=reducer,
+        unit=unit,
+        speed_rpm=speed,
+        torque_nm=torque,
+        engine=engine,
+        duration=duration,
+        ramp=ramp,
+        step=step,
+        output_inertia=output_inertia,
+        damping=damping,
+        mass_damping=mass_damping,
+        pin_stiffness=pin_stiffness,
+    )
+    prepared = prepare_simulation(asked)
+    if out:
+        require_usable(out)
+    announce_compilation()
+    with UnitProgress("ms") as progress:
+        results = simulated(prepared, progress)
+    document = simulation_document(results)
+    if out:
+        written(out, lambda: document, lambda folder: series_table(results).to_csv(folder / "series.csv", index=False))
+    if as_json:
+        print_json(document.summary)
+        return
+    print_table(steady_table(results), f"{results.reducer.name}: steady part")
+    say(document)
