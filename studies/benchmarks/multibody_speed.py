@@ -39,7 +39,7 @@ from tolalloc.study.simulation_definition import (
 from tolalloc.units import ARCSECOND
 
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"
-STEPS = (8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5)
+STEPS = (3.2e-3, 1.6e-3, 8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5)
 FINEST = 3.125e-6
 ACCURACY = 0.02  # arcsec, rms
 ALLOWED_DIFFERENCE = 0.5  # arcsec between the means: the linear gap against exact teeth
@@ -82,7 +82,7 @@ def answer(units: int, rounds: int) -> dict[str, Any]:
     use_threads(1)
     steps = {engine: coarsest(engine) for engine in (MODEL, PROTOTYPE)}
     own, other = prepared(MODEL, steps[MODEL][0]), prepared(PROTOTYPE, steps[PROTOTYPE][0])
-    damping = Damping(mass_proportional=own.asked.mass_damping, stiffness_proportional=own.asked.damping)
+    damping = Damping(mass_proportional=own.mass_damping, stiffness_proportional=own.asked.damping)
     given = (own.motion, own.inertia, damping, INTEGRATORS[MODEL])
     batch = np.repeat(own.errors, units, axis=0)
     seconds: dict[str, list[float]] = {"one": [], "batch": [], "prototype": []}

@@ -114,6 +114,7 @@ def test_a_wrong_option_is_refused(options, words):
         ({"speed_rpm": 0.0}, "--speed is 0.0; allowed is a number above 0"),
         ({"duration": -1.0}, "--duration is -1.0"),
         ({"step": 3.0}, "--step is 3.0; allowed is 1e-05 s to the duration of 2 s"),
+        ({"step": 0.45}, "--step is 0.45; allowed is up to 0.00148 s, 4 steps per pin pass"),
         ({"step": 1e-7}, "--step is 1e-07"),
         ({"torque_nm": 6000.0}, "--torque is 6000.0"),
         ({"damping": -1.0}, "--damping is -1.0; allowed is 0 or a positive number"),

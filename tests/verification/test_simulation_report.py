@@ -76,15 +76,16 @@ def test_the_answer_says_what_is_found_and_why():
     for words in (
         "6.4815 rpm, a ratio of 81.0000",
         "98.000 % leave",
-        "disc 1: 4…5; disc 2: 5.",
+        "disc 1: 4…5; disc 2: 5, a matter of how stiff a pin contact is: 2.12e+09 N/m by the constant law",
         "1025.0 N, in the static model 1000.0 N",
         "differ by 0.05″ rms and 0.05″ at most",
-        "4500 Hz, 26.7 times that: far below any resonance",
-        "inertia and damping alone",
+        "4500 Hz, away from the orders that errors and pins excite",
+        "motion alone",
+        "In the last 1 whole crank turn, from",
     ):
         assert words in said
-    near = " ".join(answer(replace(results(), natural_frequency=200.0)))
-    assert "near a resonance" in near
+    for frequency, what in ((200.0, "near 1 times the pin pass"), (8.0, "near order 78 and order 80")):
+        assert what in " ".join(answer(replace(results(), natural_frequency=frequency)))
     assert "of constant stiffness" in " ".join(answer(replace(results(), natural_frequency=None)))
     assert "not motion alone" in " ".join(answer(replace(results(), engine="exudyn")))
 
@@ -95,6 +96,18 @@ def test_vibrations_of_the_step_are_not_taken_for_the_reducers():
     calm = results()
     turning = replace(calm.series, output_acceleration=(-1.0) ** np.arange(TIMES))
     assert "Do not use the output acceleration" in warnings(replace(calm, series=turning))[0]
+
+
+@pytest.mark.parametrize("lost", [0.01, -0.01])
+def test_power_that_does_not_close_is_said(lost):
+    assert "are not steady" in warnings(results(lost=lost))[0]
+
+
+def test_a_deviation_that_decays_is_said():
+    calm = results()
+    decaying = 5 * ARCSECOND * np.exp(-np.arange(TIMES) / 1000) * np.cos(0.02 * np.arange(TIMES))
+    series = replace(calm.series, transmission_error=calm.series.transmission_error + decaying)
+    assert any("are not steady" in warning for warning in warnings(replace(calm, series=series)))
 
 
 def test_a_short_stretch_is_said_for_a_unit_with_errors():

@@ -30,8 +30,12 @@ def simulate(
     ] = 0.0,
     damping: Annotated[float, typer.Option(help="Damping over stiffness of meshes and bearings [s].")] = 1e-5,
     mass_damping: Annotated[
-        float, typer.Option(help="Damping over mass of all parts; exudyn: of the carrier's rotation [1/s].")
-    ] = 500.0,
+        float | None,
+        typer.Option(
+            help="Damping over mass of all parts; exudyn: of the carrier's rotation [1/s]. Unless given, 500 without "
+            "--output-inertia and less with it, so that the load is hardly damped."
+        ),
+    ] = None,
     pin_stiffness: Annotated[
         float | None, typer.Option(help="One stiffness for every pin contact [N/m]; the reducer's law unless given.")
     ] = None,

@@ -21,7 +21,7 @@ from tolalloc.multibody.masses import Masses
 from tolalloc.multibody.simulation import TimeSteps, simulate_prototype
 from tolalloc.multibody.time_course import TimeCourse
 from tolalloc.report.simulation.results import AtRest, SimulationResults, TimeSeries
-from tolalloc.study.simulation_definition import INTEGRATORS, SPECTRAL_RADIUS, PreparedSimulation
+from tolalloc.study.simulation_definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
 from tolalloc.study.stages import Progress
 
 MOST_ANGLES = 5000
@@ -88,7 +88,7 @@ def _milliseconds(duration: float, progress: Progress) -> Callable[[float], None
 def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
     """Simulate the equivalent model."""
     asked, every = prepared.asked, np.arange(motion.time.size)
-    damping = Damping(mass_proportional=asked.mass_damping, stiffness_proportional=asked.damping)
+    damping = Damping(mass_proportional=prepared.mass_damping, stiffness_proportional=asked.damping)
     found = simulate_model(
         prepared.model, prepared.errors, motion, prepared.inertia, damping, INTEGRATORS[asked.engine], every, tell
     )
@@ -124,8 +124,8 @@ def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[flo
             speed=TimeCourse.step(prepared.speed, 0.0, asked.ramp),
             torque=TimeCourse.step(-prepared.load, asked.ramp, prepared.loaded),
         ),
-        TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=SPECTRAL_RADIUS),
-        PrototypeDamping(bearings=asked.damping, output=asked.mass_damping * inertia.carrier_moment),
+        TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=PROTOTYPE_RADIUS),
+        PrototypeDamping(bearings=asked.damping, output=prepared.mass_damping * inertia.carrier_moment),
         prepared.prototype_errors,
         tell,
     )
@@ -191,7 +191,9 @@ def _natural_frequency(prepared: PreparedSimulation, motion: Motion, steady: sli
 def _assumptions(prepared: PreparedSimulation) -> tuple[str, ...]:
     """Return what no source prints."""
     asked = prepared.asked
-    damped = "the carrier's rotation alone" if asked.engine == "exudyn" else "every part"
+    prototype = asked.engine == "exudyn"
+    damped = "the carrier's rotation alone" if prototype else "every part"
+    stiffened = "bearings" if prototype else "meshes and bearings"
     return (
         *prepared.reducer.assumptions,
         *prepared.unit.assumptions,
@@ -202,7 +204,7 @@ def _assumptions(prepared: PreparedSimulation) -> tuple[str, ...]:
         ),
         *ASSUMPTIONS,
         f"the carrier turns {asked.output_inertia:g} kg·m² besides its own",
-        f"damping: {asked.damping:g} s times the stiffness of meshes and bearings and {asked.mass_damping:g} 1/s times "
+        f"damping: {asked.damping:g} s times the stiffness of {stiffened} and {prepared.mass_damping:.3g} 1/s times "
         f"the mass of {damped}, on the deviation from the nominal motion; none in pin contacts",
         "speed and load rise by the cubic 3s² − 2s³, the load in half the time of the speed and after it",
         "no friction, no lubricant film",

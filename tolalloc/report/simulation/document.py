@@ -44,7 +44,7 @@ def simulation_document(results: SimulationResults) -> Document:
         warnings=warnings(results),
         sections=(
             Section(
-                heading="Steady part",
+                heading="The last whole crank turns",
                 paragraphs=("At rest is the static model at the same carrier angles and torque.",),
                 figures=(error_figure({results.engine: results}, passes=20),),
                 tables=(("steady", steady_table(results)),),

@@ -12,6 +12,14 @@ COARSE = 20
 """Time steps per pin pass below which a wave is not drawn well [-]."""
 ALTERNATING = 0.05
 """Amplitude from step to step over the static peak-to-peak, above which it is not the reducer's [-]."""
+UNCLOSED = 1e-3
+"""Power that leaves over power that enters, less one, above which the run has not settled or the engine errs [-]."""
+UNSETTLED = 0.1
+"""Change of the deviation from the static model between both halves, over the larger, above which it decays [-]."""
+READ = 0.02 * ARCSECOND
+"""Deviation that is too small to matter [rad]."""
+NEAR = 1.25
+"""Ratio of an excitation to the lowest natural frequency, up or down, that counts as near [-]."""
 TURNING_BACK = -0.45
 """Correlation of successive changes below which a quantity turns back at every step; −0.5 has noise [-]."""
 
@@ -23,16 +31,26 @@ def answer(results: SimulationResults) -> tuple[str, ...]:
     difference = results.difference / ARCSECOND
     counts = "; ".join(f"disc {disc + 1}: {range_text(*both)}" for disc, both in enumerate(results.contacts))
     begins = results.series.time[results.steady.start - 1]
+    turns = f"{results.crank_turns} whole crank turn{'s' if results.crank_turns > 1 else ''}"
     return (
-        f"In the steady part from {begins:.3f} s on, {results.crank_turns} whole crank turns, the output turns at "
-        f"{results.output_speed / RPM:.4f} rpm, a ratio of {results.ratio:.4f}; of {results.input_power:.1f} W that "
-        f"enter, {100 * results.output_power / results.input_power:.3f} % leave at the output.",
-        f"Pins in contact: {counts}. The largest pin force is {moving:.1f} N, in the static model {resting:.1f} N.",
+        f"In the last {turns}, from {begins:.3f} s on, the output turns at {results.output_speed / RPM:.4f} rpm, "
+        f"a ratio of {results.ratio:.4f}; of {results.input_power:.1f} W that enter, "
+        f"{100 * results.output_power / results.input_power:.3f} % leave at the output.",
+        f"Pins in contact: {counts}, a matter of how stiff a pin contact is: {_contact(results)}. "
+        f"The largest pin force is {moving:.1f} N, in the static model {resting:.1f} N.",
         f"The transmission error spans {spans:.3g}″ over {results.span / DEGREE:.1f}° of the carrier, in the static "
         f"model at the same angles and torque {spans_at_rest:.3g}″; the two differ by {_rms(difference):.2g}″ rms and "
         f"{np.abs(difference).max():.2g}″ at most.",
         _cause(results),
     )
+
+
+def _contact(results: SimulationResults) -> str:
+    """Return what the pin contacts are."""
+    stiffness = results.reducer.stiffness
+    if stiffness.pin_contact_law == "logarithmic":
+        return f"steel line contact over {results.reducer.cycloid_stage.face_width * 1e3:g} mm"
+    return f"{stiffness.pin_contact:.3g} N/m by the {stiffness.pin_contact_law} law"
 
 
 def _rms(values: np.ndarray) -> float:
@@ -45,20 +63,34 @@ def _cause(results: SimulationResults) -> str:
     if results.natural_frequency is None:
         nearest = f"{excited}; natural frequencies are given for pin contacts of constant stiffness without play only"
     else:
-        apart = results.natural_frequency / results.pin_pass
-        verdict = (
-            "far below any resonance" if apart > 3 else "near a resonance" if apart > 1 / 3 else "above the lowest one"
-        )
-        nearest = (
-            f"{excited}, the lowest natural frequency is {results.natural_frequency:.0f} Hz, {apart:.3g} times that: "
-            f"{verdict}"
-        )
+        near = [
+            name for name, often in _excitations(results).items() if 1 / NEAR < often / results.natural_frequency < NEAR
+        ]
+        verdict = f"near {' and '.join(near)}" if near else "away from the orders that errors and pins excite"
+        nearest = f"{excited}, the lowest natural frequency is {results.natural_frequency:.0f} Hz, {verdict}"
     if results.engine == "exudyn":
         return (
-            f"{nearest}. The prototype has the exact tooth profile and the static model the linear gap, so what they "
+            f"{nearest}. The prototype has the exact tooth profile and an ideal first stage, which does not feel "
+            "planets that yield on their bearings; the static model has the linear gap and feels them. So what they "
             "differ by is not motion alone."
         )
-    return f"{nearest}. Both have the same gaps and springs, so what they differ by is inertia and damping alone."
+    return f"{nearest}. Both have the same gaps and springs, so what they differ by is motion alone."
+
+
+def _excitations(results: SimulationResults) -> dict[str, float]:
+    """Return how often per second the strong orders of the output turn come by [Hz]."""
+    stage, turn = results.reducer.cycloid_stage, results.speed / (2 * np.pi) / results.reducer.ratio
+    orders = {1, stage.disc_teeth, stage.pin_count, 2 * stage.disc_teeth, 2 * stage.pin_count}
+    found = {f"order {order}": order * turn for order in sorted(orders)}
+    return found | {f"{times} times the pin pass": times * results.pin_pass for times in (1, 2, 3)}
+
+
+def unsettled(results: SimulationResults) -> bool:
+    """Return whether what motion adds still decays, or power does not close."""
+    first, second = np.array_split(results.difference, 2)
+    one, other = (np.ptp(half) for half in (first, second))
+    decays = abs(one - other) > max(UNSETTLED * max(one, other), READ)
+    return bool(decays) or abs(results.output_power / results.input_power - 1) > UNCLOSED
 
 
 def ringing(results: SimulationResults) -> str:
@@ -78,12 +110,18 @@ def warnings(results: SimulationResults) -> tuple[str, ...]:
             f"Do not use {what}: it vibrates with only a few steps of {step} per wave, which the integrator makes; "
             "take a shorter --step or more damping."
         )
+    if unsettled(results):
+        found.append(
+            "The last crank turns are not steady: the deviation from the static model changes between their halves, or "
+            "power does not close. Ratio, power, forces and spans are those of a transient; take a longer --duration, "
+            "a shorter --step, or more damping."
+        )
     if (passes := 1 / (results.pin_pass * results.step)) < COARSE:
         found.append(f"A step of {step} is {1 / passes:.2g} of a pin pass; waves of the pin contacts are cut off.")
     if results.span < 2 * np.pi and results.unit != "exact":
         turn = 2 * np.pi / results.output_speed
         found.append(
             f"The steady part spans {results.span / DEGREE:.1f}° of the carrier; a peak-to-peak with errors "
-            f"needs the whole output turn, which takes {turn:.1f} s."
+            f"needs the whole output turn, which takes {turn:.1f} s; ratio, speed and power beyond three digits do too."
         )
     return tuple(found)
