@@ -134,6 +134,7 @@ def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
         "published_benchmarks",
         "zhang2025_assembly",
         "xi2015_virtual_prototype",
+        "rv20e_speeds",
     ],
 )
 def test_studies_that_make_one_report(study, tmp_path):
