@@ -20,13 +20,12 @@ from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.uncertainty.unit_file import load_unit
-from tolalloc.units import ARCSECOND
+from tolalloc.units import ARCSECOND, RPM
 
 TORQUE = -167.0
 LOADS = (0.0, 1.0, 100.0)
 """Moments of inertia that the carrier turns besides its own [kg·m²]."""
 ORDERS = (1, 2, 39, 40, 78, 79, 80)
-RPM = 2 * np.pi / 60
 FASTEST = 60.0 * RPM
 """Largest speed of the output [rad/s]."""
 DAMPING = Damping(mass_proportional=20.0, stiffness_proportional=2e-6)

@@ -19,12 +19,12 @@ from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
 from tolalloc.report.simulation.figures import error_figure, run_figures
-from tolalloc.report.simulation.results import RPM, SimulationResults
+from tolalloc.report.simulation.results import SimulationResults
 from tolalloc.report.simulation.sentences import warnings
 from tolalloc.report.simulation.tables import range_text, rest_row, steady_row
 from tolalloc.study.simulation import simulate
 from tolalloc.study.simulation_definition import SimulationStudy, prepare_simulation, with_ideal_gears
-from tolalloc.units import ARCSECOND
+from tolalloc.units import ARCSECOND, RPM
 
 IMPLIED = 3.67e7
 """Stiffness of every pin contact at which 16 to 17 carry, as xi2015's printed angles imply [N/m]."""

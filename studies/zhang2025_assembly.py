@@ -18,6 +18,7 @@ from zhang2025_sections import (
     priced_section,
 )
 
+from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
 from tolalloc.report.assembly.document import assembly_document
 from tolalloc.report.document import Document
@@ -26,16 +27,6 @@ from tolalloc.units import ARCSECOND
 
 SEED = 20250711
 """Seed of the parts that stand for zhang2025's Table 3, which is lost."""
-
-
-class Silent:
-    """Tells nobody how far the work has come."""
-
-    def begin(self, stage: str) -> None:
-        """Begin a stage."""
-
-    def advance(self, units: int) -> None:
-        """Count units."""
 
 
 def parts_drawn() -> np.ndarray:
@@ -47,7 +38,8 @@ def build(quick: bool) -> Document:
     """Return the report."""
     asked = AssemblyStudy(chain="bx40e", assemblies=10_000 if quick else 100_000, seed=1)
     prepared = replace(prepare_assembly(asked), name="Parts drawn within ±60″", errors=parts_drawn())
-    results = assemble(prepared, Silent())
+    with UnitProgress("assemblies") as progress:
+        results = assemble(prepared, progress)
     document = assembly_document(results)
     plan = results.plan
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)

@@ -16,6 +16,7 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
 from tolalloc.equivalent.angle_search import AngleSearch
 from tolalloc.equivalent.contact_pattern import contact_pattern
 from tolalloc.equivalent.model import EquivalentModel
@@ -28,7 +29,6 @@ from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.response.kernel import KernelResponse
 from tolalloc.response.orientations import OrientationResponse
-from tolalloc.study.assembly_transmission import LARGEST_FAILED_SHARE
 from tolalloc.study.definition import Study, prepare
 from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MICROMETRE

@@ -10,10 +10,10 @@ import pytest
 from tolalloc.reducer.files import load_reducer
 from tolalloc.report.simulation.document import simulation_document
 from tolalloc.report.simulation.figures import error_figure, line
-from tolalloc.report.simulation.results import RPM, AtRest, SimulationResults, TimeSeries
+from tolalloc.report.simulation.results import AtRest, SimulationResults, TimeSeries
 from tolalloc.report.simulation.sentences import answer, warnings
 from tolalloc.report.simulation.tables import range_text, series_table, steady_table
-from tolalloc.units import ARCSECOND
+from tolalloc.units import ARCSECOND, RPM
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
 TIMES = 5001

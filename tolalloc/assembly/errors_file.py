@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.assembly.chain_records import LARGEST
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.uncertainty.table_file import TextTable, read_text_table, split_header
 from tolalloc.units import ARCSECOND
 
 HEADERS = ("part", "x [arcsec]", "y [arcsec]", "z [arcsec]")
-LARGEST = 3600.0
-"""Largest error that is believed [arcsec]."""
 IN_DEGREES = 0.05
 """Where no error reaches this, they were written in degrees [arcsec]."""
 

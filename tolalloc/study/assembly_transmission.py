@@ -9,6 +9,7 @@ from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen, random_numbers
+from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
 from tolalloc.equivalent.contact_pattern import contact_pattern
 from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import SolveError
@@ -17,9 +18,6 @@ from tolalloc.report.assembly.results import TransmissionEffect
 from tolalloc.response.kernel import Observer
 from tolalloc.response.orientations import OrientationResponse, transmission_curves
 from tolalloc.uncertainty.seeds import SeedTree
-
-LARGEST_FAILED_SHARE = 0.01
-"""Share of assemblies without an answer above which none is given [-]."""
 
 
 def transmission_effect(

@@ -20,8 +20,8 @@ from tolalloc.multibody.part_errors import part_errors
 from tolalloc.multibody.prototype import RIGID
 from tolalloc.reducer.design import Reducer
 from tolalloc.reducer.files import load_reducer
-from tolalloc.report.simulation.results import RPM
 from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
+from tolalloc.units import RPM
 
 SPECTRAL_RADIUS = 0.9
 INTEGRATORS = {"newmark": newmark(), "generalised-alpha": generalised_alpha(SPECTRAL_RADIUS)}

@@ -6,9 +6,10 @@ from typing import Any
 
 from tolalloc.report.document import Document, Section
 from tolalloc.report.simulation.figures import error_figure, run_figures
-from tolalloc.report.simulation.results import RPM, SimulationResults
+from tolalloc.report.simulation.results import SimulationResults
 from tolalloc.report.simulation.sentences import answer, warnings
 from tolalloc.report.simulation.tables import rest_row, steady_row, steady_table
+from tolalloc.units import RPM
 
 
 def summary(results: SimulationResults) -> dict[str, Any]:

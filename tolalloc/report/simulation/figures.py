@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.simulation.results import RPM, SimulationResults
+from tolalloc.report.simulation.results import SimulationResults
+from tolalloc.units import RPM
 
 _POINTS = 2000
 """Points of a line, about two for every dot of a screen; the file of the whole series has all [-]."""

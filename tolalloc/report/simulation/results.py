@@ -10,9 +10,6 @@ from jaxtyping import Float, Int
 from tolalloc.reducer.design import Reducer
 from tolalloc.units import ARCSECOND, DEGREE
 
-RPM = 2 * np.pi / 60
-"""One turn per minute [rad/s]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class TimeSeries:

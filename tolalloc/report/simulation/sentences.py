@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.report.simulation.results import RPM, SimulationResults
+from tolalloc.report.simulation.results import SimulationResults
 from tolalloc.report.simulation.tables import range_text
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.units import ARCSECOND, DEGREE, RPM
 
 COARSE = 20
 """Time steps per pin pass below which a wave is not drawn well [-]."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from tolalloc.report.simulation.results import RPM, SimulationResults
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.report.simulation.results import SimulationResults
+from tolalloc.units import ARCSECOND, DEGREE, RPM
 
 
 def range_text(least: int, most: int) -> str:
