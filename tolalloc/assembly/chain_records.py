@@ -15,7 +15,7 @@ from tolalloc.files import Record
 from tolalloc.units import DEGREE, MILLIMETRE
 
 SMALLEST, LARGEST = 0.1, 3600.0
-"""Smallest and largest tolerance and limit that is believed, and largest error; a smaller one was in degrees [arcsec]."""
+"""Smallest and largest tolerance and limit that is believed, and largest error; smaller ones are degrees [arcsec]."""
 QUIETEST = 0.01
 """Smallest noise that is believed, unless there is none [arcsec]."""
 
