@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import pandas as pd
 
-from tolalloc.allocation.modification.reference import reference
-from tolalloc.allocation.modification.residual_gap import closed_form, residual_gap
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
-from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
-from tolalloc.report.modification import modification_document
-from tolalloc.study.modification import ModificationStudy, choose
+from tolalloc.rv.modification.answer import modification_document
+from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
+from tolalloc.rv.modification.study import ModificationStudy, choose
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 
 RADIAL_CLEARANCE = 15 * MICROMETRE

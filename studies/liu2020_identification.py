@@ -9,31 +9,31 @@ import numpy as np
 import pandas as pd
 from liu2020_tables import BOUNDS, printed_section
 
+from tolalloc.bench.identification.answer.document import identification_document
+from tolalloc.bench.identification.answer.results import IdentificationResults
+from tolalloc.bench.identification.data import data_of
+from tolalloc.bench.identification.information import information
+from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
+from tolalloc.bench.identification.prediction import KernelPredictor
+from tolalloc.bench.identification.problem import IdentificationProblem
+from tolalloc.bench.identification.recovery import Recovery, recovery
+from tolalloc.bench.identification.searches import search
+from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
+from tolalloc.bench.identification.stand_in import StandIn
+from tolalloc.bench.identification.study import IdentificationStudy, identify
+from tolalloc.bench.identification.swarm import ImprovedPSO, SwarmSettings
+from tolalloc.bench.measurement.records import Measurements
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
-from tolalloc.identification.data import data_of
-from tolalloc.identification.information import information
-from tolalloc.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
-from tolalloc.identification.prediction import KernelPredictor
-from tolalloc.identification.problem import IdentificationProblem
-from tolalloc.identification.recovery import Recovery, recovery
-from tolalloc.identification.searches import search
-from tolalloc.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.identification.stand_in import StandIn
-from tolalloc.identification.swarm import ImprovedPSO, SwarmSettings
-from tolalloc.measurement.records import Measurements
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_reducer
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.identification.document import identification_document
-from tolalloc.report.identification.results import IdentificationResults
-from tolalloc.study.identification import IdentificationStudy, identify
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.study.stages import Progress
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.unit_file import BuiltUnit
 from tolalloc.units import ARCSECOND
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}

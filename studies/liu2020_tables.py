@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.identification.baseline import BiasOnly, improvement
+from tolalloc.bench.identification.baseline import BiasOnly, improvement
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
 

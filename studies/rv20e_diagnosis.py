@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from tolalloc.bench.diagnosis.diagnosis import DiagnosisEffort, diagnose
+from tolalloc.bench.diagnosis.dominance import dominant, reductions
+from tolalloc.bench.diagnosis.problem import CurveProblem
+from tolalloc.bench.diagnosis.readings import Noise, thinned
+from tolalloc.bench.diagnosis.result import Diagnosis
+from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.chunks import one_thread
 from tolalloc.cli.document_script import run_document
-from tolalloc.diagnosis.diagnosis import DiagnosisEffort, diagnose
-from tolalloc.diagnosis.dominance import dominant, reductions
-from tolalloc.diagnosis.problem import CurveProblem
-from tolalloc.diagnosis.readings import Noise, thinned
-from tolalloc.diagnosis.result import Diagnosis
-from tolalloc.measurement.records import MeasuredCurve
+from tolalloc.drawing.limited_measure import limited_measure
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.response.chunks import one_thread
 from tolalloc.study.definition import Prepared, Study, prepare
-from tolalloc.uncertainty.limited_measure import limited_measure
-from tolalloc.uncertainty.seeds import SeedTree
 
 UNITS, QUICK = 200, 8
 READINGS = 1440

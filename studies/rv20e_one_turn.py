@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tolalloc.equivalent.attribution import attribute
-from tolalloc.equivalent.forces import forces
-from tolalloc.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.reducer.files import load_reducer
+from tolalloc.drawing.unit_file import load_unit
 from tolalloc.report.figure import Figure, Series, save_png
-from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.rv.equivalent.attribution import attribute
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 TORQUE = -1.0

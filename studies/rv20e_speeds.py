@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.cli.document_script import run_document
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.inertia import ASSUMPTIONS, inertia_of
-from tolalloc.dynamics.integrator import generalised_alpha
-from tolalloc.dynamics.modes import modes
-from tolalloc.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, orders_against_speed
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.drawing.unit_file import load_unit
 from tolalloc.exceptions import SolveError
-from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import ASSUMPTIONS, inertia_of
+from tolalloc.rv.dynamics.integrator import generalised_alpha
+from tolalloc.rv.dynamics.modes import modes
+from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, orders_against_speed
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND, RPM
 
 TORQUE = -167.0

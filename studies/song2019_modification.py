@@ -10,19 +10,19 @@ from math import pi, sin
 
 import pandas as pd
 
-from tolalloc.allocation.modification.reference import reference
-from tolalloc.allocation.modification.rotated_profile import METRICS, rotated_profile_fit
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
-from tolalloc.cycloid.assessment import assess
-from tolalloc.cycloid.mesh import flank_angle
-from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducer.design import CycloidStage, Modification, Reducer
-from tolalloc.reducer.files import load_reducer
-from tolalloc.report.contact import clearance_figure
 from tolalloc.report.document import Document, Section
-from tolalloc.report.modification import algorithms_table, convergence_figure, modification_document
-from tolalloc.study.modification import ModificationStudy, choose
+from tolalloc.rv.cycloid.assessment import assess
+from tolalloc.rv.cycloid.mesh import flank_angle
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.modification.answer import algorithms_table, convergence_figure, modification_document
+from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.rotated_profile import METRICS, rotated_profile_fit
+from tolalloc.rv.modification.study import ModificationStudy, choose
+from tolalloc.rv.reducer.design import CycloidStage, Modification, Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.teeth.contact import clearance_figure
 from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 
 STAGE = CycloidStage(

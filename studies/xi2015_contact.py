@@ -12,18 +12,18 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from tolalloc.cli.document_script import run_document
-from tolalloc.cycloid.assessment import assess
-from tolalloc.cycloid.clearance import formula_gap
-from tolalloc.cycloid.law_at_every_pin import pressed
-from tolalloc.cycloid.linear_method import pressed_linear
-from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.cycloid.mesh import normals
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_reducer
-from tolalloc.report.contact import contact_sections
-from tolalloc.report.contact_tables import summary
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
+from tolalloc.rv.cycloid.assessment import assess
+from tolalloc.rv.cycloid.clearance import formula_gap
+from tolalloc.rv.cycloid.law_at_every_pin import pressed
+from tolalloc.rv.cycloid.linear_method import pressed_linear
+from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
+from tolalloc.rv.cycloid.mesh import normals
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.teeth.contact import contact_sections
+from tolalloc.rv.teeth.contact_tables import summary
 from tolalloc.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 TORQUE = 572.0

@@ -13,17 +13,17 @@ import pandas as pd
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
 from tolalloc.exceptions import InputError
-from tolalloc.multibody.engine import engine
-from tolalloc.multibody.prototype import with_rigid_bearings
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Document, Section
-from tolalloc.report.simulation.figures import error_figure, run_figures
-from tolalloc.report.simulation.results import SimulationResults
-from tolalloc.report.simulation.sentences import warnings
-from tolalloc.report.simulation.tables import range_text, rest_row, steady_row
-from tolalloc.study.simulation import simulate
-from tolalloc.study.simulation_definition import SimulationStudy, prepare_simulation, with_ideal_gears
+from tolalloc.rv.multibody.engine import engine
+from tolalloc.rv.multibody.prototype import with_rigid_bearings
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.simulation.answer.figures import error_figure, run_figures
+from tolalloc.rv.simulation.answer.results import SimulationResults
+from tolalloc.rv.simulation.answer.sentences import warnings
+from tolalloc.rv.simulation.answer.tables import range_text, rest_row, steady_row
+from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation, with_ideal_gears
+from tolalloc.rv.simulation.run import simulate
 from tolalloc.units import ARCSECOND, RPM
 
 IMPLIED = 3.67e7

@@ -18,11 +18,11 @@ from zhang2025_sections import (
     priced_section,
 )
 
+from tolalloc.assembly.answer.document import assembly_document
+from tolalloc.assembly.study import AssemblyStudy, assemble, prepare_assembly
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
-from tolalloc.report.assembly.document import assembly_document
 from tolalloc.report.document import Document
-from tolalloc.study.assembly import AssemblyStudy, assemble, prepare_assembly
 from tolalloc.units import ARCSECOND
 
 SEED = 20250711

@@ -9,28 +9,28 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.angular.allocation import AngularAllocation, allocate_angles
-from tolalloc.allocation.angular.genetic import genetic_allocation
-from tolalloc.allocation.angular.precision import best_precision
+from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
+from tolalloc.assembly.angular.genetic import genetic_allocation
+from tolalloc.assembly.angular.precision import best_precision
+from tolalloc.assembly.mounting.drawn_parts import drawn_parts
+from tolalloc.assembly.mounting.search import best_mounting, random_mounting
+from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.contact_pattern import contact_pattern
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.mounting.drawn_parts import drawn_parts
-from tolalloc.mounting.search import best_mounting, random_mounting
-from tolalloc.mounting.stock import Stock
-from tolalloc.reducer.files import load_reducer
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.response.orientations import OrientationResponse
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.contact_pattern import contact_pattern
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MICROMETRE
 
 SEEDS = SeedTree(1).child("zhang2025")

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.reducer.files import load_reducer
-from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.drawing.unit_file import load_unit
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
 
 
 @pytest.fixture(scope="session")

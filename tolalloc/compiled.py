@@ -19,7 +19,7 @@ from numba import prange
 __all__ = ["is_kept", "jit", "parallel_jit", "prange", "thread_count", "use_threads"]
 
 _HERE = Path(__file__)
-_FILES = [_HERE, *sorted(_HERE.parent.glob("*/solvers/*.py"))]
+_FILES = [_HERE, *sorted(_HERE.parent.glob("**/solvers/*.py"))]
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()
 _KEPT = _HERE.parent / "__pycache__" / f"compiled-{_DIGEST[:16]}"
 

@@ -5,7 +5,7 @@
 One run measures in turn, round after round and on one core, the seconds per unit of one output turn of an RV-20E at
 1 rpm in 1,404 steps of the generalised-α method:
 
-* (a) `tolalloc.dynamics.simulation.simulate` of one unit, tables and all;
+* (a) `tolalloc.rv.dynamics.simulation.simulate` of one unit, tables and all;
 * (b) the tables alone, which all units of a batch share;
 * (c) the steps alone: a batch of units less the tables, per unit;
 * (d) the same steps in NumPy, all coordinates at once: Newton's method with a line search, its rows made beforehand.
@@ -30,17 +30,17 @@ from scipy.optimize import brentq
 from tests.random_units import random_units
 from tolalloc.blas import one_blas_thread
 from tolalloc.compiled import use_threads
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.inertia import inertia_of
-from tolalloc.dynamics.integrator import generalised_alpha
-from tolalloc.dynamics.motion import Profile, motion_of, nominal_acceleration
-from tolalloc.dynamics.simulation import simulate
-from tolalloc.dynamics.tables import Steps
-from tolalloc.equivalent.condensation import spring_groups
-from tolalloc.equivalent.kinematics import Coordinates, Positions
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.reducer.files import load_reducer
-from tolalloc.uncertainty.unit_file import load_unit
+from tolalloc.drawing.unit_file import load_unit
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import inertia_of
+from tolalloc.rv.dynamics.integrator import generalised_alpha
+from tolalloc.rv.dynamics.motion import Profile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.simulation import simulate
+from tolalloc.rv.dynamics.tables import Steps
+from tolalloc.rv.equivalent.condensation import spring_groups
+from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 
 STEPS, FIRST_STEPS, TORQUE, TURN = 1404, 100, -10.0, 60.0

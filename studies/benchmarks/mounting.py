@@ -3,7 +3,7 @@
     NUMBA_NUM_THREADS=2 python studies/benchmarks/mounting.py
 
 Random sets of measured RV-20E parts inside the shipped tolerance table are mounted by the package,
-`tolalloc.mounting.search.best_mounting`:
+`tolalloc.assembly.mounting.search.best_mounting`:
 
 * one unit: all mountings there are, so its best, mean and worst are exact;
 * two units: against the exact best, from every unit that the parts can make;
@@ -28,17 +28,17 @@ import numba
 import numpy as np
 from kernel_speed import SEED, progress
 
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.mounting.drawn_parts import drawn_parts
-from tolalloc.mounting.evaluation import Memory
-from tolalloc.mounting.search import best_mounting, random_mounting
-from tolalloc.mounting.steps import units_from
-from tolalloc.mounting.stock import Stock
-from tolalloc.reducer.files import load_reducer
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.assembly.mounting.drawn_parts import drawn_parts
+from tolalloc.assembly.mounting.evaluation import Memory
+from tolalloc.assembly.mounting.search import best_mounting, random_mounting
+from tolalloc.assembly.mounting.steps import units_from
+from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.response.kernel import KernelResponse
 
 TARGET_SECONDS = 2.0
 CLIMBERS = 8

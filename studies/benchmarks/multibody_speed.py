@@ -6,7 +6,7 @@ xi2015's RV-40E with an ideal first stage, shortened: 525 rpm within 0.1 s, 572 
 all. Either engine is run at the coarsest of some time steps at which its transmission error from 0.3 s on is within
 0.02″ rms of its own run at the finest step; then both are timed in turn, round after round, on one core:
 
-* (a) `tolalloc.dynamics.simulation.simulate` of one unit;
+* (a) `tolalloc.rv.dynamics.simulation.simulate` of one unit;
 * (b) the same of a batch, per unit;
 * (c) Exudyn's prototype with exact teeth, one unit, as it knows no batches.
 """
@@ -25,17 +25,17 @@ from numpy_cores import timed
 from tolalloc.blas import one_blas_thread
 from tolalloc.cli.console import UnitProgress
 from tolalloc.compiled import use_threads
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.simulation import simulate as simulate_model
-from tolalloc.report.simulation.results import SimulationResults
-from tolalloc.study.simulation import simulate
-from tolalloc.study.simulation_definition import (
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.simulation import simulate as simulate_model
+from tolalloc.rv.simulation.answer.results import SimulationResults
+from tolalloc.rv.simulation.definition import (
     INTEGRATORS,
     PreparedSimulation,
     SimulationStudy,
     prepare_simulation,
     with_ideal_gears,
 )
+from tolalloc.rv.simulation.run import simulate
 from tolalloc.units import ARCSECOND
 
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"

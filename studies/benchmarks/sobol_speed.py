@@ -27,9 +27,9 @@ from kernel_speed import SEED, figures, progress, run_benchmark
 from numpy_cores import CORES, timed
 from SALib.analyze import sobol as salib
 
-from tolalloc.response.interface import Evaluation
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.saltelli import one_pass, saltelli_indices
-from tolalloc.uncertainty.seeds import SeedTree
 
 SOURCES, OUTPUTS, RESAMPLES = 30, 9, 100
 TARGET_RATIO = 10.0

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tolalloc.equivalent.columns import source_name
+from tolalloc.rv.equivalent.columns import source_name
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from tests.studies.command import tolalloc
-from tolalloc.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.measurement.folder import write_measurements
-from tolalloc.reducer.files import load_reducer
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
+from tolalloc.bench.measurement.folder import write_measurements
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 
 NAME, TRUTH, START = "crank_disc_bearing", 1.4e10, 1.09e10

@@ -15,8 +15,8 @@ import pytest
 from tests.studies.command import ROOT, command, tolalloc
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.cli.allocate import allocate
+from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import TolallocError
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 KEPT = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
 PROCESSES = """sources,process,model,fixed [cost units],factor,min [µm],max [µm],note
@@ -65,9 +65,7 @@ def script_with(path: Path, fields: str = "", effort: str = SMALL) -> Path:
 
 
 def few_sources(path: Path, **columns: str) -> Path:
-    table = pd.read_csv(
-        ROOT / "tolalloc/uncertainty/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False
-    )
+    table = pd.read_csv(ROOT / "tolalloc/drawing/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
     kept = table[table["id"].isin(KEPT)].assign(**columns)
     kept.to_csv(path / "few.csv", index=False)
     return path / "few.csv"

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.unit_file import DATA
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.unit_file import DATA
 
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
 
@@ -206,7 +206,7 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
 
 
 def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
-    from tolalloc.reducer.files import PRESETS
+    from tolalloc.rv.reducer.files import PRESETS
 
     text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
     path = tmp_path / "loose.toml"
@@ -254,7 +254,7 @@ def test_a_truncated_table_is_refused(tmp_path):
     ],
 )
 def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
-    from tolalloc.reducer.files import PRESETS
+    from tolalloc.rv.reducer.files import PRESETS
 
     text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
     assert old in text

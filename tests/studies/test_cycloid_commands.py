@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
-from tolalloc.reducer.files import PRESETS
+from tolalloc.rv.reducer.files import PRESETS
 
 
 def reducer_with(tmp_path, *changes: tuple[str, str]):

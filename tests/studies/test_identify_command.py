@@ -27,7 +27,7 @@ from tests.studies.bench_files import (
     value,
 )
 from tests.studies.command import ROOT, refused, tolalloc
-from tolalloc.reducer.files import load_identified_stiffness
+from tolalloc.rv.reducer.files import load_identified_stiffness
 
 
 @dataclass(frozen=True)

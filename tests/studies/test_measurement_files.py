@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.drawing.unit_file import DATA
+from tolalloc.drawing.unit_table import load_units
 from tolalloc.exceptions import TolallocError
-from tolalloc.measurement.files import load_measurements
-from tolalloc.uncertainty.unit_file import DATA
-from tolalloc.uncertainty.unit_table import load_units
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE, MICRORADIAN
 
 UNITS = """# drawn on the coordinate measuring machine

@@ -7,11 +7,11 @@ import json
 import pytest
 from command import refused, tolalloc
 
-from tolalloc.mounting.drawn_parts import drawn_parts
-from tolalloc.reducer.files import load_reducer
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.assembly.mounting.drawn_parts import drawn_parts
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 
 

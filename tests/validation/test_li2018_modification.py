@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.allocation.modification.binary_ga import LI2018, binary_search
-from tolalloc.allocation.modification.reference import reference
-from tolalloc.allocation.modification.residual_gap import closed_form, residual_gap
-from tolalloc.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.cycloid.mesh import flank_angle
-from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
+from tolalloc.rv.cycloid.mesh import flank_angle
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.modification.binary_ga import LI2018, binary_search
+from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 
 STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e", "rv40e", "rv80e")}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.identification.baseline import BiasOnly, improvement
+from tolalloc.bench.identification.baseline import BiasOnly, improvement
 
 SCRIPT = Path(__file__).parents[2] / "studies" / "liu2020_tables.py"
 

@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tolalloc.response.interface import Evaluation
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.uncertainty.seeds import SeedTree
 
 PROBLEMS = {
     item["id"]: item

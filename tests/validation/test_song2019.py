@@ -12,9 +12,9 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from tolalloc.cycloid.clearance import exact_clearance
-from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducer.design import CycloidStage, Modification
+from tolalloc.rv.cycloid.clearance import exact_clearance
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import MILLIMETRE
 
 STAGE = CycloidStage(

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.allocation.modification.reference import polish, reference
-from tolalloc.allocation.modification.rotated_profile import rotated_profile_fit
-from tolalloc.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.cycloid.mesh import flank_angle
-from tolalloc.cycloid.tooth_profile import ToothProfile
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import CycloidStage, Modification
+from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
+from tolalloc.rv.cycloid.mesh import flank_angle
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.modification.reference import polish, reference
+from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
+from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
 
 STAGE = CycloidStage(

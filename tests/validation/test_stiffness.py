@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.cycloid.contact_stiffness import pin_contact_table2
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reducer.design import CycloidStage
-from tolalloc.reducer.files import (
+from tolalloc.rv.cycloid.contact_stiffness import pin_contact_table2
+from tolalloc.rv.reducer.design import CycloidStage
+from tolalloc.rv.reducer.files import (
     PRESETS,
     load_identified_stiffness,
     load_reducer,
     with_stiffness,
     write_identified_stiffness,
 )
-from tolalloc.reducer.stiffness import IdentifiedStiffness, Material, contact_modulus, line_contact, pin_bending
-from tolalloc.reducer.table2 import (
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, contact_modulus, line_contact, pin_bending
+from tolalloc.rv.reducer.table2 import (
     TAPER_ANGLE,
     ball_bearing,
     ball_coefficient_as_printed,

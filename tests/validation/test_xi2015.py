@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tolalloc.cycloid.clearance import formula_gap
-from tolalloc.cycloid.law_at_every_pin import pressed
-from tolalloc.cycloid.linear_method import pressed_linear
-from tolalloc.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import PRESETS, load_reducer
+from tolalloc.rv.cycloid.clearance import formula_gap
+from tolalloc.rv.cycloid.law_at_every_pin import pressed
+from tolalloc.rv.cycloid.linear_method import pressed_linear
+from tolalloc.rv.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import PRESETS, load_reducer
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
 
 DEFLECTION = 17.603 * MICROMETRE

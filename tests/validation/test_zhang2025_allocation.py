@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tolalloc.allocation.angular.allocation import allocate_angles, allocated
-from tolalloc.allocation.angular.genetic import genetic_allocation
-from tolalloc.allocation.angular.precision import best_precision
-from tolalloc.allocation.angular.retuning import retuned_allocation
+from tolalloc.assembly.angular.allocation import allocate_angles, allocated
+from tolalloc.assembly.angular.genetic import genetic_allocation
+from tolalloc.assembly.angular.precision import best_precision
+from tolalloc.assembly.angular.retuning import retuned_allocation
 from tolalloc.assembly.chain_file import load_plan
 from tolalloc.assembly.final_errors import final_errors
 from tolalloc.assembly.gains import Gains, tuned_gains
 from tolalloc.assembly.kalman import kalman_filter
 from tolalloc.assembly.regulator import regulator
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
 PLAN = load_plan("bx40e")

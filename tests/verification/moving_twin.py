@@ -9,10 +9,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
-from tolalloc.dynamics.inertia import Inertia
-from tolalloc.dynamics.motion import Profile
-from tolalloc.equivalent.kinematics import HARMONICS, Coordinates
-from tolalloc.reducer.design import Reducer
+from tolalloc.rv.dynamics.inertia import Inertia
+from tolalloc.rv.dynamics.motion import Profile
+from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates
+from tolalloc.rv.reducer.design import Reducer
 
 
 def part_paths(reducer: Reducer, carrier_angle: float) -> np.ndarray:

@@ -11,6 +11,8 @@ import pytest
 from openpyxl import load_workbook
 from typer.testing import CliRunner
 
+from tolalloc.allocation.answer.cost_formulas import cost_formula
+from tolalloc.allocation.answer.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.model import Weighted
 from tolalloc.allocation.cost.points import Points
@@ -18,12 +20,10 @@ from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
 from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import app
-from tolalloc.report.allocation.cost_formulas import cost_formula
-from tolalloc.report.allocation.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
+from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.study.allocation import allocate_study
 from tolalloc.study.definition import Study
 from tolalloc.study.effort import QUICK
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame
 
 UM, RADIAL = 1e-6, "radial clearance at tip and root [µm]"
 SMALL = replace(

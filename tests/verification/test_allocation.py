@@ -22,10 +22,10 @@ from tolalloc.allocation.trust_region import aimed
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.response.kernel import PEAK_TO_PEAK
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 
 LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
 UNITS = 1152

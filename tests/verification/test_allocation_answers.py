@@ -19,8 +19,8 @@ from tolalloc.allocation.trade import ModificationTrade, modification_trade
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.capability.indices import Limits
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 
 UNITS = 1152
 

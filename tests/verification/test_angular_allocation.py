@@ -9,14 +9,14 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from tolalloc.allocation.angular.allocation import allocate_angles
-from tolalloc.allocation.angular.genetic import genetic_allocation
-from tolalloc.allocation.angular.precision import best_precision
-from tolalloc.allocation.angular.retuning import retuned_allocation
-from tolalloc.allocation.angular.verification import verify_angles
+from tolalloc.assembly.angular.allocation import allocate_angles
+from tolalloc.assembly.angular.genetic import genetic_allocation
+from tolalloc.assembly.angular.precision import best_precision
+from tolalloc.assembly.angular.retuning import retuned_allocation
+from tolalloc.assembly.angular.verification import verify_angles
 from tolalloc.assembly.chain_file import load_plan
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
 PLAN = load_plan("bx40e")

@@ -21,8 +21,8 @@ from tolalloc.assembly.regulator import Regulator, limiting_regulator, regulator
 from tolalloc.assembly.state_space import StateSpace
 from tolalloc.assembly.steps import Efforts, Step, steps_in_order
 from tolalloc.assembly.trajectory import Trajectory, as_mounted, foreseen, simulated
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
 SEEDS = range(6)

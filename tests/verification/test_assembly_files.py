@@ -12,11 +12,11 @@ from tolalloc.assembly.chain_file import DATA, load_plan
 from tolalloc.assembly.errors_file import load_errors
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import Step, check_steps
-from tolalloc.equivalent.bearings import crank_disc
-from tolalloc.equivalent.kinematics import Positions
-from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.reducer.files import PRESETS, load_reducer
+from tolalloc.rv.equivalent.bearings import crank_disc
+from tolalloc.rv.equivalent.kinematics import Positions
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import PRESETS, load_reducer
 from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
 
 SHORT = """

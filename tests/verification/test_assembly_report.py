@@ -9,23 +9,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tolalloc.assembly.answer import tables, tolerance_tables, transmission
+from tolalloc.assembly.answer.cautions import assumptions, warnings
+from tolalloc.assembly.answer.characteristics import characteristic_table, larger
+from tolalloc.assembly.answer.document import assembly_document
+from tolalloc.assembly.answer.plan_record import plan_record
+from tolalloc.assembly.answer.results import AssemblyResults, TransmissionEffect
+from tolalloc.assembly.answer.sentences import answer
+from tolalloc.assembly.answer.summary import summary
 from tolalloc.assembly.chain_file import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
+from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves
 from tolalloc.assembly.steps import Efforts, steps_in_order
+from tolalloc.assembly.study import AssemblyStudy, PreparedAssembly, assemble
 from tolalloc.assembly.trajectory import random_numbers
-from tolalloc.equivalent.contact_pattern import ContactPattern
-from tolalloc.reducer.files import load_reducer
-from tolalloc.report.assembly import tables, tolerance_tables, transmission
-from tolalloc.report.assembly.cautions import assumptions, warnings
-from tolalloc.report.assembly.characteristics import characteristic_table, larger
-from tolalloc.report.assembly.document import assembly_document
-from tolalloc.report.assembly.plan_record import plan_record
-from tolalloc.report.assembly.results import AssemblyResults, TransmissionEffect
-from tolalloc.report.assembly.sentences import answer
-from tolalloc.report.assembly.summary import summary
 from tolalloc.report.figure import as_html
-from tolalloc.response.orientations import TRANSMISSION, TransmissionCurves
-from tolalloc.study.assembly import AssemblyStudy, PreparedAssembly, assemble
+from tolalloc.rv.equivalent.contact_pattern import ContactPattern
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 
 CHAIN = """

@@ -22,11 +22,11 @@ import pytest
 
 from tests.random_reducers import Case, random_case, random_reducer, random_unit
 from tests.verification.dense_twin import DenseModel, dense_model
-from tolalloc.equivalent.condensation import spring_groups
-from tolalloc.equivalent.kinematics import Coordinates
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.status import Status
-from tolalloc.reducer.design import Reducer
+from tolalloc.rv.equivalent.condensation import spring_groups
+from tolalloc.rv.equivalent.kinematics import Coordinates
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND
 
 SEEDS = range(40)

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from tests.random_units import random_units
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.response import chunks
-from tolalloc.response.kernel import KernelResponse
+from tolalloc import chunks
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.response.kernel import KernelResponse
 
 
 def test_same_bits_for_any_chunk_and_any_process(rv20e, table4, generator, monkeypatch):

@@ -11,15 +11,15 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import kstest
 
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.correlation_file import load_correlations
+from tolalloc.drawing.distributions import Distribution
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.mixtures import Batch
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.correlation_file import load_correlations
-from tolalloc.uncertainty.distributions import Distribution
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.mixtures import Batch
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 SAMPLES = 40_000
 

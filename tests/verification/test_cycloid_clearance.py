@@ -11,7 +11,8 @@ from scipy.optimize import brentq
 from tests.random_reducers import random_cycloid_stage
 from tests.verification.distance_search import grindable, places, random_amounts, searched, searched_between
 from tests.verification.test_cycloid_profile import path_bend
-from tolalloc.cycloid.clearance import (
+from tolalloc.exceptions import InputError
+from tolalloc.rv.cycloid.clearance import (
     LARGE,
     clearance_of,
     exact_clearance,
@@ -19,10 +20,9 @@ from tolalloc.cycloid.clearance import (
     is_large,
     linear_clearance,
 )
-from tolalloc.cycloid.tooth_profile import ToothProfile, require_sound
-from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import CycloidStage, Modification
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
+from tolalloc.rv.reducer.design import CycloidStage, Modification
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
 
 NANOMETRE_MILLIONTH = 1e-12  # 1e-9 mm

@@ -16,15 +16,15 @@ from scipy.optimize import brentq
 
 from tests.random_reducers import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
-from tolalloc.cycloid.law_at_every_pin import pressed
-from tolalloc.cycloid.linear_method import pressed_linear
-from tolalloc.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.equivalent.forces import forces
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.status import Status
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import Clearances, CycloidStage, Modification, Reducer
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.cycloid.law_at_every_pin import pressed
+from tolalloc.rv.cycloid.linear_method import pressed_linear
+from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.reducer.design import Clearances, CycloidStage, Modification, Reducer
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 
 SEEDS = (0, 1, 4, 7)  # odd and even pin counts, one and two first contacts, 3 to 912 N·m

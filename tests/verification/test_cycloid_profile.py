@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from tests.random_reducers import random_cycloid_stage
-from tolalloc.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import CycloidStage, Modification
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
+from tolalloc.rv.reducer.design import CycloidStage, Modification
 
 SEEDS = range(40)
 AROUND = np.linspace(-np.pi, np.pi, 4001)

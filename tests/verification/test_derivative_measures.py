@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import KernelResponse
+from tolalloc.model import Evaluation
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.zones import Distribution, Feature
 
 
 def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **more) -> Source:

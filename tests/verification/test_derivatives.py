@@ -9,9 +9,9 @@ import pytest
 
 from tests.random_reducers import is_angle, random_case
 from tests.random_units import random_units
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.status import Status
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.status import Status
 from tolalloc.units import ARCSECOND
 
 

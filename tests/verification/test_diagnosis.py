@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.diagnosis.bridge import Moves, Neighbourhood, bridge
-from tolalloc.diagnosis.diagnosis import DiagnosisEffort, diagnose
-from tolalloc.diagnosis.dominance import dominant, named_set, reductions
-from tolalloc.diagnosis.groups import groups
-from tolalloc.diagnosis.half_turn import exchanged, half_turn, has_half_turn
-from tolalloc.diagnosis.posterior import SampleEffort, with_twins
-from tolalloc.diagnosis.problem import CurveProblem
-from tolalloc.diagnosis.readings import Noise, thinned
-from tolalloc.diagnosis.result import Diagnosis
-from tolalloc.diagnosis.search import SearchEffort, climb
+from tolalloc.bench.diagnosis.bridge import Moves, Neighbourhood, bridge
+from tolalloc.bench.diagnosis.diagnosis import DiagnosisEffort, diagnose
+from tolalloc.bench.diagnosis.dominance import dominant, named_set, reductions
+from tolalloc.bench.diagnosis.groups import groups
+from tolalloc.bench.diagnosis.half_turn import exchanged, half_turn, has_half_turn
+from tolalloc.bench.diagnosis.posterior import SampleEffort, with_twins
+from tolalloc.bench.diagnosis.problem import CurveProblem
+from tolalloc.bench.diagnosis.readings import Noise, thinned
+from tolalloc.bench.diagnosis.result import Diagnosis
+from tolalloc.bench.diagnosis.search import SearchEffort, climb
+from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.drawing.limited_measure import limited_measure
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.measurement.records import MeasuredCurve
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.study.definition import Prepared, Study, prepare
-from tolalloc.uncertainty.limited_measure import limited_measure
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCSECOND, DEGREE
 
 NOISE = Noise()

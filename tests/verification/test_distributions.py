@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolalloc.uncertainty.distributions import Distribution, moments
-from tolalloc.uncertainty.measured_parts import MeasuredParts
-from tolalloc.uncertainty.mixtures import Batch, smoothed_magnitude
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_cells import parsed_spectrum
-from tolalloc.uncertainty.zones import Feature, harmonic_range_quantile
+from tolalloc.drawing.distributions import Distribution, moments
+from tolalloc.drawing.measured_parts import MeasuredParts
+from tolalloc.drawing.mixtures import Batch, smoothed_magnitude
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_cells import parsed_spectrum
+from tolalloc.drawing.zones import Feature, harmonic_range_quantile
 
 SAMPLES = 100_000
 ZONE = 4e-6

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.verification.test_dynamics import input_of, run
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.integrator import generalised_alpha, newmark
-from tolalloc.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
+from tolalloc.rv.dynamics.motion import Profile, motion_of
 
 INTEGRATORS = {"newmark": newmark(), "alpha 0": generalised_alpha(0.0), "alpha 0.8": generalised_alpha(0.8)}
 STEPS = 160 * 2 ** np.arange(5)

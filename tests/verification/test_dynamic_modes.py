@@ -9,20 +9,20 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.verification.dense_twin import dense_model, least_energy
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.inertia import inertia_of
-from tolalloc.dynamics.integrator import generalised_alpha, newmark
-from tolalloc.dynamics.modes import Modes, modes
-from tolalloc.dynamics.motion import Profile, motion_of
-from tolalloc.dynamics.simulation import simulate
-from tolalloc.dynamics.speeds import campbell, orders_against_speed
-from tolalloc.equivalent.kinematics import Coordinates
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.outputs import order_spectrum
-from tolalloc.equivalent.status import Status
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.reducer.design import Clearances
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import inertia_of
+from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
+from tolalloc.rv.dynamics.modes import Modes, modes
+from tolalloc.rv.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.simulation import simulate
+from tolalloc.rv.dynamics.speeds import campbell, orders_against_speed
+from tolalloc.rv.equivalent.kinematics import Coordinates
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import order_spectrum
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.reducer.design import Clearances
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 
 TURN = 2 * np.pi * np.arange(96) / 96

@@ -13,16 +13,16 @@ from tests.random_units import random_units
 from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
 from tolalloc.compiled import thread_count, use_threads
-from tolalloc.dynamics.damping import Damping
-from tolalloc.dynamics.inertia import Inertia, inertia_of
-from tolalloc.dynamics.integrator import Integrator, generalised_alpha, newmark
-from tolalloc.dynamics.motion import Motion, Profile, motion_of, nominal_acceleration
-from tolalloc.dynamics.simulation import Simulated, simulate
-from tolalloc.equivalent.kinematics import Coordinates, Positions
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.status import Status
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import Clearances
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import Inertia, inertia_of
+from tolalloc.rv.dynamics.integrator import Integrator, generalised_alpha, newmark
+from tolalloc.rv.dynamics.motion import Motion, Profile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.simulation import Simulated, simulate
+from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.reducer.design import Clearances
 from tolalloc.units import ARCSECOND
 
 UNDAMPED = Damping()

@@ -10,18 +10,18 @@ from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import yield_at_limit
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.target import target_sensitivity
 from tolalloc.study.effort import QUICK, RankingEffort
 from tolalloc.surrogate.validation import answers_of
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 ERRORS = ErrorModel(
     (Source(name="a", part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0),)

@@ -12,12 +12,12 @@ import pytest
 from tests.random_reducers import Case, random_case, variations
 from tests.random_units import random_units
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
-from tolalloc.cycloid.solvers.contact_law import LOGARITHMIC, pin_force
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.condensation import spring_groups
-from tolalloc.equivalent.kinematics import Coordinates
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.status import Status
+from tolalloc.rv.cycloid.solvers.contact_law import LOGARITHMIC, pin_force
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.condensation import spring_groups
+from tolalloc.rv.equivalent.kinematics import Coordinates
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.status import Status
 from tolalloc.units import ARCSECOND
 
 SEEDS = range(200)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.random_units import random_units
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.units import ARCSECOND
 
 

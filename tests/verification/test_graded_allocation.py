@@ -15,9 +15,9 @@ from tolalloc.allocation.graded import AMOUNT_STEP, allocate_grades, group_ladde
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 
 UNITS, UM = 1152, 1e-6
 

@@ -4,10 +4,10 @@ import pytest
 from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_zones
 from tolalloc.allocation.grade.ladder import Ladder, group_ladder
 from tolalloc.allocation.grade.preferred import ZONES
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.zones import Feature
 
 UM, MM = 1e-6, 1e-3
 

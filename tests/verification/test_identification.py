@@ -10,28 +10,28 @@ import pytest
 from scipy.stats import binom, norm
 from scipy.stats import t as student
 
+from tolalloc.bench.identification.baseline import BiasOnly, improvement
+from tolalloc.bench.identification.data import Block, Data, data_of
+from tolalloc.bench.identification.estimate import as_stiffness, estimates
+from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
+from tolalloc.bench.identification.information import information
+from tolalloc.bench.identification.parameters import LIU2020, Parameter, parameter
+from tolalloc.bench.identification.prediction import KernelPredictor, Prediction
+from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
+from tolalloc.bench.identification.profile import profile
+from tolalloc.bench.identification.recovery import recovery
+from tolalloc.bench.identification.resampling import bootstrap, judged, simplest
+from tolalloc.bench.identification.searches import ALGORITHMS, search
+from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
+from tolalloc.bench.identification.stand_in import StandIn, anchored, fit_stand_in
+from tolalloc.bench.identification.swarm import best_neighbours, velocity, weights
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.identification.baseline import BiasOnly, improvement
-from tolalloc.identification.data import Block, Data, data_of
-from tolalloc.identification.estimate import as_stiffness, estimates
-from tolalloc.identification.gauss_newton import gauss_newton, starts
-from tolalloc.identification.information import information
-from tolalloc.identification.parameters import LIU2020, Parameter, parameter
-from tolalloc.identification.prediction import KernelPredictor, Prediction
-from tolalloc.identification.problem import IdentificationProblem, require_enough
-from tolalloc.identification.profile import profile
-from tolalloc.identification.recovery import recovery
-from tolalloc.identification.resampling import bootstrap, judged, simplest
-from tolalloc.identification.searches import ALGORITHMS, search
-from tolalloc.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.identification.stand_in import StandIn, anchored, fit_stand_in
-from tolalloc.identification.swarm import best_neighbours, velocity, weights
-from tolalloc.reducer.files import load_reducer
-from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.surrogate.polynomial import fit_box_polynomial, total_degrees
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 from tolalloc.units import ARCSECOND
 
 NONE = np.empty(0)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.inverse import inverse_sensitivity
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 NAMES = ("a", "b", "c", "d")
 DEVIATIONS = np.array([1.0, 0.7, 0.5, 0.01])

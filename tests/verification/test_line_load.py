@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from tests.random_reducers import random_reducer
-from tolalloc.cycloid.contact_stiffness import peak_pressure
-from tolalloc.cycloid.mesh import normals
-from tolalloc.cycloid.solvers.contact_law import LINEAR, pin_force
-from tolalloc.equivalent.contact_pattern import contact_pattern
-from tolalloc.equivalent.hysteresis import LOOP_ANGLES
-from tolalloc.equivalent.line_load import LineContact, line_contact, peak_line_load, unit_pressure
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.outputs import Solved
 from tolalloc.exceptions import InputError
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.response.outputs import OutputsResponse
+from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
+from tolalloc.rv.cycloid.mesh import normals
+from tolalloc.rv.cycloid.solvers.contact_law import LINEAR, pin_force
+from tolalloc.rv.equivalent.contact_pattern import contact_pattern
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.rv.equivalent.line_load import LineContact, line_contact, peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.response.outputs import OutputsResponse
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 
 TORQUE = -100.0

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tolalloc.bench.measurement.cleaning import clean_curve, clean_loop
+from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.bench.measurement.folder import write_measurements
+from tolalloc.bench.measurement.readings import Readings
+from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
+from tolalloc.drawing.unit_file import BuiltUnit
+from tolalloc.drawing.unit_table import load_units, write_units
 from tolalloc.exceptions import InputError
-from tolalloc.measurement.cleaning import clean_curve, clean_loop
-from tolalloc.measurement.files import load_measurements
-from tolalloc.measurement.folder import write_measurements
-from tolalloc.measurement.readings import Readings
-from tolalloc.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
-from tolalloc.measurement.resampling import FULL, READINGS, resampled
-from tolalloc.uncertainty.unit_file import BuiltUnit
-from tolalloc.uncertainty.unit_table import load_units, write_units
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 
 TURN = 2 * np.pi

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.allocation.modification.binary_ga import LI2018, BinaryCode, binary_search, scaled_fitness
-from tolalloc.allocation.modification.mixed_penalty import extrapolated, mixed_penalty
-from tolalloc.allocation.modification.problem import Evaluation
-from tolalloc.allocation.modification.reference import polish, reference
-from tolalloc.allocation.modification.residual_gap import residual_gap
-from tolalloc.allocation.modification.result import REACHED, Spread, Tally
-from tolalloc.allocation.modification.rotated_profile import rotated_profile_fit
-from tolalloc.allocation.modification.searches import ALGORITHMS, search, spread
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.reducer.design import CycloidStage
-from tolalloc.reducer.files import load_reducer
-from tolalloc.search.history import History
+from tolalloc.rv.modification.binary_ga import LI2018, BinaryCode, binary_search, scaled_fitness
+from tolalloc.rv.modification.history import History
+from tolalloc.rv.modification.mixed_penalty import extrapolated, mixed_penalty
+from tolalloc.rv.modification.problem import Evaluation
+from tolalloc.rv.modification.reference import polish, reference
+from tolalloc.rv.modification.residual_gap import residual_gap
+from tolalloc.rv.modification.result import REACHED, Spread, Tally
+from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
+from tolalloc.rv.modification.searches import ALGORITHMS, search, spread
+from tolalloc.rv.reducer.design import CycloidStage
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 SONG = CycloidStage(

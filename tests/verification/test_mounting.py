@@ -9,17 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.diagnosis.half_turn import half_turn
-from tolalloc.equivalent.bearings import crank_disc
-from tolalloc.equivalent.kinematics import Positions
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.pins import dense_rows
-from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
-from tolalloc.mounting.columns import mounted, own_name, owned_columns, unmounted
-from tolalloc.mounting.drawn_parts import drawn_parts
-from tolalloc.mounting.parts import MeasuredPart
-from tolalloc.mounting.parts_file import load_parts, own_errors
-from tolalloc.mounting.places import (
+from tolalloc.assembly.mounting.columns import mounted, own_name, owned_columns, unmounted
+from tolalloc.assembly.mounting.drawn_parts import drawn_parts
+from tolalloc.assembly.mounting.parts import MeasuredPart
+from tolalloc.assembly.mounting.parts_file import load_parts, own_errors
+from tolalloc.assembly.mounting.places import (
     Place,
     Turn,
     carrier_turn,
@@ -28,16 +22,22 @@ from tolalloc.mounting.places import (
     places_of,
     sun_turn,
 )
-from tolalloc.mounting.search import best_mounting, random_mounting
-from tolalloc.mounting.steps import units_from
-from tolalloc.mounting.stock import Stock
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_reducer
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
+from tolalloc.assembly.mounting.search import best_mounting, random_mounting
+from tolalloc.assembly.mounting.steps import units_from
+from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.bench.diagnosis.half_turn import half_turn
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
+from tolalloc.model import Evaluation
+from tolalloc.rv.equivalent.bearings import crank_disc
+from tolalloc.rv.equivalent.kinematics import Positions
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.pins import dense_rows
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCSECOND, MICROMETRE
 
 TORQUE = -1.0

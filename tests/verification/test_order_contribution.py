@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.growth import Growth, Step
 from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 NAMES = ("a", "b", "c", "d")
 ORDERS = (1, 2, 39)

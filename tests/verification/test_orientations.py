@@ -9,17 +9,17 @@ import pytest
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.orientations import OrientationResponse, transmission_curves
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.line_load import peak_line_load
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.outputs import Solved
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.files import load_reducer
-from tolalloc.response.interface import Response
-from tolalloc.response.orientations import OrientationResponse, transmission_curves
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.model import Response
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.line_load import peak_line_load
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 
 LOAD = "largest line load, rated torque [N/mm]"

@@ -9,16 +9,16 @@ import pytest
 
 from tests.random_reducers import random_case
 from tests.verification.dense_twin import dense_equilibrium
-from tolalloc.equivalent.angle_search import AngleSearch
-from tolalloc.equivalent.attribution import attribute
-from tolalloc.equivalent.condensation import spring_groups
-from tolalloc.equivalent.forces import forces
-from tolalloc.equivalent.hysteresis import BACKLASH, both_directions, hysteresis_loop
-from tolalloc.equivalent.kinematics import Coordinates
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.outputs import OUTPUTS, Solved, load_share, order_spectrum
-from tolalloc.reducer.design import Clearances
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.attribution import attribute
+from tolalloc.rv.equivalent.condensation import spring_groups
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.hysteresis import BACKLASH, both_directions, hysteresis_loop
+from tolalloc.rv.equivalent.kinematics import Coordinates
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, load_share, order_spectrum
+from tolalloc.rv.reducer.design import Clearances
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 
 INTERFACES = {

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.equivalent.outputs import order_spectrum
-from tolalloc.equivalent.status import Status, count_statuses
-from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.outputs import order_spectrum
+from tolalloc.rv.equivalent.status import Status, count_statuses
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCMINUTE, ARCSECOND
 
 ORDERS = (1, 39, 40)

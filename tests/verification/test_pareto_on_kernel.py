@@ -16,9 +16,9 @@ from tolalloc.allocation.pareto.indicators import nondominated
 from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.seeds import SeedTree
 
 POPULATION = 80
 

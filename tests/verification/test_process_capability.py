@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from tolalloc.drawing.distributions import Distribution
+from tolalloc.drawing.process_capability import load_process_capabilities
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
-from tolalloc.uncertainty.distributions import Distribution
-from tolalloc.uncertainty.process_capability import load_process_capabilities
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.zones import Feature
 
 LIBRARY = """process,feature,Cp [-],shift [half zone],distribution,shape [-],sorted,note
 own,size,1.25,0.1,weibull,2.0,yes,measured in the shop

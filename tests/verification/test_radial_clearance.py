@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.cycloid.clearance import exact_clearance
-from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.equivalent.condensation import spring_groups
-from tolalloc.equivalent.forces import forces
-from tolalloc.equivalent.hysteresis import LOOP_ANGLES
-from tolalloc.equivalent.radial_clearance import radial_clearance
-from tolalloc.equivalent.status import Status
-from tolalloc.reducer.design import Modification
-from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse
+from tolalloc.rv.cycloid.clearance import exact_clearance
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.equivalent.condensation import spring_groups
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.rv.equivalent.radial_clearance import radial_clearance
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.reducer.design import Modification
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
 from tolalloc.study.definition import Study, prepare
 from tolalloc.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 

@@ -14,8 +14,8 @@ from tolalloc.capability.rare_failure.form import DesignPoints, design_point, de
 from tolalloc.capability.rare_failure.importance import importance_sampling
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitValues
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.uncertainty.seeds import SeedTree
 
 
 @dataclass(frozen=True)

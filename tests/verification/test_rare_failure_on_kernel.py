@@ -17,15 +17,15 @@ from tolalloc.capability.rare_failure.result import Level, RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Distribution, Feature
 from tolalloc.exceptions import InputError
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import WithDerivatives
+from tolalloc.model import Evaluation
+from tolalloc.rv.response.kernel import WithDerivatives
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Distribution, Feature
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from SALib.analyze import sobol as salib
 
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.growth import grow_until_stable
 from tolalloc.sensitivity.ranking import (
     Ranking,
@@ -20,7 +21,6 @@ from tolalloc.sensitivity.ranking import (
     ranks,
 )
 from tolalloc.sensitivity.saltelli import SaltelliIndices, resample_counts, saltelli_indices
-from tolalloc.uncertainty.seeds import SeedTree
 
 SOURCES, BLOCKS, RESAMPLES, OUTPUTS = 5, 96, 60, 7
 FIELDS = (

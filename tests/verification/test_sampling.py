@@ -10,12 +10,12 @@ from scipy.special import ndtri
 from scipy.stats import kstest, qmc
 
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.response.interface import Evaluation
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.sampling import SamplingDesign, uniform_chunk, uniform_chunks
-from tolalloc.uncertainty.seeds import CHUNK, SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.sampling import SamplingDesign, uniform_chunk, uniform_chunks
+from tolalloc.drawing.seeds import CHUNK, SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
+from tolalloc.model import Evaluation
 
 COLUMNS = 3
 LATIN, SOBOL = SamplingDesign.LATIN_HYPERCUBE, SamplingDesign.SOBOL

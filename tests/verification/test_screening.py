@@ -11,14 +11,14 @@ from SALib.sample import morris
 from scipy.stats import norm
 
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Distribution, Feature
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.UNIFORM) -> Source:

@@ -9,14 +9,14 @@ import pytest
 from scipy.stats import norm
 
 from tolalloc.capability.monte_carlo import allowed_rejections, monte_carlo, proportion
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Distribution, Feature
 
 
 def sizes(*names: str) -> ErrorModel:

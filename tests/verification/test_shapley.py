@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.distributions import Distribution
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.distributions import Distribution
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 SIGMA_ZONE = float(2 * -ndtri((1 - 0.9973) / 2))
 """Zone at which a size has standard deviation 1."""

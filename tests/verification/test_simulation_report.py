@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.reducer.files import load_reducer
-from tolalloc.report.simulation.document import simulation_document
-from tolalloc.report.simulation.figures import error_figure, line
-from tolalloc.report.simulation.results import AtRest, SimulationResults, TimeSeries
-from tolalloc.report.simulation.sentences import answer, warnings
-from tolalloc.report.simulation.tables import range_text, series_table, steady_table
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.simulation.answer.document import simulation_document
+from tolalloc.rv.simulation.answer.figures import error_figure, line
+from tolalloc.rv.simulation.answer.results import AtRest, SimulationResults, TimeSeries
+from tolalloc.rv.simulation.answer.sentences import answer, warnings
+from tolalloc.rv.simulation.answer.tables import range_text, series_table, steady_table
 from tolalloc.units import ARCSECOND, RPM
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from SALib.sample import sobol as salib
 
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
 from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
-from tolalloc.uncertainty.correlation import Correlation, Pair
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 
 PLAYERS = ("a", "b", "b", "c", "a", "d")
 CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))

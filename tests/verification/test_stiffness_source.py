@@ -8,13 +8,17 @@ from math import exp
 import numpy as np
 import pytest
 
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
-from tolalloc.reducer.stiffness import IdentifiedStiffness
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.response.stiffness import (
+from tolalloc.model import Evaluation
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.response.stiffness import (
     NAME,
     StiffnessResponse,
     first_order_error,
@@ -23,10 +27,6 @@ from tolalloc.response.stiffness import (
 )
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 FIELDS = ("crank_disc_bearing", "pin_contact")
 

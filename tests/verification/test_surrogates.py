@@ -7,13 +7,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation, Response
-from tolalloc.response.kernel import KernelResponse
+from tolalloc.model import Evaluation, Response
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.stand_ins.contact import ContactCandidate, Corrected, corrected
+from tolalloc.rv.stand_ins.curve import CurveCandidate
 from tolalloc.surrogate.choice import Gate, choose
-from tolalloc.surrogate.contact import ContactCandidate, Corrected, corrected
-from tolalloc.surrogate.curve import CurveCandidate
 from tolalloc.surrogate.regression import (
     RegressionCandidate,
     fit_surrogate,
@@ -21,9 +24,6 @@ from tolalloc.surrogate.regression import (
     sparse_quadratic_regression,
 )
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
 
 COLUMNS = ("a", "b", "c")
 OUTPUTS = ("answer [arcsec]",)

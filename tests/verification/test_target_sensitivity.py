@@ -9,16 +9,16 @@ import pytest
 from scipy.stats import norm
 
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.limited_measure import limited_measure
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_cells import parsed_spectrum
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.limited_measure import limited_measure
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_cells import parsed_spectrum
-from tolalloc.uncertainty.zones import Feature
 
 
 def source(name: str, feature: Feature = Feature.SIZE, **more) -> Source:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.uncertainty.distributions import Distribution
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import CHUNK, SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table, table_frame, with_zones
-from tolalloc.uncertainty.unit_file import load_unit
-from tolalloc.uncertainty.zones import Feature
+from tolalloc.drawing.distributions import Distribution
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import CHUNK, SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame, with_zones
+from tolalloc.drawing.unit_file import load_unit
+from tolalloc.drawing.zones import Feature
 
 SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
 CASES = [

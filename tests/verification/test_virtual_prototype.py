@@ -12,22 +12,22 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tolalloc.cycloid.clearance import exact_clearance
-from tolalloc.cycloid.tooth_profile import ToothProfile
-from tolalloc.equivalent.forces import forces
-from tolalloc.equivalent.model import EquivalentModel
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.multibody import engine as door
-from tolalloc.multibody.drive import Damping, Drive
-from tolalloc.multibody.masses import Masses
-from tolalloc.multibody.part_errors import part_errors
-from tolalloc.multibody.prototype import RIGID, with_rigid_bearings
-from tolalloc.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.multibody.solvers.pin_forces import fill_forces, pin_contacts
-from tolalloc.multibody.teeth import mesh_of
-from tolalloc.multibody.time_course import TimeCourse
-from tolalloc.reducer.design import Modification, Reducer
-from tolalloc.reducer.files import load_reducer
+from tolalloc.rv.cycloid.clearance import exact_clearance
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.multibody import engine as door
+from tolalloc.rv.multibody.drive import Damping, Drive
+from tolalloc.rv.multibody.masses import Masses
+from tolalloc.rv.multibody.part_errors import part_errors
+from tolalloc.rv.multibody.prototype import RIGID, with_rigid_bearings
+from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
+from tolalloc.rv.multibody.solvers.pin_forces import fill_forces, pin_contacts
+from tolalloc.rv.multibody.teeth import mesh_of
+from tolalloc.rv.multibody.time_course import TimeCourse
+from tolalloc.rv.reducer.design import Modification, Reducer
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 
 pytest.importorskip("exudyn")

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.worst_case import worst_case
+from tolalloc.differences import DifferencedResponse
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.limited_measure import limited_measure
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.response.differences import DifferencedResponse
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import KernelResponse, WithDerivatives
-from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.limited_measure import limited_measure
-from tolalloc.uncertainty.seeds import SeedTree
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.zones import Feature
+from tolalloc.model import Evaluation
+from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
 
 SEEDS = SeedTree(0).child("worst case")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tolalloc.allocation.programs import SETTLED
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
-from tolalloc.reducer.design import Modification
+from tolalloc.rv.reducer.design import Modification
 
 
 def scale_by_hand(verifier: Verifier, modification: Modification, steps: int) -> tuple[VerifiedDesign, ...]:

@@ -13,10 +13,10 @@ from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.allocation.cost.sampled import made_together
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.sources import Source
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import CycloidStage, Modification
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.sources import Source
+from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import MICROMETRE
 
 FLANK = "flank clearance [µm]"
@@ -66,7 +66,7 @@ class DesignSpace:
     Notes
     -----
     A design is a vector: the scale of every group [-], then flank and radial clearance [µm]. Clearances and
-    amounts map to each other one to one, `tolalloc.reducer.design.Modification.from_clearances`.
+    amounts map to each other one to one, `tolalloc.rv.reducer.design.Modification.from_clearances`.
     """
 
     errors: ErrorModel

@@ -19,8 +19,8 @@ from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.surrogate.regression import Surrogate
-from tolalloc.uncertainty.seeds import SeedTree
 
 _SPAN = 2.5
 """Factor around the scales of a design within which the surrogate learns [-]."""

@@ -13,8 +13,8 @@ from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSoluti
 from tolalloc.allocation.program.problem import AllocationProblem, Shared, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
+from tolalloc.drawing.tolerance_table import with_zones
 from tolalloc.exceptions import SolveError
-from tolalloc.uncertainty.tolerance_table import with_zones
 
 AMOUNT_STEP = 0.5
 """Step of the modification amounts on a drawing [µm]."""

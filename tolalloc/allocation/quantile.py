@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import KernelResponse
+from tolalloc.model import Evaluation
+from tolalloc.rv.response.kernel import KernelResponse
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Solution
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
-from tolalloc.response.kernel import KernelResponse
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.rv.response.kernel import KernelResponse
 
 COST_CHANGE = 0.2
 """Relative change of every cost, up or down, in the corners that are tried [-]."""

@@ -12,11 +12,11 @@ from jaxtyping import Float
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.worst_case import worst_case
-from tolalloc.response.differences import DifferencedResponse
-from tolalloc.response.interface import Evaluation
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives
-from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.differences import DifferencedResponse
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.model import Evaluation
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
 from tolalloc.units import MICROMETRE
 
 _SCALE_STEP = 0.05

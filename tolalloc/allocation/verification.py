@@ -12,9 +12,9 @@ from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits, OutputTrial
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import Step, check_steps, steps_in_order
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import read_toml, shipped_or_path, validated
-from tolalloc.reducer.files import PRESETS
+from tolalloc.rv.reducer.files import PRESETS
 from tolalloc.units import ARCSECOND
 
 DATA = Path(__file__).parent / "data"

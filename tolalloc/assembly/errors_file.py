@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from tolalloc.assembly.chain_records import LARGEST
 from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.uncertainty.table_file import TextTable, read_text_table, split_header
 from tolalloc.units import ARCSECOND
 
 HEADERS = ("part", "x [arcsec]", "y [arcsec]", "z [arcsec]")

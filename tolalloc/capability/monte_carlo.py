@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import beta
 
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.sampling import SamplingDesign, uniform_chunks
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.response.interface import Evaluation, Response
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.sampling import SamplingDesign, uniform_chunks
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.model import Evaluation, Response
 
 CONFIDENCE = 0.95
 LARGEST_FAILED_SHARE = 0.01

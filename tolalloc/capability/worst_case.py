@@ -10,10 +10,10 @@ from jaxtyping import Float
 
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
 from tolalloc.capability.zone_moves import extreme_in_zone, moved_towards
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import ResponseWithDerivatives
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.model import ResponseWithDerivatives
 
 _WEIGHT = 0.3
 """Weight of the newest gradient in the mean of all before [-]."""

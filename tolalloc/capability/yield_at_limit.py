@@ -20,8 +20,8 @@ from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.rare_failure.result import RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Monte Carlo"
 RARE = 1e-3

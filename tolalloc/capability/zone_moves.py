@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 
 _TURNS = 0.5 ** np.arange(2, 8)
 """Steps of the search over the phases of waves [turn]."""

@@ -41,10 +41,10 @@ def allocate(
         seed=study.seed if seed is None else seed,
     )
     # The report's libraries take half a second to import; a misspelt script need not wait for them.
+    from tolalloc.allocation.answer.document import allocation_document
+    from tolalloc.allocation.answer.drawing import drawing_table, write_drawing
+    from tolalloc.allocation.answer.results import AllocationResults
     from tolalloc.cli.document_script import written
-    from tolalloc.report.allocation.document import allocation_document
-    from tolalloc.report.allocation.drawing import drawing_table, write_drawing
-    from tolalloc.report.allocation.results import AllocationResults
     from tolalloc.report.document import Document
     from tolalloc.study.allocation import allocate_study
 

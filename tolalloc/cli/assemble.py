@@ -24,12 +24,12 @@ def assemble(
 ) -> None:
     """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
+    from tolalloc.assembly.answer.characteristics import characteristic_table
+    from tolalloc.assembly.answer.document import assembly_document
+    from tolalloc.assembly.answer.tables import step_table
+    from tolalloc.assembly.study import AssemblyStudy, prepare_assembly
+    from tolalloc.assembly.study import assemble as assembled
     from tolalloc.cli.document_script import written
-    from tolalloc.report.assembly.characteristics import characteristic_table
-    from tolalloc.report.assembly.document import assembly_document
-    from tolalloc.report.assembly.tables import step_table
-    from tolalloc.study.assembly import AssemblyStudy, prepare_assembly
-    from tolalloc.study.assembly import assemble as assembled
     from tolalloc.study.run_folder import require_usable
 
     prepared = prepare_assembly(AssemblyStudy(chain=chain, measured=measured, precision=precision, seed=seed))

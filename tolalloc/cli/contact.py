@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tolalloc.cycloid.assessment import Assessment, assess
-from tolalloc.cycloid.solvers.contact_law import LAWS
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reducer.design import Reducer
+from tolalloc.rv.cycloid.assessment import Assessment, assess
+from tolalloc.rv.cycloid.solvers.contact_law import LAWS
+from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import MILLIMETRE
 
 MOST_PHASES = 3600

@@ -16,9 +16,9 @@ def costs(
     as_json: AsJson = False,
 ) -> None:
     """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
+    from tolalloc.allocation.cost.fits_answer import cost_fits_document, fits_table, fitted_processes
     from tolalloc.allocation.cost.points_file import load_shop_points
     from tolalloc.cli.document_script import written
-    from tolalloc.report.cost_fits import cost_fits_document, fits_table, fitted_processes
 
     found = fitted_processes(load_shop_points(shop))
     document = cost_fits_document(found, shop.name)

@@ -29,10 +29,10 @@ def diagnose(
 ) -> None:
     """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
+    from tolalloc.bench.diagnosis.answer.document import diagnosis_document, source_table
+    from tolalloc.bench.diagnosis.study import DiagnosisStudy, diagnose_unit
     from tolalloc.cli.document_script import written
-    from tolalloc.report.diagnosis.document import diagnosis_document, source_table
     from tolalloc.study.definition import Study
-    from tolalloc.study.diagnosis import DiagnosisStudy, diagnose_unit
     from tolalloc.study.run_folder import require_usable
 
     asked = DiagnosisStudy(

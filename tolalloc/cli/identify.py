@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
 from tolalloc.cli.console import (
     AsJson,
     ReportFolder,
@@ -20,10 +21,9 @@ from tolalloc.cli.console import (
 )
 from tolalloc.exceptions import InputError
 from tolalloc.files import require_new
-from tolalloc.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_reducer, write_identified_stiffness
-from tolalloc.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 
 PLACE = "tolalloc identify"
 
@@ -52,12 +52,12 @@ def identify(
 ) -> None:
     """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
+    from tolalloc.bench.identification.answer.document import identification_document
+    from tolalloc.bench.identification.answer.tables import estimates_table, short_choices_table
+    from tolalloc.bench.identification.study import IdentificationStudy
+    from tolalloc.bench.identification.study import identify as identified
+    from tolalloc.bench.measurement.files import load_measurements
     from tolalloc.cli.document_script import written
-    from tolalloc.measurement.files import load_measurements
-    from tolalloc.report.identification.document import identification_document
-    from tolalloc.report.identification.tables import estimates_table, short_choices_table
-    from tolalloc.study.identification import IdentificationStudy
-    from tolalloc.study.identification import identify as identified
     from tolalloc.study.run_folder import require_usable
 
     design = load_reducer(reducer)

@@ -31,16 +31,16 @@ from tolalloc.cli.rank import rank
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.study_script import load_study
 from tolalloc.cli.transmission_error import as_table, attribution_table, unit_answer
+from tolalloc.drawing.unit_file import load_unit
 from tolalloc.exceptions import TolallocError
-from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.study.definition import Study, prepare
-from tolalloc.uncertainty.unit_file import load_unit
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
-    from tolalloc.allocation.modification.rotated_profile import Metric
-    from tolalloc.cycloid.tooth_profile import ToothProfile
     from tolalloc.report.document import Document
+    from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+    from tolalloc.rv.modification.rotated_profile import Metric
 
 app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
@@ -174,8 +174,8 @@ def contact(
     announce_compilation("cycloid")
     found = contact_answer(design, torque, law, exact, phases)
     # The report's libraries take half a second to import, and only these lines need them.
-    from tolalloc.report.contact import contact_document
-    from tolalloc.report.contact_tables import contact_table, profile_table
+    from tolalloc.rv.teeth.contact import contact_document
+    from tolalloc.rv.teeth.contact_tables import contact_table, profile_table
 
     document = contact_document(found)
     _write_asked(document, out, found.profile, profile, points)
@@ -207,7 +207,7 @@ def modify(
     as_json: AsJson = False,
 ) -> None:
     """Choose equidistant and shift amount by a published method, beside a sure reference and other algorithms."""
-    from tolalloc.study.modification import ModificationStudy, choose
+    from tolalloc.rv.modification.study import ModificationStudy, choose
 
     study = ModificationStudy(
         method=method,
@@ -225,7 +225,7 @@ def modify(
     announce_compilation("cycloid")
     with UnitProgress("searches") as progress:
         results = choose(study, design, asked, progress)
-    from tolalloc.report.modification import algorithms_table, delivered_table, modification_document
+    from tolalloc.rv.modification.answer import algorithms_table, delivered_table, modification_document
 
     document = modification_document(results)
     _write_asked(document, out, results.assessment.profile, profile, points)
@@ -256,7 +256,7 @@ def compare(
 ) -> None:
     """Two finished studies side by side: answers, rankings, zones."""
     from tolalloc.cli.document_script import written
-    from tolalloc.report.comparison import Comparison, comparison_document, ranking_table, zones_table
+    from tolalloc.study.comparison import Comparison, comparison_document, ranking_table, zones_table
     from tolalloc.study.run_folder import read_run
 
     comparison = Comparison(first=read_run(first), second=read_run(second))
@@ -273,7 +273,7 @@ def compare(
 
 def _require_writable(out: Path | None, file: Path | None, points: int) -> None:
     """Refuse a report or a profile that could not be written, before anything long runs."""
-    from tolalloc.report.profile_files import require_profile_file
+    from tolalloc.rv.teeth.profile_files import require_profile_file
     from tolalloc.study.run_folder import require_usable
 
     if out:
@@ -285,7 +285,7 @@ def _require_writable(out: Path | None, file: Path | None, points: int) -> None:
 def _write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
     """Write the report and the profile that were asked for."""
     from tolalloc.cli.document_script import written
-    from tolalloc.report.profile_files import write_profile
+    from tolalloc.rv.teeth.profile_files import write_profile
 
     if out:
         written(out, lambda: document)

@@ -23,10 +23,10 @@ def mount(
 ) -> None:
     """Build the units with the least peak-to-peak from measured parts: who goes where, turned how far."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
+    from tolalloc.assembly.mounting.answer import fitting_table, mounting_document, unit_table
+    from tolalloc.assembly.mounting.study import MountingStudy, prepare_mounting
+    from tolalloc.assembly.mounting.study import mount as mounted
     from tolalloc.cli.document_script import written
-    from tolalloc.report.mounting import fitting_table, mounting_document, unit_table
-    from tolalloc.study.mounting import MountingStudy, prepare_mounting
-    from tolalloc.study.mounting import mount as mounted
     from tolalloc.study.run_folder import require_usable
 
     asked = MountingStudy(parts=parts, reducer=reducer, torque_nm=torque, starts=starts, seed=seed)

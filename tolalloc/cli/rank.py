@@ -25,8 +25,8 @@ def rank(
     # The report's libraries take half a second to import; a misspelt script need not wait for them.
     from tolalloc.cli.document_script import written
     from tolalloc.report.document import Document
-    from tolalloc.report.ranking.document import ranking_document
-    from tolalloc.report.ranking.driver_tables import ranking_table
+    from tolalloc.sensitivity.answer.document import ranking_document
+    from tolalloc.sensitivity.answer.driver_tables import ranking_table
     from tolalloc.study.ranking import rank as ranked
 
     announce_compilation()

@@ -9,16 +9,16 @@ from jaxtyping import Float
 from rich.markup import escape
 from rich.table import Table
 
-from tolalloc.cycloid.clearance import linear_model_warnings
-from tolalloc.equivalent.attribution import attribute
-from tolalloc.equivalent.hysteresis import LOOP_ANGLES, LOOP_ASSUMPTION, both_directions, hysteresis_loop
-from tolalloc.equivalent.kinematics import HARMONICS
-from tolalloc.equivalent.model import EquivalentModel
-from tolalloc.equivalent.outputs import OUTPUTS, Solved, order_spectrum
-from tolalloc.equivalent.status import Status, count_statuses
+from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.exceptions import SolveError
-from tolalloc.reducer.design import Reducer
-from tolalloc.uncertainty.unit_file import BuiltUnit
+from tolalloc.rv.cycloid.clearance import linear_model_warnings
+from tolalloc.rv.equivalent.attribution import attribute
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, LOOP_ASSUMPTION, both_directions, hysteresis_loop
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, order_spectrum
+from tolalloc.rv.equivalent.status import Status, count_statuses
+from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 

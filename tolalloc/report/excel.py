@@ -8,9 +8,9 @@ import pandas as pd
 from openpyxl.styles import Alignment, Font
 from openpyxl.utils import get_column_letter
 
+from tolalloc.drawing.tolerance_table import table_frame
 from tolalloc.report import tables
 from tolalloc.report.results import StudyResults
-from tolalloc.uncertainty.tolerance_table import table_frame
 
 
 def write_workbook(results: StudyResults, path: Path) -> None:

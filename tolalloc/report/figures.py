@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tolalloc.allocation.answer.before_after import units_figure, zones_figure
 from tolalloc.report import tables
-from tolalloc.report.before_after import units_figure, zones_figure
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.results import StudyResults
 from tolalloc.units import ARCSECOND, DEGREE

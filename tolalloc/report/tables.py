@@ -11,11 +11,11 @@ from jaxtyping import Float
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.capability.indices import Limits, quantile_interval
 from tolalloc.capability.indices import capability as sample_capability
-from tolalloc.cycloid.assessment import Assessment
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.tolerance_table import with_zones
 from tolalloc.report.results import StudyResults
-from tolalloc.report.sobol_table import sobol_table
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.tolerance_table import with_zones
+from tolalloc.rv.cycloid.assessment import Assessment
+from tolalloc.sensitivity.answer.sobol_table import sobol_table
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
 
 

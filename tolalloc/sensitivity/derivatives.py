@@ -9,12 +9,12 @@ from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.response.interface import ResponseWithDerivatives
+from tolalloc.model import ResponseWithDerivatives
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import MICROMETRE
 
 _STEP = 1e-4

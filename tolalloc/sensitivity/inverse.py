@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.indices import quantile_interval
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Response
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.model import Response
 
 _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""

@@ -17,13 +17,13 @@ from SALib.sample import morris
 
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Response
+from tolalloc.model import Response
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
 
 _CURVE_POINTS = 100
 """Points at which delta compares two densities, SALib's number."""

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Evaluation, Response
+from tolalloc.model import Evaluation, Response
 from tolalloc.sensitivity.ranking import percentile_interval, rank_interval
 from tolalloc.sensitivity.saltelli import resample_counts
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
 
 _RESAMPLES = 400
 _AT_ONCE = 128

@@ -14,14 +14,14 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.response.interface import Evaluation, Response
+from tolalloc.model import Evaluation, Response
 from tolalloc.sensitivity.growth import Resampled, grow_until_stable
 from tolalloc.sensitivity.saltelli import SaltelliIndices, saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SaltelliDesign
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, overall_ranking
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
 
 _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.limited_measure import limited_measure
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.sensitivity.ranking import percentile_interval
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.limited_measure import limited_measure
-from tolalloc.uncertainty.seeds import SeedTree
 
 WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.answer.results import AllocationResults, Fronts
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.unit_price import YieldLadder, best_yield
 from tolalloc.allocation.design_space import ClearanceRange, DesignSpace
@@ -23,16 +24,16 @@ from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.report.allocation.results import AllocationResults, Fronts
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.response.stiffness import StiffnessResponse
+from tolalloc.progress import Progress, Record
+from tolalloc.rv.equivalent.status import OUTCOMES
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.stiffness import StiffnessResponse
 from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared, Study, prepare
 from tolalloc.study.effort import QUICK, AllocationEffort
-from tolalloc.study.stages import Progress, Record
-from tolalloc.uncertainty.seeds import SeedTree
 
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
@@ -223,7 +224,7 @@ def allocate_study(
     SolveError
         Too many units failed.
     """
-    prepared, record = prepare(replace(study, effort=QUICK) if quick else study), Record(progress)
+    prepared, record = prepare(replace(study, effort=QUICK) if quick else study), Record(progress, OUTCOMES)
     require_groups(prepared.space, f"study {study.name}")
     if study.grades:
         group_options(with_shared_zones(prepared.space))  # before anything long runs

@@ -17,24 +17,24 @@ from tolalloc.allocation.guarantee import AtYield, Guarantee
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
-from tolalloc.equivalent.columns import source_name
-from tolalloc.equivalent.kinematics import HARMONICS
-from tolalloc.equivalent.model import EquivalentModel
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import Correlation
+from tolalloc.drawing.correlation_file import load_correlations
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.sources import Source, neglected_columns
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reducer.design import Reducer
-from tolalloc.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
-from tolalloc.reducer.stiffness import IdentifiedStiffness
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.response.outputs import OTHER_OUTPUTS
-from tolalloc.response.stiffness import stiffness_source
+from tolalloc.rv.equivalent.columns import source_name
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.outputs import OTHER_OUTPUTS
+from tolalloc.rv.response.stiffness import stiffness_source
 from tolalloc.study.effort import Effort
-from tolalloc.uncertainty.correlated import CorrelatedSource
-from tolalloc.uncertainty.correlation import Correlation
-from tolalloc.uncertainty.correlation_file import load_correlations
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.sources import Source, neglected_columns
-from tolalloc.uncertainty.tolerance_table import load_tolerance_table
-from tolalloc.uncertainty.unit_file import BuiltUnit, load_unit
 from tolalloc.units import MICROMETRE
 
 NEGLECTED = (

@@ -9,11 +9,11 @@ import numpy as np
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
 from tolalloc.capability import yield_at_limit
+from tolalloc.drawing.sampling import SamplingDesign
 from tolalloc.exceptions import InputError
 from tolalloc.sensitivity import screening, target
 from tolalloc.sensitivity.sobol import SobolEffort
 from tolalloc.surrogate import validation
-from tolalloc.uncertainty.sampling import SamplingDesign
 
 _FEWEST = {
     "units": target.fewest_units(),

@@ -9,8 +9,12 @@ from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
+from tolalloc.rv.stand_ins.contact import ContactCandidate
+from tolalloc.rv.stand_ins.curve import CurveCandidate
 from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
 from tolalloc.sensitivity.derivatives import (
     DerivativeMeasures,
@@ -32,12 +36,8 @@ from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
 from tolalloc.study.definition import Prepared
 from tolalloc.study.effort import RankingEffort
 from tolalloc.surrogate.choice import Choice, choose
-from tolalloc.surrogate.contact import ContactCandidate
-from tolalloc.surrogate.curve import CurveCandidate
 from tolalloc.surrogate.regression import RegressionCandidate, quadratic_regression, sparse_quadratic_regression
 from tolalloc.surrogate.validation import Candidate
-from tolalloc.uncertainty.error_model import ErrorModel
-from tolalloc.uncertainty.seeds import SeedTree
 
 _ANGLES = (468, 936)
 """Angles at which the contact is solved without a search between them [-]."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tolalloc.blas import one_blas_thread
-from tolalloc.report.ranking.results import RankingResults
-from tolalloc.response.kernel import PEAK_TO_PEAK
-from tolalloc.response.outputs import wave_outputs
+from tolalloc.progress import Progress, Record
+from tolalloc.rv.equivalent.status import OUTCOMES
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK
+from tolalloc.rv.response.outputs import wave_outputs
+from tolalloc.sensitivity.answer.results import RankingResults
 from tolalloc.sensitivity.order_contribution import order_contribution
 from tolalloc.study.definition import Study, prepare
 from tolalloc.study.effort import QUICK
 from tolalloc.study.measures import Measures
-from tolalloc.study.stages import Progress, Record
 
 
 def rank(study: Study, progress: Progress, *, quick: bool = False) -> RankingResults:
@@ -34,7 +35,7 @@ def rank(study: Study, progress: Progress, *, quick: bool = False) -> RankingRes
     SolveError
         Too many units failed.
     """
-    prepared, record = prepare(replace(study, effort=QUICK) if quick else study), Record(progress)
+    prepared, record = prepare(replace(study, effort=QUICK) if quick else study), Record(progress, OUTCOMES)
     measures = Measures(prepared=prepared, kernel=replace(prepared.kernel, observe=record.observe))
     limits, orders = measures.limits, measures.orders
     with one_blas_thread():

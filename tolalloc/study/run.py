@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from tolalloc.progress import Progress, Record
 from tolalloc.report.results import StudyResults
+from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.study.definition import Study, prepare
 from tolalloc.study.effort import QUICK
 from tolalloc.study.run_folder import claimed, require_usable, write_run
-from tolalloc.study.stages import Progress, Record, run_stages
+from tolalloc.study.stages import run_stages
 
 
 def run_study(study: Study, folder: Path, progress: Progress, *, quick: bool = False) -> StudyResults:
@@ -34,7 +36,7 @@ def run_study(study: Study, folder: Path, progress: Progress, *, quick: bool = F
     require_usable(folder)
     if quick:
         study = replace(study, effort=QUICK)
-    prepared, record = prepare(study), Record(progress)
+    prepared, record = prepare(study), Record(progress, OUTCOMES)
     with claimed(folder):
         results = run_stages(prepared, record, quick)
         write_run(folder, prepared, results, record)

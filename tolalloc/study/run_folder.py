@@ -14,18 +14,18 @@ from typing import Any
 import numba
 import pandas as pd
 
+from tolalloc.drawing.tolerance_table import table_frame
 from tolalloc.exceptions import InputError, RunFolderError
+from tolalloc.progress import Record
 from tolalloc.report import tables
-from tolalloc.report.comparison import HIGH, LOW, TOTAL, FinishedRun
 from tolalloc.report.document import write_json
 from tolalloc.report.excel import write_workbook
 from tolalloc.report.figure import save_png
 from tolalloc.report.figures import study_figures
 from tolalloc.report.page import write_page
 from tolalloc.report.results import StudyResults
+from tolalloc.study.comparison import HIGH, LOW, TOTAL, FinishedRun
 from tolalloc.study.definition import Prepared
-from tolalloc.study.stages import Record
-from tolalloc.uncertainty.tolerance_table import table_frame
 
 _NEEDED = ("limit [arcsec]", "met", "yield [-]", "cost [cost units]")
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)

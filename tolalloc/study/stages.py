@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import time
-from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from typing import Protocol, runtime_checkable
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.fronts import exact_front, searched_front
@@ -18,20 +13,20 @@ from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.cycloid.assessment import Assessment, assess
-from tolalloc.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.equivalent.outputs import order_spectrum
-from tolalloc.equivalent.status import Status
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.reducer.design import Modification, Reducer
+from tolalloc.progress import Record
 from tolalloc.report.results import ExampleUnit, StudyResults
-from tolalloc.response.kernel import PEAK_TO_PEAK, KernelResponse
-from tolalloc.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
+from tolalloc.rv.cycloid.assessment import Assessment, assess
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.outputs import order_spectrum
+from tolalloc.rv.reducer.design import Modification, Reducer
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
 from tolalloc.sensitivity.classical import classical_estimate
 from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared
-from tolalloc.uncertainty.seeds import SeedTree
 from tolalloc.units import ARCMINUTE
 
 _FIRST_SPREAD = 3.1
@@ -44,57 +39,6 @@ _EFFECT_UNITS = 256
 """Units over which the effect of the stiffness is averaged [-]."""
 _DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
 """Directions in which the stiffnesses are changed together, either way, and units that the kernel solves there [-]."""
-
-
-@runtime_checkable
-class Progress(Protocol):
-    """What shows a person how far the work has come."""
-
-    def begin(self, stage: str) -> None:
-        """Begin a stage."""
-        ...
-
-    def advance(self, units: int) -> None:
-        """So many more units are solved."""
-        ...
-
-
-@dataclass
-class Record:
-    """What the manifest says of the run itself: statuses and times per stage.
-
-    Parameters
-    ----------
-    progress
-        Told of every stage and every chunk of units.
-    """
-
-    progress: Progress
-    statuses: Counter[int] = field(default_factory=Counter)
-    stages: dict[str, dict[str, float]] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time a stage and count its units."""
-        self.progress.begin(name)
-        units, start = sum(self.statuses.values()), time.perf_counter()
-        yield
-        seconds, solved = time.perf_counter() - start, sum(self.statuses.values()) - units
-        self.stages[name] = {
-            "seconds": round(seconds, 3),
-            "units": solved,
-            "units per second": round(solved / seconds, 1),
-        }
-
-    def observe(self, status: UInt8[np.ndarray, " sample"]) -> None:
-        """Count the statuses of one chunk."""
-        self.statuses.update(int(value) for value in status)
-        self.progress.advance(status.size)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Outcome → number of units."""
-        return {status.sentence: self.statuses[int(status)] for status in Status}
 
 
 def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:

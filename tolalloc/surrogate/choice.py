@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.response.interface import Response
+from tolalloc.model import Response
 from tolalloc.surrogate.regression import NEEDED_Q2
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
-from tolalloc.uncertainty.seeds import SeedTree
 
 
 @dataclass(frozen=True, kw_only=True)

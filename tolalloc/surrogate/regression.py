@@ -17,7 +17,7 @@ from sklearn.linear_model import LassoCV, RidgeCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from tolalloc.response.interface import Evaluation
+from tolalloc.model import Evaluation
 
 NEEDED_Q2 = 0.95
 """A surrogate below this Q² is not used; the response itself runs instead."""
@@ -38,7 +38,7 @@ class Regression:
     Parameters
     ----------
     columns, outputs
-        As in `tolalloc.response.interface.Response`.
+        As in `tolalloc.model.Response`.
     estimator
         The fitted scikit-learn estimator of the output over the baseline.
     baseline
@@ -92,7 +92,7 @@ class RegressionCandidate:
     name
         What a table calls it.
     columns, outputs
-        As in `tolalloc.response.interface.Response`.
+        As in `tolalloc.model.Response`.
     estimator
         Makes the unfitted scikit-learn regressor.
     """

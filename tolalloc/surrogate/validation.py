@@ -13,9 +13,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.response.interface import Response
-from tolalloc.uncertainty.seeds import SeedTree
+from tolalloc.model import Response
 
 FOLDS = 5
 FEWEST_OF_FOLD = 2

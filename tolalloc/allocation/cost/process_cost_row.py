@@ -22,10 +22,10 @@ from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel
 from tolalloc.allocation.cost.points import Points
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.table_rows import TableRow
+from tolalloc.drawing.tolerance_row import LARGEST_ZONE
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.table_rows import TableRow
-from tolalloc.uncertainty.tolerance_row import LARGEST_ZONE
 from tolalloc.units import MICROMETRE
 
 Cost = Annotated[float, Field(ge=0, le=1e9)]

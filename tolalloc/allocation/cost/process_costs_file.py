@@ -12,11 +12,11 @@ from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.cost.points_file import ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.table_rows import read_rows
+from tolalloc.drawing.unit_file import DATA
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.table_rows import read_rows
-from tolalloc.uncertainty.unit_file import DATA
 from tolalloc.units import MICROMETRE
 
 ProcessesOfSources = Mapping[str, tuple[Process, ...]]

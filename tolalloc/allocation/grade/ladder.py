@@ -10,9 +10,9 @@ from jaxtyping import Float
 
 from tolalloc.allocation.grade.iso286 import grade_zones, size_step
 from tolalloc.allocation.grade.preferred import SERIES, ZONES
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.sources import Source
-from tolalloc.uncertainty.zones import Feature
 from tolalloc.units import MICROMETRE
 
 RADII = ("radius", "groove")

@@ -13,7 +13,7 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.response.interface import Response
+from tolalloc.model import Response
 
 COST = Objective(name="cost [cost units]")
 

@@ -15,10 +15,10 @@ from tolalloc.allocation.pareto.genetic import search
 from tolalloc.allocation.pareto.indicators import knee, spread_over
 from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.surrogate.regression import Baseline, Regression, Surrogate, fitted, gaussian_process
 from tolalloc.surrogate.validation import FOLDS, Answers, answers_of, cross_validate
-from tolalloc.uncertainty.seeds import SeedTree
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,8 +24,8 @@ from tolalloc.allocation.pareto.found import Found
 from tolalloc.allocation.pareto.indicators import spread_over
 from tolalloc.allocation.pareto.problem import Genes, ParetoProblem
 from tolalloc.allocation.pareto.remembered import RememberedProblem
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 
 _MARGIN = 0.49
 """How far the operators may leave the range of an integer gene, so that its ends are drawn as often as the rest [-]."""

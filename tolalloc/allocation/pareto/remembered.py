@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.pareto.answers import Answers, Checkpoint
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives, ParetoProblem
-from tolalloc.response.interface import Evaluation, Response
+from tolalloc.model import Evaluation, Response
 
 
 class RememberedProblem:

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from scipy.special import ndtr
 
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitStateWithGradient
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 
 _STEP = 1e-4
 _VALUE_TOLERANCE = 1e-6

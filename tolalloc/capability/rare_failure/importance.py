@@ -12,8 +12,8 @@ from scipy.special import log_ndtr, logsumexp, ndtr
 from tolalloc.capability.rare_failure.form import DesignPoint, DesignPoints
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.capability.rare_failure.result import RareFailure
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Importance sampling"
 WIDE_SHARE = 0.2

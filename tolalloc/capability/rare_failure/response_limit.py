@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.capability.rare_failure.limit_state import LimitValues
-from tolalloc.response.interface import Response, ResponseWithDerivatives
-from tolalloc.uncertainty.error_model import ErrorModel
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.model import Response, ResponseWithDerivatives
 
 _STEP = 1e-3
 """Step of the differences in standard normal space; up to 6, rounding and curvature both cost less than 1e-4 [-]."""

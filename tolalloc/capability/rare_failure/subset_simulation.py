@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.capability.rare_failure.result import Level, RareFailure
+from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.uncertainty.seeds import SeedTree
 
 METHOD = "Subset simulation"
 _LENGTH = 10

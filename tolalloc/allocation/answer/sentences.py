@@ -1,0 +1,185 @@
+"""The answer of an allocation in sentences, each no stronger than what was computed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.allocation.answer.results import AllocationResults
+from tolalloc.allocation.answer.tables import guarantee_text, limit_price, unit_of
+from tolalloc.allocation.robustness import COST_CHANGE, SAME
+from tolalloc.allocation.verification import VerifiedDesign
+
+_NOTHING = 1e-3
+"""Price of a whole limit, over the cost, below which it costs nothing [-]."""
+_SAME_COST = 5e-4
+"""Relative difference of costs below which they are printed alike [-]."""
+
+
+def answer(results: AllocationResults) -> tuple[str, ...]:
+    """Return the answer in sentences."""
+    chosen, joint = results.chosen, results.joint
+    achieved = chosen.achieved
+    found = [
+        f"{'Met' if chosen.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units} fresh units keep "
+        f"{joint.limit:g}″ (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
+    ]
+    if len(results.requirements) > 1:
+        found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
+    found.append(_cost(results))
+    return (
+        *found,
+        *_certificate(results),
+        *_modification(results),
+        *_prices(results),
+        *_good_unit(results),
+        *_settled(results),
+    )
+
+
+def missed(design: VerifiedDesign) -> str:
+    """Return which limit blocks a design that is not met, and by how much."""
+    check = design.blocking
+    side, unit = check.tightest, unit_of(check.requirement.output)
+    kept = f"{check.requirement.output.split(' [')[0]}, limit {side.limit:g} {unit}: "
+    shown = guarantee_text(check.requirement.guarantee)
+    if not np.isfinite(side.value):
+        return f"{kept}too many units have no answer to show any limit kept (shown for {shown})"
+    return f"{kept}it keeps {side.value:.4g} {unit} (shown for {shown}), {side.excess:.3g} {unit} beyond"
+
+
+def least_saving(results: AllocationResults) -> float:
+    """Return the saving against uniform scaling that uses the limit to its last arcsecond [-]."""
+    joint = results.joint
+    return 1 - (1 - joint.saving_at_least) * results.chosen.cost / joint.chosen.cost
+
+
+def _against(cost: float, other: float) -> str:
+    """Return how a cost stands against another one, in words."""
+    change = cost / other - 1
+    if abs(change) < _SAME_COST:
+        return "as much as"
+    return f"{abs(change):.1%} {'below' if change < 0 else 'above'}"
+
+
+def _cost(results: AllocationResults) -> str:
+    """Return what the drawing costs, and what uniform scaling does."""
+    chosen, hand = results.chosen, results.joint.by_hand
+    used = ", which missed a limit"
+    if hand.met:
+        least = chosen.cost / (1 - least_saving(results))
+        used = f", and {_against(chosen.cost, least)} that had it used the limit to its last arcsecond ({least:.2f})"
+    return (
+        f"Cost {chosen.cost:.2f} cost units, {_against(chosen.cost, hand.cost)} all zones scaled alike with the "
+        f"modification as it is ({hand.cost:.2f}){used}."
+    )
+
+
+def _certificate(results: AllocationResults) -> tuple[str, ...]:
+    """Return how far from optimal the answer can be."""
+    return (*_free(results), *_graded(results))
+
+
+def _free(results: AllocationResults) -> tuple[str, ...]:
+    """Return what is certified of free zones; nothing where they miss a limit."""
+    joint = results.joint
+    if not joint.chosen.met:
+        return ()
+    of_margin = (joint.inside.cost - joint.optimum.cost) / joint.bound
+    margin = (
+        f", {100 * of_margin:.1f} points of that for the margin of one standard error that the search keeps"
+        if of_margin >= _SAME_COST
+        else ""
+    )
+    design = "the verified design with free zones" if results.graded else "the verified design"
+    return (
+        f"Certified: by the local models around {design}, no zones, processes and clearances that keep the limits cost "
+        f"less than {joint.bound:.2f}; it costs {max(joint.gap, 0.0):.1%} more ({joint.chosen.cost:.2f}){margin}.",
+    )
+
+
+def _graded(results: AllocationResults) -> tuple[str, ...]:
+    """Return what is certified of grades, if they were asked for."""
+    graded, free = results.graded, results.joint.chosen
+    if not graded:
+        return ()
+    cost = f"On grades and preferred numbers the cost is {graded.chosen.cost:.2f}"
+    if free.met:
+        cost += f", {_against(graded.chosen.cost, free.cost)} free zones"
+    if not graded.chosen.met:
+        return (f"{cost}, and a limit is missed.",)
+    return (
+        f"{cost}; by the local models around it no choice of grades, processes and rounded amounts near by that keeps "
+        f"the limits costs less than {graded.bound:.2f}.",
+    )
+
+
+def _modification(results: AllocationResults) -> tuple[str, ...]:
+    """Return what the modification buys."""
+    alone, joint = results.alone.chosen, results.joint.chosen
+    if not joint.met:
+        said = (f"With tolerances and modification free no design was verified: {missed(joint)}.",)
+        return said if alone.met else (*said, f"Nor with tolerances alone: {missed(alone)}.")
+    if not alone.met:
+        return (f"Tolerances alone were not verified: {missed(alone)}; the modification makes the difference.",)
+    saving = 1 - joint.cost / alone.cost
+    if saving < _SAME_COST:
+        return (f"Nothing cheaper was found with the modification free: as it is, the zones cost {alone.cost:.2f}.",)
+    doubt = ""
+    if max(results.alone.gap, results.joint.gap) > saving:
+        doubt = (
+            f" (the search for tolerances alone ended {max(results.alone.gap, 0.0):.1%} above its own certified bound, "
+            "so up to that much of it may be the search)"
+        )
+    return (
+        f"The modification saves {alone.cost - joint.cost:.2f} cost units ({saving:.1%}) against tolerances alone "
+        f"({alone.cost:.2f}){doubt}.",
+    )
+
+
+def _prices(results: AllocationResults) -> tuple[str, ...]:
+    """Return what the limits cost, to first order."""
+    joint, said = results.joint, []
+    for side in joint.chosen.sides if joint.chosen.met else ():
+        price = joint.prices[side.stack.name]
+        if price * abs(side.limit) > _NOTHING * joint.chosen.cost:
+            cost, per = limit_price(side, price)
+            said.append(
+                f"{side.stack.name.split(' [')[0]}: at its limit of {side.limit:g} {unit_of(side.stack.name)}, a "
+                f"tighter one costs at the rate of {cost:.3g} cost units per {per}, a wider one saves at the same."
+            )
+    return tuple(said)
+
+
+def _good_unit(results: AllocationResults) -> tuple[str, ...]:
+    """Return the yield with the cheapest good unit, if the study states what becomes of the others."""
+    found = results.prices
+    if found is None:
+        return ()
+    if not found.priced.size:
+        return ("No good unit has a price: no yield that was tried is both in reach and shown by so many units.",)
+    ends = {float(found.priced.max()): "or above ", float(found.priced.min()): "or below "}
+    said = f"Of the yields that were tried a good unit is cheapest at {ends.get(found.best, '')}{found.best * 100:g}%"
+    if found.priced.size == 1:
+        said = f"Of the yields that were tried only {found.best * 100:g}% has a price for a good unit"
+    return (
+        f"{said}: {np.nanmin(found.prices):.2f} cost units by the local models, not verified; units beyond the "
+        "peak-to-peak limit alone count as bad.",
+    )
+
+
+def _settled(results: AllocationResults) -> tuple[str, ...]:
+    """Return which zones do not depend on what was assumed."""
+    found = results.robustness
+    same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
+    said = [
+        f"{len(same)} of {len(found.groups)} free zones {'stays' if len(same) == 1 else 'stay'} within {SAME:.0%} "
+        f"under all changed assumptions{': ' + ', '.join(same) if same else ''}.",
+    ]
+    if found.costs:
+        dearest = max(0.0, *(variant.regret for variant in found.costs))
+        corners = f"{len(found.costs)} random corner{'' if len(found.costs) == 1 else 's'}"
+        said.append(
+            f"In {corners} of ±{COST_CHANGE * 100:g} % on every cost the free zones are at most {dearest:.2%} dearer "
+            "than the cheapest ones there."
+        )
+    return tuple(said)

@@ -1,0 +1,223 @@
+"""What the final angles do to the transmission: tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from tolalloc.assembly.answer.results import TransmissionEffect
+from tolalloc.assembly.answer.tables import rounded
+from tolalloc.report.figure import Figure, Series
+from tolalloc.report.heat_map import HeatMap
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK
+from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+
+RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
+PIN_FORCE = "largest pin force, rated torque [N]"
+DISC_FORCE = "largest sum of pin forces of a disc, rated torque [N]"
+LINE_LOAD = "largest line load, rated torque [N/mm]"
+PRESSURE = "peak pressure, rated torque [MPa]"
+DRAWN = {"peak_to_peak": PEAK_TO_PEAK, "pin_force": PIN_FORCE, "disc_force": DISC_FORCE, "line_load": LINE_LOAD}
+"""Figure name → output that is drawn over the precision."""
+_BETTER_SMALL = (PEAK_TO_PEAK, RATED_PEAK_TO_PEAK, PIN_FORCE, DISC_FORCE, LINE_LOAD, PRESSURE)
+BAND = (5.0, 95.0)
+"""Percentiles around the median of random assemblies [%]."""
+_SAME = 1e-6
+"""Share by which solutions of the same angles may differ [-]."""
+_CRANK_TURNS = 2
+"""Turns of the crank that a curve shows; a whole output turn is too many to read [-]."""
+_EVERY = 4
+"""Of the places along the width every such one has a cell [-]."""
+
+
+def answers(effect: TransmissionEffect, output: str) -> Float[np.ndarray, "precision good"]:
+    """Return an output of all assemblies that have an answer at every precision."""
+    return effect.values[:, effect.good, effect.outputs.index(output)]
+
+
+def perfect(effect: TransmissionEffect, output: str) -> float:
+    """Return an output without any angular error."""
+    return float(effect.perfect[effect.outputs.index(output)])
+
+
+def change(effect: TransmissionEffect, output: str, precision: float) -> tuple[float, float]:
+    """Return an output unadjusted and adjusted, the median of random assemblies [as the name says].
+
+    Parameters
+    ----------
+    effect
+        What the final angles do.
+    output
+        Its name.
+    precision
+        Precision of the adjusted assembly, one of the solved ones [-].
+    """
+    at = int(np.flatnonzero(effect.precisions == precision)[0])
+    before, after = np.median(answers(effect, output)[[0, at]], axis=1)
+    return float(before), float(after)
+
+
+def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
+    """Return which outputs adjusting leaves larger, with both values.
+
+    Parameters
+    ----------
+    effect
+        What the final angles do.
+    precision
+        Precision of the adjusted assembly, one of the solved ones [-].
+    """
+    found = []
+    for output in _BETTER_SMALL:
+        before, after = change(effect, output, precision)
+        if after > before * (1 + _SAME):
+            name, unit = output.removesuffix("]").split(" [")
+            at = f" at {effect.test_torque:g} N·m" if output == PEAK_TO_PEAK else ""
+            found.append(f"{name}{at} ({before:.4g} → {after:.4g} {unit})")
+    return tuple(found)
+
+
+def value_table(effect: TransmissionEffect) -> pd.DataFrame:
+    """Return every output over the precision, the median of random assemblies."""
+    names = ["perfect parts", *(f"{precision:g}" for precision in effect.precisions)]
+    values = {
+        output: [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
+        for output in effect.outputs
+    }
+    return rounded(pd.DataFrame({"precision Q [-]": names, **values}))
+
+
+def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
+    """Return by how much the outputs of that table are above those of perfect parts; a mean angle has no zero."""
+    columns: dict[str, object] = {"precision Q [-]": effect.precisions}
+    for output in effect.outputs:
+        ideal = perfect(effect, output)
+        if ideal > 0:
+            above = 100 * (np.median(answers(effect, output), axis=1) / ideal - 1)
+            columns[f"{output.split(' [')[0]}, above perfect parts [%]"] = above
+    return rounded(pd.DataFrame(columns))
+
+
+def fallen_table(effect: TransmissionEffect) -> pd.DataFrame:
+    """Return in how many random assemblies an output is smaller than unadjusted; nothing of a single one."""
+    if effect.good.size == 1:
+        return pd.DataFrame()
+    shares = {
+        f"{output.split(' [')[0]}, smaller than unadjusted [%]": 100
+        * (answers(effect, output)[1:] < answers(effect, output)[0]).mean(axis=1)
+        for output in effect.outputs
+        if perfect(effect, output) > 0
+    }
+    return rounded(pd.DataFrame({"precision Q [-]": effect.precisions[1:], **shares}))
+
+
+def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
+    """Return transmission error and pin force of a disc over the carrier angle."""
+    angle = effect.curves.carrier_angle
+    shown = angle <= _CRANK_TURNS * 2 * np.pi / effect.reducer.cycloid_stage.disc_teeth
+    labels = ("perfect parts", *(f"Q = {precision:g}" for precision in effect.precisions))
+    both = (effect.perfect_curves, effect.curves)
+    force = np.concatenate([each.disc_force for each in both])
+    error = np.concatenate([each.transmission_error for each in both]) / ARCSECOND
+
+    def drawn(curves: Iterable[Float[np.ndarray, " angle"]]) -> tuple[Series, ...]:
+        x = list(angle[shown] / DEGREE)
+        return tuple(
+            Series(label=label, kind="line", x=x, y=list(curve[shown]))
+            for label, curve in zip(labels, curves, strict=True)
+        )
+
+    return (
+        Figure(
+            name="transmission_error",
+            title=f"Transmission error at rated torque less its mean over a turn, {_CRANK_TURNS} turns of the cranks",
+            x_label="carrier angle [°]",
+            y_label="transmission error less its mean [arcsec]",
+            series=drawn(error - error.mean(axis=1, keepdims=True)),
+        ),
+        Figure(
+            name="mesh_force",
+            title="Sum of the pin forces of the disc that carries most, at rated torque",
+            x_label="carrier angle [°]",
+            y_label="sum of pin forces of a disc [N]",
+            series=drawn(force),
+        ),
+    )
+
+
+def precision_figures(effect: TransmissionEffect) -> tuple[Figure, ...]:
+    """Return largest values over the precision."""
+    return tuple(_over_precision(effect, name, output) for name, output in DRAWN.items())
+
+
+def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figure:
+    values, many = answers(effect, output), effect.good.size > 1
+    low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
+    label = f"median and band from {BAND[0]:g} to {BAND[1]:g} % of random assemblies" if many else "measured parts"
+    short = f"median, {BAND[0]:g} to {BAND[1]:g} %" if many else label
+    return Figure(
+        name=name,
+        title=f"{output.split(' [')[0].capitalize()}: {short}; dashed: perfect parts",
+        x_label="precision Q [-]",
+        y_label=output,
+        series=(
+            Series(
+                label=label,
+                kind="line",
+                x=list(effect.precisions),
+                y=list(np.median(values, axis=1)),
+                low=low,
+                high=high,
+            ),
+        ),
+        horizontal=((perfect(effect, output), ""),),
+    )
+
+
+def pressure_map(effect: TransmissionEffect, precision: float) -> HeatMap:
+    """Return the pressure along the pins that carry, unadjusted above adjusted.
+
+    Parameters
+    ----------
+    effect
+        What the final angles do.
+    precision
+        Precision of the adjusted assembly, one of the solved ones [-].
+    """
+    chosen = [(0.0, effect.patterns[0])]
+    if precision > 0:
+        chosen.append((precision, effect.patterns[int(np.flatnonzero(effect.precisions == precision)[0])]))
+    rows = [(value, pattern, pin) for value, pattern in chosen for pin in np.flatnonzero(pattern.force)]
+    first = effect.patterns[0]
+    return HeatMap(
+        name="pressure",
+        title=f"Hertz pressure of the pins that carry, disc {first.disc} at carrier angle "
+        f"{first.carrier_angle / DEGREE:.1f}°",
+        columns=[f"{place:.1f}" for place in first.position[::_EVERY] / MILLIMETRE],
+        rows=[f"Q = {value:g}, pin {pin + 1}" for value, _, pin in rows],
+        x_label="place along the width [mm]",
+        label="pressure [MPa]",
+        values=[(pattern.pressure[pin, ::_EVERY] / MEGAPASCAL).tolist() for _, pattern, pin in rows],
+    )
+
+
+def deformation_figure(effect: TransmissionEffect) -> Figure:
+    """Return the largest compression of every pin that carries."""
+    return Figure(
+        name="deformation",
+        title=f"Largest compression of the pins that carry, disc {effect.patterns[0].disc}",
+        x_label="pin [-]",
+        y_label="compression [µm]",
+        series=tuple(
+            Series(
+                label=f"Q = {precision:g}",
+                kind="points",
+                x=(np.flatnonzero(pattern.force) + 1).tolist(),
+                y=list(pattern.deformation[pattern.force > 0] / MICROMETRE),
+            )
+            for precision, pattern in zip(effect.precisions, effect.patterns, strict=True)
+        ),
+    )

@@ -1,0 +1,156 @@
+"""Which part goes where: all mountings of one unit, or exact assignments and swaps between several.
+
+Parts of one place are assigned to the units exactly, all else fixed, as the sum over the units needs no more than one
+value per unit and part. Then every unit is turned anew with the parts that it has, and what stands at different places
+of different units is exchanged. A step is taken only if it lowers the mean over the units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tolalloc.assembly.mounting.evaluation import Memory
+from tolalloc.assembly.mounting.results import MountingResult, RandomMountings
+from tolalloc.assembly.mounting.steps import Asking, Peaks, assigned, exchanged, turned, units_from
+from tolalloc.assembly.mounting.stock import Mountings, Stock
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.model import Response
+
+_GAIN = 1e-9
+"""Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""
+
+Found = tuple[Mountings, Peaks, tuple[float, ...]]
+"""A mounting, its peak-to-peaks, and the means on the way to it [arcsec]."""
+
+
+def best_mounting(
+    stock: Stock,
+    response: Response,
+    seeds: SeedTree,
+    starts: int = 4,
+    largest_failed_share: float = 0.01,
+) -> MountingResult:
+    """Return the mounting with the least mean peak-to-peak that was found; of equals, the one with the least largest.
+
+    Parameters
+    ----------
+    stock
+        The parts.
+    response
+        What is to be small, `tolalloc.rv.response.kernel.KernelResponse`.
+    seeds
+        Node of the seed tree, for all starts but the first, which takes the parts as they come.
+    starts
+        Starts of the search for several units; for one unit all mountings are tried [-].
+    largest_failed_share
+        Largest share of units without an answer [-].
+
+    Raises
+    ------
+    InputError
+        No start.
+    SolveError
+        Too many units have no answer, or one of every mounting met.
+    """
+    if starts < 1:
+        raise InputError.at("mounting", "number of starts", starts, "1 or more")
+    memory = Memory(stock=stock, response=response)
+    first = stock.as_they_come
+    before = memory(first)
+    if stock.units == 1:
+        every = units_from(stock, range(len(stock.parts)))
+        best = every[[int(np.argmin(memory(every)))]]
+        after = memory(best)
+        found: list[Found] = [(best, after, tuple(dict.fromkeys((float(before[0]), float(after[0])))))]
+    else:
+        others = (stock.random_mountings(seeds.generator(number)) for number in range(1, starts))
+        found = _together(memory, [_improved(stock, mountings) for mountings in (first, *others)])
+    mountings, after, history = min(found, key=lambda own: (float(own[1].mean()), float(own[1].max())))
+    memory.require_few_failures(largest_failed_share)
+    if not np.isfinite(after).all():
+        raise SolveError("Mounting: a unit has no equilibrium that can be trusted in any mounting met.")
+    return MountingResult(
+        stock=stock,
+        mountings=mountings,
+        before=before,
+        after=after,
+        history=history,
+        evaluations=memory.evaluations,
+        failures=memory.failures,
+    )
+
+
+def random_mounting(
+    stock: Stock, response: Response, count: int, seeds: SeedTree, largest_failed_share: float = 0.01
+) -> RandomMountings:
+    """Return what random mountings of the same parts do; for one unit, all mountings, each once.
+
+    Parameters
+    ----------
+    stock
+        The parts.
+    response
+        What is to be small.
+    count
+        Number of random mountings of several units [-].
+    seeds
+        Node of the seed tree.
+    largest_failed_share
+        Largest share of units without an answer [-].
+
+    Raises
+    ------
+    InputError
+        No mounting is asked for.
+    SolveError
+        Too many units have no answer.
+    """
+    if count < 1:
+        raise InputError.at("random mounting", "number of mountings", count, "1 or more")
+    one, generator = stock.units == 1, seeds.generator()
+    if one:
+        mountings = units_from(stock, range(len(stock.parts)))
+    else:
+        mountings = np.concatenate([stock.random_mountings(generator) for _ in range(count)])
+    memory = Memory(stock=stock, response=response)
+    values = memory(mountings)
+    memory.require_few_failures(largest_failed_share)
+    return RandomMountings(
+        peak_to_peaks=values.reshape(-1, stock.units), failures=int(np.count_nonzero(np.isinf(values))), every=one
+    )
+
+
+def _together(memory: Memory, searches: Sequence[Asking[Found]]) -> list[Found]:
+    """Return what the searches find, each as if it were alone; many units at a time keep all cores busy."""
+    found: dict[int, Found] = {}
+    asked = {number: next(search) for number, search in enumerate(searches)}
+    while asked:
+        values = memory(np.concatenate(list(asked.values())))
+        ends = np.cumsum([len(trials) for trials in asked.values()])[:-1]
+        for number, own in zip(list(asked), np.split(values, ends), strict=True):
+            try:
+                asked[number] = searches[number].send(own)
+            except StopIteration as end:
+                found[number] = end.value
+                del asked[number]
+    return [found[number] for number in range(len(searches))]
+
+
+def _improved(stock: Stock, mountings: Mountings) -> Asking[Found]:
+    """Return a mounting that no step improves."""
+    peaks = yield mountings
+    history = [float(peaks.mean())]
+    while True:
+        gained = False
+        for step in (*map(assigned, range(len(stock.places))), turned, exchanged):
+            if step is exchanged and gained:  # the dearest step waits until nothing else helps
+                break
+            trial, values = yield from step(stock, mountings, peaks)
+            if values.mean() < history[-1] - _GAIN:
+                mountings, peaks, gained = trial, values, True
+                history.append(float(values.mean()))
+        if not gained:
+            return mountings, peaks, tuple(history)

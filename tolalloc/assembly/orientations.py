@@ -1,0 +1,230 @@
+"""What the final orientations of an assembly do to the transmission: its error, the load on pins and teeth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.assembly.chain import DatumFlowChain
+from tolalloc.chunks import Mapper
+from tolalloc.drawing.sources import ANGULAR
+from tolalloc.exceptions import InputError
+from tolalloc.model import Evaluation
+from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.equivalent.columns import source_name
+from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, Observer
+from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
+from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+
+_AT_ONCE = 64
+"""Samples whose pins are read at all angles of a turn together, some 40 MB per quantity [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransmissionCurves:
+    """Transmission of samples over one output turn at one torque.
+
+    Parameters
+    ----------
+    carrier_angle
+        θc [rad].
+    transmission_error
+        Carrier rotation beyond θc, output side [rad].
+    pin_force
+        Largest force between a pin and a tooth [N].
+    disc_force
+        Largest sum of the pin forces of one disc [N].
+    line_load
+        Largest line load of pins and teeth [N/m].
+    pressure
+        Largest Hertz pressure of pins and teeth [Pa].
+    pins_in_contact
+        Pins that carry load, all discs [-].
+    status
+        Values of `tolalloc.rv.equivalent.status.Status` [-].
+    """
+
+    carrier_angle: Float[np.ndarray, " angle"]
+    transmission_error: Float[np.ndarray, "sample angle"]
+    pin_force: Float[np.ndarray, "sample angle"]
+    disc_force: Float[np.ndarray, "sample angle"]
+    line_load: Float[np.ndarray, "sample angle"]
+    pressure: Float[np.ndarray, "sample angle"]
+    pins_in_contact: Float[np.ndarray, "sample angle"]
+    status: UInt8[np.ndarray, "sample angle"]
+
+
+def transmission_curves(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "sample column"],
+    torque: float,
+    carrier_angle: Float[np.ndarray, " angle"] | None = None,
+) -> TransmissionCurves:
+    """Return the transmission of a few samples over one output turn.
+
+    Parameters
+    ----------
+    model
+        The reducer.
+    errors
+        Deviations in the order of the model's columns, `OrientationResponse.errors` [m, angles rad].
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
+    carrier_angle
+        Carrier angles; the coarse angles of the model's search unless given [rad].
+    """
+    solved = Solved.of(model.equilibria(errors, torque, carrier_angle))
+    found, pins = solved.equilibria, solved.forces.pins
+    line_load = peak_line_load(found, solved.forces)
+    return TransmissionCurves(
+        carrier_angle=found.carrier_angle,
+        transmission_error=found.transmission_error,
+        pin_force=pins.max(axis=(2, 3)),
+        disc_force=pins.sum(axis=3).max(axis=2),
+        line_load=line_load.max(axis=(2, 3)),
+        pressure=(unit_pressure(found) * np.sqrt(line_load)).max(axis=(2, 3)),
+        pins_in_contact=found.pins_in_contact.astype(float),
+        status=found.status,
+    )
+
+
+def _unloaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    found, curves = model.extremes(errors, torque), model.equilibria(errors, torque)
+    values = np.stack([found.peak_to_peak, curves.transmission_error.mean(axis=1)], axis=1) / ARCSECOND
+    return values, np.maximum(found.status, curves.status.max(axis=1))
+
+
+def _loaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    rated = float(np.copysign(model.reducer.load.rated_torque, torque))
+    found = model.extremes(errors, rated)
+    values, status = [], []
+    for first in range(0, errors.shape[0], _AT_ONCE):
+        curves = transmission_curves(model, errors[first : first + _AT_ONCE], rated)
+        largest = [
+            curves.pin_force.max(axis=1),
+            curves.disc_force.max(axis=1),
+            curves.line_load.max(axis=1) * MILLIMETRE,
+            curves.pressure.max(axis=1) / MEGAPASCAL,
+        ]
+        values.append(np.stack([*largest, curves.pins_in_contact.mean(axis=1)], axis=1))
+        status.append(curves.status.max(axis=1))
+    peak_to_peak = found.peak_to_peak[:, np.newaxis] / ARCSECOND
+    return np.hstack([peak_to_peak, np.concatenate(values)]), np.maximum(found.status, np.concatenate(status))
+
+
+TRANSMISSION = (
+    Reading(outputs=(PEAK_TO_PEAK, "mean transmission error [arcsec]"), read=_unloaded),
+    Reading(
+        outputs=(
+            "peak-to-peak transmission error, rated torque [arcsec]",
+            "largest pin force, rated torque [N]",
+            "largest sum of pin forces of a disc, rated torque [N]",
+            "largest line load, rated torque [N/mm]",
+            "peak pressure, rated torque [MPa]",
+            "pins in contact, mean, rated torque [-]",
+        ),
+        read=_loaded,
+    ),
+)
+"""What orientations change: at the test torque, and at rated torque at every coarse angle of the model's search."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrientationResponse:
+    """Transmission of a reducer over the final orientations of its parts; every other error is zero.
+
+    Parameters
+    ----------
+    model
+        The reducer.
+    chain
+        Its parts, and which columns of the model their orientations move.
+    torque
+        Test torque on the carrier; negative resists the rotation [N·m].
+    observe
+        Told the statuses of each chunk.
+    mapper
+        What solves the chunks, `tolalloc.chunks.map_chunks`.
+    readings
+        What is read.
+
+    Raises
+    ------
+    InputError
+        The chain moves a column that the model does not have, or none at all.
+    """
+
+    model: EquivalentModel
+    chain: DatumFlowChain
+    torque: float
+    observe: Observer = KernelResponse.observe
+    mapper: Mapper = map
+    readings: tuple[Reading, ...] = TRANSMISSION
+
+    def __post_init__(self) -> None:
+        reducer, law = self.model.reducer, self.model.reducer.stiffness.pin_contact_law
+        place, moved = f"datum flow chain of {reducer.name}", self._moved(np.zeros((1, len(self.columns))))
+        if not moved:
+            raise InputError.at(place, "columns that its parts move", [], "at least one column of the reducer's model")
+        for name in moved:
+            if name in self.model.columns:
+                if source_name(name).rpartition(".")[2] not in ANGULAR:
+                    raise InputError.at(place, "column", name, f"an angle, whose source ends in {' or '.join(ANGULAR)}")
+                continue
+            if LAWS[law] != LINEAR and name.rpartition(".")[0] in _disc_tilts(reducer.disc_count):
+                linear = " or ".join(known for known in LAWS if LAWS[known] == LINEAR)
+                raise InputError.at(place, f"law of the pin contact, with {name},", law, linear)
+            size = f"{reducer.disc_count} discs and {reducer.crank_count} crankshafts"
+            raise InputError.at(place, "column", name, f"an error column of a reducer with {size}")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Rotation of every part about the datum's axes, in the order of the states [rad]."""
+        return tuple(f"{part}.{axis}" for part in self.chain.names for axis in "xyz")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of all outputs with their units."""
+        return tuple(name for reading in self.readings for name in reading.outputs)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the transmission of every sample of orientations [rad]."""
+        return OutputsResponse(kernel=self._kernel, readings=self.readings)(self._deviations(x))
+
+    def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
+        """Return the deviations in the order of the model's columns [m, angles rad].
+
+        Parameters
+        ----------
+        x
+            Orientations in the order of ``columns`` [rad].
+        """
+        return self._kernel.errors(self._deviations(x))
+
+    @property
+    def _kernel(self) -> KernelResponse:
+        names = tuple(self._moved(np.zeros((1, len(self.columns)))))
+        others = {name: 0.0 for name in self.model.columns if name not in names}
+        return KernelResponse(
+            model=self.model,
+            torque=self.torque,
+            columns=names,
+            fixed=others | self.model.reducer.modification.deviations,
+            observe=self.observe,
+            mapper=self.mapper,
+        )
+
+    def _moved(self, x: Float[np.ndarray, "sample column"]) -> dict[str, Float[np.ndarray, " sample"]]:
+        return self.chain.columns(x.reshape(-1, len(self.chain.parts), 3))
+
+    def _deviations(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample moved"]:
+        return np.stack(list(self._moved(x).values()), axis=1)
+
+
+def _disc_tilts(discs: int) -> tuple[str, ...]:
+    return tuple(f"disc{disc + 1}.tilt" for disc in range(discs))

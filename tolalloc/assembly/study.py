@@ -1,0 +1,251 @@
+"""From a datum flow chain to adjustments, what they leave, what that does to the transmission, and tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
+from tolalloc.assembly.angular.limits import angular_limits
+from tolalloc.assembly.angular.precision import best_precision
+from tolalloc.assembly.angular.retuning import retuned_allocation
+from tolalloc.assembly.angular.verification import verify_angles
+from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts
+from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.errors_file import load_errors
+from tolalloc.assembly.gains import expected_angles, tuned_gains
+from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
+from tolalloc.assembly.precision_sweep import norms, precision_sweep
+from tolalloc.assembly.regulator import regulator
+from tolalloc.assembly.trajectory import foreseen
+from tolalloc.assembly.transmission import transmission_effect
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.exceptions import InputError
+from tolalloc.progress import Progress, Record
+from tolalloc.rv.equivalent.status import OUTCOMES
+
+SWEPT = (
+    0.0,
+    0.1,
+    0.2,
+    0.3,
+    0.5,
+    0.7,
+    1.0,
+    1.5,
+    2.0,
+    3.0,
+    4.0,
+    5.0,
+    6.0,
+    8.0,
+    10.0,
+    13.0,
+    16.0,
+    20.0,
+    30.0,
+    50.0,
+    100.0,
+)
+"""Precisions over which the expected errors are drawn [-]."""
+SHOWN = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Precisions at which the transmission is solved; zhang2025 shows some of them [-]."""
+TRIED = np.geomspace(0.01, LARGEST_PRECISION, 161)
+"""Precisions among which one that keeps all limits is looked for [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssemblyStudy:
+    """Which assembly is asked about.
+
+    Parameters
+    ----------
+    chain
+        Shipped name or chain file.
+    measured
+        CSV file with the measured errors of its parts, if there is one.
+    precision
+        Q in place of the chain's own [-].
+    assemblies
+        Random assemblies that verify the tolerances [-].
+    draws
+        Random assemblies whose transmission is solved where the parts are not measured [-].
+    seed
+        Seed of every random number [-].
+
+    Raises
+    ------
+    InputError
+        A precision or a seed out of range.
+    """
+
+    chain: str | Path
+    measured: Path | None = None
+    precision: float | None = None
+    assemblies: int = 100_000
+    draws: int = 50
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError.at("tolalloc assemble", "--seed", self.seed, "0 or a positive integer")
+        if self.precision is not None and not 0 <= self.precision <= LARGEST_PRECISION:
+            raise InputError.at("tolalloc assemble", "--precision", self.precision, f"0 to {LARGEST_PRECISION:g}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreparedAssembly:
+    """A checked assembly.
+
+    Parameters
+    ----------
+    asked
+        What was asked.
+    plan
+        The chain at the precision that was asked for.
+    name
+        Where the errors of the parts come from.
+    errors
+        Measured errors of its parts, if there are any [rad].
+    """
+
+    asked: AssemblyStudy
+    plan: AssemblyPlan
+    name: str
+    errors: Float[np.ndarray, "part 3"] | None
+
+
+def prepare_assembly(asked: AssemblyStudy) -> PreparedAssembly:
+    """Return an assembly with its files read and checked.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    """
+    plan = load_plan(asked.chain)
+    if asked.precision is not None:
+        plan = replace(plan, precision=asked.precision)
+    errors = None if asked.measured is None else load_errors(asked.measured, plan)
+    return PreparedAssembly(
+        asked=asked, plan=plan, name="" if asked.measured is None else asked.measured.stem, errors=errors
+    )
+
+
+def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
+    """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
+
+    Parameters
+    ----------
+    prepared
+        The assembly.
+    progress
+        Told how far the work has come.
+
+    Raises
+    ------
+    InputError
+        A measurement that tells nothing new, or a column that the reducer does not have.
+    SolveError
+        A unit without equilibrium.
+    """
+    plan, record, seeds = prepared.plan, Record(progress, OUTCOMES), SeedTree(prepared.asked.seed).child("assembly")
+    with record.stage("adjustment"):
+        gains = tuned_gains(plan, plan.precision, plan.tolerances)
+        swept = np.array(sorted({*SWEPT, plan.precision}))
+        sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
+        fewer = _fewer(plan)
+        measured = None if prepared.errors is None else _measured(plan, prepared.name, prepared.errors, swept)
+    with record.stage("tolerances"):
+        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
+    with record.stage("transmission"):
+        shown = np.array(sorted({*SHOWN, plan.precision}))
+        transmission = None
+        if plan.reducer:
+            draws = prepared.asked.draws
+            transmission = transmission_effect(
+                plan, prepared.errors, shown, draws, seeds.child("transmission"), record.observe
+            )
+    return AssemblyResults(
+        plan=plan,
+        gains=gains,
+        sweep=sweep,
+        expected=expected,
+        fewer=fewer,
+        measured=measured,
+        transmission=transmission,
+        tolerances=tolerances,
+        unreachable=unreachable,
+        seed=prepared.asked.seed,
+        statuses=record.counts,
+    )
+
+
+def _measured(
+    plan: AssemblyPlan, name: str, errors: Float[np.ndarray, "part 3"], precisions: Float[np.ndarray, " precision"]
+) -> MeasuredParts:
+    sequence = foreseen(plan.space, regulator(plan.space, plan.final_weight()), errors.ravel())
+    turned = plan.space.adjusting * (sequence.adjustments != 0)[:, np.newaxis]
+    return MeasuredParts(
+        name=name,
+        errors=errors,
+        sequence=sequence,
+        # Nobody measures again after the turns as listed, so what they miss stays.
+        missed=plan.adjustment_noise * np.sqrt((turned**2).sum(axis=(0, 2))).reshape(-1, 3),
+        unadjusted=(plan.chain.transform @ errors.ravel()).reshape(-1, 3),
+        exact=plan.chain.finite(errors),
+        norms=norms(plan, errors.ravel(), precisions),
+        keeping=_smallest_keeping(plan, errors),
+    )
+
+
+def _smallest_keeping(plan: AssemblyPlan, errors: Float[np.ndarray, "part 3"]) -> float | None:
+    """Return the smallest of the tried precisions at which the measured parts keep all limits, if any does."""
+    if plan.requirements is None:
+        return None
+    limits = angular_limits(plan)
+    for precision in TRIED:
+        final = foreseen(plan.space, regulator(plan.space, plan.final_weight(float(precision))), errors.ravel())
+        if (limits.counted @ final.adjusted[-1] ** 2 <= limits.values**2).all():
+            return float(precision)
+    return None
+
+
+def _fewer(plan: AssemblyPlan) -> float | None:
+    """Return the total that is left if every step turns the part that it mounts alone, unless it does anyway [rad]."""
+    fewer = plan.turning_fewer
+    if [step.adjust for step in fewer.steps] == [step.adjust for step in plan.steps]:
+        return None
+    gains = tuned_gains(fewer, fewer.precision, fewer.tolerances)
+    return float(np.sqrt(np.trace(gains.errors.covariance(fewer.variances))))
+
+
+def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> tuple[AngularTolerances | None, str]:
+    """Return the cheapest tolerances, if any are asked for, or why there are none."""
+    if plan.requirements is None:
+        return None, ""
+    try:
+        retuned, by_precision = retuned_allocation(plan), best_precision(plan)
+    except InputError as error:  # who wants to know what to turn must not be kept from it
+        return None, str(error)
+    # Without a price on effort the best precision is the end of the range, which nobody asked for.
+    verified = by_precision.best if plan.requirements.effort_price > 0 else retuned.best
+    found = AngularTolerances(
+        adjusted=retuned.allocations[0],
+        unadjusted=_without_adjusting(plan),
+        retuned=retuned,
+        verified=verified,
+        verification=verify_angles(plan, verified, seeds, assemblies),
+        by_precision=by_precision,
+    )
+    return found, ""
+
+
+def _without_adjusting(plan: AssemblyPlan) -> AngularAllocation | str:
+    try:
+        return allocate_angles(plan, 0.0)
+    except InputError as error:
+        return str(error)

@@ -1,0 +1,1 @@
+"""What a test bench reads: measured data, identified stiffnesses, diagnosed units."""

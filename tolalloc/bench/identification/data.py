@@ -1,0 +1,140 @@
+"""All readings of all units in one row, with their noise, and the blocks that they came in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.bench.measurement.records import Measurements
+from tolalloc.exceptions import InputError
+from tolalloc.units import ARCSECOND
+
+PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Readings that belong together.
+
+    Parameters
+    ----------
+    kind
+        `PEAK_TO_PEAK`, `CURVE` or `LOOP`.
+    number
+        Which of the measured curves or loops; 0 for the peak-to-peaks [-].
+    rows
+        Its readings among all.
+    centred
+        Whether its mean has been removed, from readings and model alike.
+    """
+
+    kind: str
+    number: int
+    rows: slice
+    centred: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Data:
+    """All readings.
+
+    Parameters
+    ----------
+    measured
+        Readings [rad].
+    noise
+        Standard deviation of each; one arcsecond where nobody stated it [rad].
+    unit
+        Position of the unit that each belongs to [-].
+    blocks
+        Where they came from, in order.
+    noise_stated
+        Whether the noise was stated; if not, it is estimated from what the fit leaves.
+    """
+
+    measured: Float[np.ndarray, " datum"]
+    noise: Float[np.ndarray, " datum"]
+    unit: Int[np.ndarray, " datum"]
+    blocks: tuple[Block, ...]
+    noise_stated: bool
+
+    @property
+    def units(self) -> Int[np.ndarray, " unit"]:
+        """Positions of the units that have readings."""
+        return np.unique(self.unit)
+
+    @property
+    def peak_to_peak(self) -> slice | None:
+        """Where the peak-to-peaks stand; none if there are none."""
+        return next((block.rows for block in self.blocks if block.kind == PEAK_TO_PEAK), None)
+
+    @property
+    def only_peak_to_peak(self) -> bool:
+        """Whether there is nothing else."""
+        return all(block.kind == PEAK_TO_PEAK for block in self.blocks)
+
+
+def centred(values: Float[np.ndarray, "..."], blocks: tuple[Block, ...]) -> Float[np.ndarray, "..."]:
+    """Return values, readings along the first axis, without the means of the blocks that have none."""
+    found = np.array(values)
+    for block in blocks:
+        if block.centred:
+            found[block.rows] -= found[block.rows].mean(axis=0)
+    return found
+
+
+def data_of(measurements: Measurements, place: str) -> Data:
+    """Return the readings of all units in one row.
+
+    Parameters
+    ----------
+    measurements
+        What was measured.
+    place
+        Where it was read, for errors.
+
+    Raises
+    ------
+    InputError
+        Some noise is stated and some is not, or kinds are mixed without any: their weights would be a guess.
+    """
+    parts = list(_parts(measurements))
+    stated = [noise for *_, noise in parts]
+    if len({part[0] for part in parts}) > 1 or any(noise is not None for noise in stated):
+        without = [f"{kind} {number + 1}" for kind, number, _, _, noise in parts if noise is None]
+        if without:
+            raise InputError(
+                f"{place}: noise_arcsec of {without[0]} is missing; readings of several kinds, or with and without "
+                "it, cannot be weighed against each other."
+            )
+    blocks, start = [], 0
+    for kind, number, values, _, _ in parts:
+        rows = slice(start, start + values.size)
+        blocks.append(Block(kind=kind, number=number, rows=rows, centred=kind != PEAK_TO_PEAK))
+        start = rows.stop
+    noise = [np.full(values.size, ARCSECOND if own is None else own) for _, _, values, _, own in parts]
+    return Data(
+        measured=centred(np.concatenate([values for _, _, values, _, _ in parts]), tuple(blocks)),
+        noise=np.concatenate(noise),
+        unit=np.concatenate([unit for _, _, _, unit, _ in parts]),
+        blocks=tuple(blocks),
+        noise_stated=all(noise is not None for noise in stated),
+    )
+
+
+_Part = tuple[str, int, Float[np.ndarray, " reading"], Int[np.ndarray, " reading"], float | None]
+
+
+def _parts(measurements: Measurements) -> Iterator[_Part]:
+    """Yield kind, number, readings, units and noise of everything that was measured."""
+    found = measurements.peak_to_peak
+    if found is not None:
+        yield PEAK_TO_PEAK, 0, found.values, found.unit, found.noise
+    for number, curve in enumerate(measurements.curves):
+        values = curve.transmission_error
+        yield CURVE, number, values, np.full(values.size, curve.unit), curve.noise
+    for number, loop in enumerate(measurements.loops):
+        yield LOOP, number, loop.twist, np.full(loop.twist.size, loop.unit), loop.noise

@@ -1,0 +1,199 @@
+"""What the readings fix and what they do not: information, its directions, covariance and bounds that stop a search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.stats import chi2
+from scipy.stats import f as fisher_f
+from scipy.stats import t as student
+
+from tolalloc.bench.identification.parameters import BIAS
+from tolalloc.bench.identification.prediction import Prediction
+from tolalloc.bench.identification.problem import IdentificationProblem
+
+LEVEL = 0.95
+"""Confidence of every interval [-]."""
+
+_ON_BOUND = 1e-3  # distance over the box within which a coordinate stands on its bound [-]
+_FINEST = 1e-6  # least variance factor of noise that nobody stated: a thousandth of an arcsecond, squared [-]
+_TINY = np.finfo(float).tiny
+_RARE = 1e-3  # probability below which the stated noise is doubted [-]
+_NOTHING = 1e-12  # eigenvalue over the largest, or squared loading, that is rounding [-]
+_SMALL = 0.05  # loadings below this share of the largest are not written [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direction:
+    """One combination of coordinates that the readings fix independently of the others.
+
+    Parameters
+    ----------
+    loading
+        Share of each coordinate, of length 1, its largest positive [-].
+    deviation
+        Standard deviation that the readings leave along it [-].
+    room
+        Half the box's extent along it: the standard deviation must be well below for the readings to say anything [-].
+    """
+
+    loading: Float[np.ndarray, " parameter"]
+    deviation: float
+    room: float
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the 95 % interval is no longer than half of what the bounds allow."""
+        return 1.96 * self.deviation < 0.5 * self.room
+
+    def sentence(self, symbols: tuple[str, ...]) -> str:
+        """Return the direction in words."""
+        largest = np.abs(self.loading).max()
+        parts = [
+            f"{share:+.2f}·{symbol}"
+            for share, symbol in zip(self.loading, symbols, strict=True)
+            if abs(share) >= _SMALL * largest
+        ]
+        combination = " ".join(parts).removeprefix("+").replace("-", "−")
+        if self.is_fixed:
+            return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%} as standard error"
+        left = (
+            f"±{self.deviation:.2%} as standard error, where the bounds alone leave ±{self.room:.2%}"
+            if self.deviation < self.room
+            else f"they leave no less than the bounds alone, ±{self.room:.2%}"
+        )
+        return f"these data leave {combination} (relative changes) open: {left}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Information:
+    """What the readings say around the least objective, to first order.
+
+    Parameters
+    ----------
+    matrix
+        Fisher information of the coordinates from the readings over the variance factor, and from the prior [-].
+    variance_factor
+        Variance of the noise over the one that the data carry: 1 where it was stated and can be believed, else the
+        reduced χ² [-].
+    freedom
+        Readings less parameters [-].
+    reduced_chi_square
+        Sum of squared residuals over noise, per degree of freedom [-].
+    lower, upper
+        Bounds of the coordinates [-].
+    coordinates
+        Where it was taken [-].
+    estimated
+        Whether the variance factor was estimated from the residuals; if not, the noise is known.
+    logarithmic
+        Which coordinates are logarithms; the bias is not.
+    """
+
+    matrix: Float[np.ndarray, "parameter parameter"]
+    variance_factor: float
+    freedom: int
+    reduced_chi_square: float
+    lower: Float[np.ndarray, " parameter"]
+    upper: Float[np.ndarray, " parameter"]
+    coordinates: Float[np.ndarray, " parameter"]
+    estimated: bool
+    logarithmic: Bool[np.ndarray, " parameter"]
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """Eigenvectors of the information of all logarithms, best known first; a bias is left free."""
+        own, other = self.logarithmic, ~self.logarithmic
+        between = self.matrix[np.ix_(own, other)]
+        left = self.matrix[np.ix_(own, own)] - between @ np.linalg.pinv(self.matrix[np.ix_(other, other)]) @ between.T
+        values, vectors = np.linalg.eigh(left)
+        width = (self.upper - self.lower)[own]
+        found = []
+        for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+            loading = vector * np.sign(vector[np.abs(vector).argmax()])
+            room = 0.5 * float(np.abs(loading) @ width)
+            deviation = sqrt(1.0 / value) if value > _NOTHING * max(values[-1], _TINY) else np.inf
+            found.append(Direction(loading=loading, deviation=deviation, room=room))
+        return tuple(found)
+
+    @property
+    def covariance(self) -> Float[np.ndarray, "parameter parameter"]:
+        """Covariance of the coordinates from the readings and the bounds together [-].
+
+        Notes
+        -----
+        Bounds enter as a prior with the variance of an even distribution between them, (upper − lower)²/12, so a
+        coordinate of which the readings say nothing has that variance and no more. Where readings say much, it is the
+        inverse of their information. Theory page, equation (40).
+        """
+        bounds = np.diag(12.0 / (self.upper - self.lower) ** 2)
+        return np.asarray(np.linalg.inv(self.matrix + bounds))
+
+    @property
+    def standard_errors(self) -> Float[np.ndarray, " parameter"]:
+        """Standard errors of the coordinates from the readings alone; infinite where they say nothing [-]."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        known = values > _NOTHING * max(values.max(), _TINY)
+        share = vectors**2
+        variance = share[:, known] @ (1.0 / values[known])
+        open_to = share[:, ~known].sum(axis=1) > _NOTHING
+        return np.asarray(np.where(open_to, np.inf, np.sqrt(variance)))
+
+    @property
+    def interval(self) -> Float[np.ndarray, "2 parameter"]:
+        """First-order 95 % interval of the coordinates, not cut at the bounds [-]."""
+        freedom = self.freedom if self.estimated else np.inf
+        half = float(student.ppf(0.5 + LEVEL / 2, freedom)) * self.standard_errors
+        return np.stack([self.coordinates - half, self.coordinates + half])
+
+    @property
+    def threshold(self) -> float:
+        """Rise of twice the objective at which a 95 % interval ends: χ² of one, or F where the noise was estimated."""
+        return float(fisher_f.ppf(LEVEL, 1, self.freedom) if self.estimated else chi2.ppf(LEVEL, 1))
+
+    @property
+    def on_bound(self) -> Bool[np.ndarray, " parameter"]:
+        """Which coordinates stand on a bound."""
+        near = _ON_BOUND * (self.upper - self.lower)
+        return np.asarray((self.coordinates <= self.lower + near) | (self.coordinates >= self.upper - near))
+
+
+def information(
+    problem: IdentificationProblem, prediction: Prediction, coordinates: Float[np.ndarray, " parameter"]
+) -> Information:
+    """Return what the readings say around a point.
+
+    Parameters
+    ----------
+    problem
+        The data.
+    prediction
+        What should have been read there.
+    coordinates
+        The point [-].
+
+    Notes
+    -----
+    Theory page, equation (39).
+    """
+    readings, freedom = problem.data.measured.size, problem.freedom
+    slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)[:readings]
+    reduced = float(left @ left) / freedom
+    # Stated noise is believed unless it makes such residuals in less than one case of a thousand.
+    estimated = not problem.data.noise_stated or bool(chi2.sf(reduced * freedom, freedom) < _RARE)
+    factor = max(reduced, _FINEST) if estimated else 1.0
+    known = slopes[readings:]
+    return Information(
+        matrix=slopes[:readings].T @ slopes[:readings] / factor + known.T @ known,
+        variance_factor=factor,
+        freedom=freedom,
+        reduced_chi_square=reduced,
+        lower=problem.lower,
+        upper=problem.upper,
+        coordinates=coordinates,
+        estimated=estimated,
+        logarithmic=np.array([item.name != BIAS for item in problem.parameters]),
+    )

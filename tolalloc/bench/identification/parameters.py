@@ -1,0 +1,173 @@
+"""What may be identified: stiffnesses, an instrument's bias, the test torque; bounds and what is known beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp, inf, isfinite, log
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.units import ARCSECOND
+
+SYMBOLS = {
+    "sun_support": "K_s",
+    "gear_mesh": "K_sp",
+    "crank_disc_bearing": "K_pd",
+    "crank_carrier_bearing": "K_b",
+    "carrier_bearing": "K_ca",
+    "pin_contact": "C",
+    "torque": "torque",
+    "bias": "bias",
+}
+"""Name of each parameter → its symbol; stiffnesses are fields of `tolalloc.rv.reducer.stiffness.Stiffness`."""
+
+BIAS, TORQUE = "bias", "torque"
+
+LIU2020 = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
+"""The stiffnesses that liu2020 identifies."""
+
+_WIDEST = {BIAS: (-60.0, 60.0), TORQUE: (0.1, 10.0)}
+_ALLOWED = {BIAS: "two numbers from -3600 to 3600 arcsec", TORQUE: "two positive factors up to 1000"}
+_NARROWEST = 1.01
+_SMALLEST_PRIOR = 1e-4  # what is known better is known [-]
+_STIFFNESS_SPAN = 2.0  # bounds of a stiffness unless told otherwise: half to double its value in the reducer file
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One unknown. Searches move its coordinate, which is of order one for every kind of parameter.
+
+    Parameters
+    ----------
+    name
+        One of `SYMBOLS`.
+    low, high
+        Bounds: a stiffness [N/m], the bias [arcsec], the torque over the stated one [-].
+    start
+        Where searches begin, and what the parameter stays at when it is not identified [as low].
+    prior
+        Standard deviation of the coordinate around ``start`` that is known beforehand; infinite if nothing is [-].
+    """
+
+    name: str
+    low: float
+    high: float
+    start: float
+    prior: float = inf
+
+    @property
+    def symbol(self) -> str:
+        """Short name for tables and figures."""
+        return SYMBOLS[self.name]
+
+    @property
+    def unit(self) -> str:
+        """Unit of measurement of bounds and value."""
+        return {BIAS: "arcsec", TORQUE: "-"}.get(self.name, "N/m")
+
+    def written(self, value: str) -> str:
+        """Return a value with its unit of measurement, if it has one."""
+        return value if self.unit == "-" else f"{value} {self.unit}"
+
+    @property
+    def is_stiffness(self) -> bool:
+        """Whether it is a stiffness."""
+        return self.name not in (BIAS, TORQUE)
+
+    def coordinate(self, value: float) -> float:
+        """Return the logarithm of the value over the start, or the bias in arcseconds from the start [-]."""
+        return value - self.start if self.name == BIAS else log(value / self.start)
+
+    def value(self, coordinate: float) -> float:
+        """Return the value at a coordinate [as low]."""
+        return self.start + coordinate if self.name == BIAS else self.start * exp(coordinate)
+
+    @property
+    def lower(self) -> float:
+        """Coordinate of the lower bound [-]."""
+        return self.coordinate(self.low)
+
+    @property
+    def upper(self) -> float:
+        """Coordinate of the upper bound [-]."""
+        return self.coordinate(self.high)
+
+
+def parameter(
+    name: str, reducer: Reducer, bounds: tuple[float, float] | None = None, prior: float = inf, place: str = "identify"
+) -> Parameter:
+    """Return a parameter that begins at the reducer's value, or at no bias and the stated torque.
+
+    Parameters
+    ----------
+    name
+        One of `SYMBOLS`.
+    reducer
+        Where a stiffness begins.
+    bounds
+        Lower and upper bound; half to double a stiffness, ±60 arcsec, a tenth to ten times the torque unless given.
+    prior
+        Relative standard deviation that is known beforehand, for the bias in arcseconds [-].
+    place
+        Where the user wrote it, for errors.
+
+    Raises
+    ------
+    UnknownNameError
+        No such parameter.
+    InputError
+        Bounds in the wrong order or without meaning, the start outside of them, a prior that is not positive.
+    """
+    if name not in SYMBOLS:
+        raise UnknownNameError.among(place, "parameter", name, SYMBOLS)
+    start = {BIAS: 0.0, TORQUE: 1.0}.get(name) if name in (BIAS, TORQUE) else float(getattr(reducer.stiffness, name))
+    assert start is not None
+    low, high = bounds or _WIDEST.get(name) or (start / _STIFFNESS_SPAN, start * _STIFFNESS_SPAN)
+    floor, ceiling = {BIAS: (-3600.0, 3600.0), TORQUE: (1e-3, 1e3)}.get(name, (1e4, 1e13))
+    allowed = _ALLOWED.get(name, "two stiffnesses from 1e4 to 1e13 N/m") + ", the smaller one first"
+    if not floor <= low < high <= ceiling:
+        raise InputError.at(place, name, f"{low:g}:{high:g}", allowed)
+    if not prior >= _SMALLEST_PRIOR:
+        raise InputError.at(place, f"prior of {name}", prior, f"{_SMALLEST_PRIOR:g} or more")
+    if name != BIAS and high < _NARROWEST * low:
+        raise InputError.at(place, name, f"{low:g}:{high:g}", "bounds at least 1 % apart")
+    if not low <= start <= high:
+        raise InputError.at(place, name, f"{low:g}:{high:g}", f"bounds around the start, which is {start:g}")
+    return Parameter(name=name, low=low, high=high, start=start, prior=prior)
+
+
+def with_parameters(
+    reducer: Reducer, parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]
+) -> Reducer:
+    """Return the reducer with the stiffnesses that coordinates stand for."""
+    values: dict[str, Any] = {
+        item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True) if item.is_stiffness
+    }
+    return replace(reducer, stiffness=replace(reducer.stiffness, **values))
+
+
+def bias_of(parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]) -> float:
+    """Return the bias that coordinates stand for, 0 if it is not asked for [rad]."""
+    found = {item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True)}
+    return found.get(BIAS, 0.0) * ARCSECOND
+
+
+def torque_factor_of(parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]) -> float:
+    """Return the torque over the stated one that coordinates stand for [-]."""
+    found = {item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True)}
+    return found.get(TORQUE, 1.0)
+
+
+def box(parameters: Sequence[Parameter]) -> tuple[Float[np.ndarray, " parameter"], Float[np.ndarray, " parameter"]]:
+    """Return the coordinates of all lower and of all upper bounds [-]."""
+    return np.array([item.lower for item in parameters]), np.array([item.upper for item in parameters])
+
+
+def prior_weights(parameters: Sequence[Parameter]) -> Float[np.ndarray, " parameter"]:
+    """Return one over the prior standard deviation of each coordinate, 0 where nothing is known [-]."""
+    return np.array([1.0 / item.prior if isfinite(item.prior) else 0.0 for item in parameters])

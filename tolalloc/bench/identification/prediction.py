@@ -1,0 +1,171 @@
+"""What the equivalent model says the instruments should have read, with exact derivatives by the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, Block, Data, centred
+from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, bias_of, torque_factor_of, with_parameters
+from tolalloc.bench.measurement.records import Measurements
+from tolalloc.rv.equivalent.answers import Derivatives
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.units import ARCSECOND
+
+_SAMPLES_AT_ONCE = 16
+"""Curves solved together; each takes some 3 kB an angle for its derivatives [-]."""
+
+_Answer = tuple[tuple[Block, ...], Float[np.ndarray, " reading"], Float[np.ndarray, "reading parameter"]]
+
+Observer = Callable[[int], None]
+"""Told how many units have been answered for: a progress bar, a counter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prediction:
+    """What should have been read, at one point.
+
+    Parameters
+    ----------
+    values
+        Readings, their means removed as in the data; not a number where there is no equilibrium [rad].
+    by_coordinate
+        Their derivatives by the coordinates of the parameters [rad].
+    """
+
+    values: Float[np.ndarray, " datum"]
+    by_coordinate: Float[np.ndarray, "datum parameter"]
+
+
+@runtime_checkable
+class Predictor(Protocol):
+    """Answers for all readings at one point, or at many without derivatives."""
+
+    def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
+        """Return readings and derivatives at one point."""
+        ...
+
+    def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
+        """Return the readings at many points [rad]."""
+        ...
+
+
+@dataclass(frozen=True)
+class KernelPredictor:
+    """The equivalent model itself.
+
+    Parameters
+    ----------
+    reducer
+        Nominal design; what is not a parameter keeps its stiffness.
+    parameters
+        The unknowns, in the order of the coordinates.
+    measurements
+        Units, angles and torques.
+    data
+        The same readings in one row.
+    observe
+        Told how many units have been answered for.
+    """
+
+    reducer: Reducer
+    parameters: tuple[Parameter, ...]
+    measurements: Measurements
+    data: Data
+    observe: Observer = lambda _: None
+
+    def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
+        """Return readings and derivatives at one point."""
+        factor = torque_factor_of(self.parameters, coordinates)
+        orders = sorted({order for unit in self.measurements.units for order in unit.orders})
+        reducer = with_parameters(self.reducer, self.parameters, coordinates)
+        model = EquivalentModel(reducer, orders=tuple(orders) or HARMONICS)
+        deviations = reducer.modification.deviations
+        errors = np.concatenate([unit.errors(model.columns, deviations) for unit in self.measurements.units])
+        values = np.empty(self.data.measured.size)
+        slopes = np.empty((values.size, len(self.parameters)))
+        for blocks, found, by_coordinate in self._answers(model, errors, factor):
+            rows = np.concatenate([np.arange(block.rows.start, block.rows.stop) for block in blocks])
+            values[rows], slopes[rows] = found, by_coordinate
+        self._add_bias(coordinates, values, slopes)
+        self.observe(self.data.units.size)
+        return Prediction(values=centred(values, self.data.blocks), by_coordinate=centred(slopes, self.data.blocks))
+
+    def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
+        """Return the readings at many points [rad]."""
+        return np.stack([self(point).values for point in coordinates])
+
+    def _add_bias(
+        self,
+        coordinates: Float[np.ndarray, " parameter"],
+        values: Float[np.ndarray, " datum"],
+        slopes: Float[np.ndarray, "datum parameter"],
+    ) -> None:
+        """Add the bias of the instrument to what it reads of the peak-to-peaks."""
+        rows = self.data.peak_to_peak
+        if rows is None:
+            return
+        values[rows] += bias_of(self.parameters, coordinates)
+        for at, item in enumerate(self.parameters):
+            if item.name == BIAS:
+                slopes[rows, at] = ARCSECOND
+
+    def _answers(
+        self, model: EquivalentModel, errors: Float[np.ndarray, "unit column"], factor: float
+    ) -> Iterator[_Answer]:
+        """Yield blocks with the same angles, their readings one after another, and the derivatives."""
+        measured = self.measurements
+        for blocks in _with_same_angles(self.data.blocks, measured):
+            kind, first = blocks[0].kind, blocks[0].number
+            if kind == PEAK_TO_PEAK:
+                assert measured.peak_to_peak is not None
+                torque = factor * measured.peak_to_peak.torque
+                extremes, found = model.peak_to_peak_derivatives(errors[measured.peak_to_peak.unit], torque)
+                yield blocks, extremes.peak_to_peak, self._by_coordinate(found, torque)
+            elif kind == CURVE:
+                curves = [measured.curves[block.number] for block in blocks]
+                torques = factor * np.array([curve.torque for curve in curves])
+                angles, units = measured.curves[first].carrier_angle, [curve.unit for curve in curves]
+                rotation, found = model.rotation_derivatives(errors[units], torques, angles)
+                yield blocks, rotation.ravel(), self._by_coordinate(found, np.repeat(torques, angles.size))
+            else:
+                loops = [measured.loops[block.number] for block in blocks]
+                torques = np.concatenate([loop.torque for loop in loops])  # the instrument measures these themselves
+                rows = np.repeat([loop.unit for loop in loops], [loop.torque.size for loop in loops])
+                rotation, found = model.rotation_derivatives(errors[rows], torques, np.array([loops[0].carrier_angle]))
+                yield blocks, rotation.ravel(), self._by_coordinate(found, 0.0)
+
+    def _by_coordinate(
+        self, found: Derivatives, torque: float | Float[np.ndarray, " item"]
+    ) -> Float[np.ndarray, "item parameter"]:
+        """Return derivatives by the coordinates; by the torque's factor it is the torque times that by the torque."""
+        slopes = np.zeros((found.by_torque.size, len(self.parameters)))
+        for at, item in enumerate(self.parameters):
+            if item.is_stiffness:
+                slopes[:, at] = found.by_stiffness[item.name]
+            elif item.name == TORQUE:
+                slopes[:, at] = torque * found.by_torque
+        return slopes
+
+
+def _with_same_angles(blocks: tuple[Block, ...], measured: Measurements) -> list[tuple[Block, ...]]:
+    """Return the blocks in groups that share their carrier angles, and so their tables."""
+    groups: dict[tuple[object, ...], list[Block]] = {}
+    for block in blocks:
+        angles: object = None
+        if block.kind == CURVE:
+            angles = measured.curves[block.number].carrier_angle.tobytes()
+        elif block.kind == LOOP:
+            angles = measured.loops[block.number].carrier_angle
+        groups.setdefault((block.kind, angles), []).append(block)
+    return [
+        tuple(group[start : start + _SAMPLES_AT_ONCE])
+        for group in groups.values()
+        for start in range(0, len(group), _SAMPLES_AT_ONCE)
+    ]

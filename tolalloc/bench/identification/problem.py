@@ -1,0 +1,149 @@
+"""The weighted least squares that every method minimises: measured against predicted readings, and what was known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.bench.identification.data import Data
+from tolalloc.bench.identification.parameters import Parameter, box, prior_weights
+from tolalloc.bench.identification.prediction import Prediction, Predictor
+from tolalloc.exceptions import InputError, SolveError
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentificationProblem:
+    """Half the sum of squares of all residuals over their noise, and of the coordinates over their prior deviation.
+
+    Parameters
+    ----------
+    parameters
+        The unknowns.
+    data
+        The readings.
+    predictor
+        What says what should have been read.
+    weight
+        How often each unit counts: 1, 0 for one that is left out, more in a bootstrap sample [-].
+    evenly
+        Whether the bounds count as knowledge: an even distribution between them, by its mean and variance.
+    place
+        Where the data were read, for errors.
+
+    Notes
+    -----
+    liu2020, equations (15)–(16), with weights. Theory page, equation (38).
+    """
+
+    parameters: tuple[Parameter, ...]
+    data: Data
+    predictor: Predictor
+    weight: Float[np.ndarray, " unit"]
+    evenly: bool = False
+    place: str = "identify"
+    _root: Float[np.ndarray, " datum"] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        # The square root of every reading's weight over its noise is asked for thousands of times.
+        root = np.sqrt(self.weight[self.data.unit]) / self.data.noise
+        object.__setattr__(self, "_root", root)
+
+    @property
+    def lower(self) -> Float[np.ndarray, " parameter"]:
+        """Lower bounds of the coordinates [-]."""
+        return box(self.parameters)[0]
+
+    @property
+    def upper(self) -> Float[np.ndarray, " parameter"]:
+        """Upper bounds of the coordinates [-]."""
+        return box(self.parameters)[1]
+
+    @property
+    def start(self) -> Float[np.ndarray, " parameter"]:
+        """Coordinates of the reducer as it was given: all zero."""
+        return np.zeros(len(self.parameters))
+
+    @property
+    def readings(self) -> int:
+        """Readings that count, less one for every mean removed [-]."""
+        removed = sum(
+            block.centred and bool(self.weight[self.data.unit[block.rows.start]]) for block in self.data.blocks
+        )
+        return int(np.count_nonzero(self.weight[self.data.unit])) - removed
+
+    def residuals(
+        self, prediction: Prediction, coordinates: Float[np.ndarray, " parameter"]
+    ) -> Float[np.ndarray, " row"]:
+        """Return all residuals over their noise, then the coordinates over their prior deviation [-]."""
+        own = (prediction.values - self.data.measured) * self._root
+        if not np.isfinite(own).all():
+            unit = int(self.data.unit[np.flatnonzero(~np.isfinite(own))[0]]) + 1
+            values = ", ".join(
+                f"{item.name} = {item.value(float(at)):.4g}"
+                for item, at in zip(self.parameters, coordinates, strict=True)
+            )
+            raise SolveError(
+                f"{self.place}: unit {unit} in the order of the file has no equilibrium at {values}; leave it out, or "
+                "narrow the bounds."
+            )
+        known = [coordinates * prior_weights(self.parameters)]
+        if self.evenly:
+            known.append((coordinates - 0.5 * (self.lower + self.upper)) * self._pull)
+        return np.concatenate([own, *known])
+
+    @property
+    def _pull(self) -> Float[np.ndarray, " parameter"]:
+        """One over the standard deviation of an even distribution between the bounds [-]."""
+        return np.asarray(np.sqrt(12.0) / (self.upper - self.lower))
+
+    def jacobian(self, prediction: Prediction) -> Float[np.ndarray, "row parameter"]:
+        """Return the derivatives of the residuals by the coordinates [-]."""
+        own = prediction.by_coordinate * self._root[:, np.newaxis]
+        known = [np.diag(prior_weights(self.parameters)), *([np.diag(self._pull)] if self.evenly else [])]
+        return np.concatenate([own, *known])
+
+    def objectives(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
+        """Return the objective at many points [-]."""
+        own = (self.predictor.values(coordinates) - self.data.measured) * self._root
+        known = coordinates * prior_weights(self.parameters)
+        return np.asarray(0.5 * ((own**2).sum(axis=1) + (known**2).sum(axis=1)))
+
+    @property
+    def freedom(self) -> int:
+        """Readings less parameters, at least 1 [-]."""
+        return max(self.readings - len(self.parameters), 1)
+
+    def widened(self, variance_factor: float) -> IdentificationProblem:
+        """Return the problem with the variance of the noise times a factor."""
+        noise = self.data.noise * np.sqrt(variance_factor)
+        return replace(self, data=replace(self.data, noise=noise))
+
+    def of(self, parameters: Sequence[Parameter], predictor: Predictor) -> IdentificationProblem:
+        """Return the same data asked for other parameters."""
+        return replace(self, parameters=tuple(parameters), predictor=predictor)
+
+    def weighed(self, weight: Float[np.ndarray, " unit"]) -> IdentificationProblem:
+        """Return the problem with other weights of the units."""
+        return replace(self, weight=weight)
+
+
+def require_enough(problem: IdentificationProblem) -> None:
+    """Refuse data that cannot fix so many parameters whatever they read.
+
+    Raises
+    ------
+    InputError
+        Fewer readings, or for peak-to-peaks fewer units, than parameters.
+    """
+    asked, units = len(problem.parameters), problem.data.units.size
+    names = ", ".join(item.symbol for item in problem.parameters)
+    if problem.data.only_peak_to_peak and units <= asked:
+        raise InputError(
+            f"{problem.place}: peak-to-peaks of {units} units cannot fix {asked} parameters ({names}); allowed is one "
+            "parameter fewer than units, or measured curves and loops."
+        )
+    if problem.readings <= asked:
+        raise InputError(f"{problem.place}: {problem.readings} readings cannot fix {asked} parameters ({names}).")

@@ -1,0 +1,147 @@
+"""Profile likelihood: how much worse the best fit gets as one parameter is held at each value between its bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import brentq
+
+from tolalloc.bench.identification.gauss_newton import gauss_newton
+from tolalloc.bench.identification.information import Information
+from tolalloc.bench.identification.prediction import Prediction, Predictor
+from tolalloc.bench.identification.problem import IdentificationProblem
+
+BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
+"""Values at which a parameter is held: evenly between its bounds, and within so many standard errors of its best."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Profile of one parameter.
+
+    Parameters
+    ----------
+    coordinate
+        Values at which it was held, bounds and ends of the interval included [-].
+    rise
+        Twice the rise of the objective above its least [-].
+    threshold
+        Rise at which the 95 % interval ends [-].
+    interval
+        Where the rise crosses the threshold to either side of the least, or the bound [-].
+    """
+
+    coordinate: Float[np.ndarray, " value"]
+    rise: Float[np.ndarray, " value"]
+    threshold: float
+    interval: tuple[float, float]
+
+    def widened(self, interval: Float[np.ndarray, " 2"]) -> Profile:
+        """Return the profile with an interval that holds another one, cut at the bounds."""
+        low, high = np.clip(interval, self.coordinate[0], self.coordinate[-1])
+        return replace(self, interval=(min(self.interval[0], float(low)), max(self.interval[1], float(high))))
+
+    @property
+    def open_ends(self) -> tuple[bool, bool]:
+        """Whether the interval reaches the lower and the upper bound."""
+        return bool(self.interval[0] <= self.coordinate[0]), bool(self.interval[1] >= self.coordinate[-1])
+
+    @property
+    def is_identified(self) -> bool:
+        """Whether the readings keep the parameter away from at least one of its bounds."""
+        return not all(self.open_ends)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A predictor with one coordinate held."""
+
+    predictor: Predictor
+    place: int
+    at: float
+
+    def _whole(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point all_parameters"]:
+        return np.insert(coordinates, self.place, self.at, axis=1)
+
+    def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
+        found = self.predictor(self._whole(coordinates[np.newaxis])[0])
+        return replace(found, by_coordinate=np.delete(found.by_coordinate, self.place, axis=1))
+
+    def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
+        return self.predictor.values(self._whole(coordinates))
+
+
+class _Fits:
+    """Least objectives with one coordinate held, each begun where its nearest neighbour ended."""
+
+    def __init__(self, problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int) -> None:
+        self._problem, self._place = problem, place
+        self._others = [item for at, item in enumerate(problem.parameters) if at != place]
+        self._ended = {float(best[place]): np.delete(best, place)}
+        self.objective: dict[float, float] = {}
+        self(float(best[place]))
+
+    def __call__(self, at: float) -> float:
+        """Return the least objective with the coordinate held at a value."""
+        if at not in self.objective:
+            held = self._problem.of(self._others, _Held(self._problem.predictor, self._place, at))
+            known = 0.5 * (at / self._problem.parameters[self._place].prior) ** 2
+            if self._others:
+                nearest = min(self._ended, key=lambda other: abs(other - at))
+                fitted = gauss_newton(held, self._ended[nearest][np.newaxis])
+                self._ended[at], self.objective[at] = fitted.coordinates, fitted.objective + known
+            else:
+                self.objective[at] = float(held.objectives(np.empty((1, 0)))[0]) + known
+        return self.objective[at]
+
+
+def profile(
+    problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int, found: Information
+) -> Profile:
+    """Return the profile of one parameter, the others fitted anew at each of its values.
+
+    Parameters
+    ----------
+    problem
+        The data, their noise widened by the variance factor; a stand-in should predict.
+    best
+        Where the objective is least [-].
+    place
+        Position of the parameter [-].
+    found
+        What the readings say to first order: where to look, and the threshold.
+
+    Notes
+    -----
+    Theory page, equation (41).
+    """
+    lower, upper, middle = float(problem.lower[place]), float(problem.upper[place]), float(best[place])
+    reach = NEAR * float(np.sqrt(found.covariance[place, place]))
+    box = np.linspace(lower, upper, BOX_POINTS)
+    near = middle + reach * np.linspace(-1.0, 1.0, NEAR_POINTS)
+    values = np.unique(np.concatenate([box, near[(near > lower) & (near < upper)], [middle]]))
+    fits = _Fits(problem, best, place)
+    for at in sorted(values, key=lambda value: abs(value - middle)):
+        fits(float(at))
+    ends = tuple(_crossing(fits, values, found.threshold, side) for side in (-1, 1))
+    held = np.array(sorted(fits.objective))
+    rise = 2.0 * (np.array([fits.objective[float(at)] for at in held]) - min(fits.objective.values()))
+    return Profile(coordinate=held, rise=rise, threshold=found.threshold, interval=(ends[0], ends[1]))
+
+
+def _crossing(fits: _Fits, values: Float[np.ndarray, " value"], threshold: float, side: int) -> float:
+    """Return where the rise crosses the threshold beyond the outermost value inside, or the bound."""
+    least = min(fits.objective.values())
+
+    def beyond(at: float) -> float:
+        return 2.0 * (fits(at) - least) - threshold
+
+    inside = [float(at) for at in values if beyond(float(at)) <= 0.0]
+    inner = min(inside) if side < 0 else max(inside)
+    outward = values[values < inner] if side < 0 else values[values > inner]
+    if outward.size == 0:
+        return inner
+    outer = float(outward.max() if side < 0 else outward.min())
+    return float(brentq(beyond, inner, outer, xtol=1e-4 * abs(outer - inner)))

@@ -1,0 +1,175 @@
+"""What other units would have said: bootstrap over units, and each unit left out in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.bench.identification.data import Data
+from tolalloc.bench.identification.gauss_newton import gauss_newton
+from tolalloc.bench.identification.information import LEVEL
+from tolalloc.bench.identification.parameters import Parameter
+from tolalloc.bench.identification.problem import IdentificationProblem
+from tolalloc.bench.identification.stand_in import StandIn
+from tolalloc.drawing.seeds import SeedTree
+
+RESAMPLES = 400
+FEWEST_UNITS = 5
+"""Units below which neither a bootstrap nor leaving one out says anything [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bootstrap:
+    """The least objective of resampled units.
+
+    Parameters
+    ----------
+    coordinates
+        One row for each resample [-].
+    """
+
+    coordinates: Float[np.ndarray, "resample parameter"]
+
+    @property
+    def interval(self) -> Float[np.ndarray, "2 parameter"]:
+        """95 % percentile interval of the coordinates [-]."""
+        return np.asarray(np.quantile(self.coordinates, (0.5 - LEVEL / 2, 0.5 + LEVEL / 2), axis=0))
+
+
+def bootstrap(problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], seeds: SeedTree) -> Bootstrap:
+    """Return the fits to units drawn with replacement.
+
+    Parameters
+    ----------
+    problem
+        The data; a stand-in should predict.
+    best
+        Where each fit begins [-].
+    seeds
+        Node of the seed tree.
+    """
+    units = problem.data.units
+    drawn = seeds.generator().integers(0, units.size, (RESAMPLES, units.size))
+    rows = []
+    for draw in drawn:
+        weight = np.bincount(units[draw], minlength=problem.weight.size).astype(float)
+        rows.append(gauss_newton(problem.weighed(weight), best[np.newaxis]).coordinates)
+    return Bootstrap(coordinates=np.array(rows))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One choice of what is fitted, judged by the units that it has not seen.
+
+    Parameters
+    ----------
+    parameters
+        What is fitted; nothing is the reducer as it was given.
+    left
+        Residual of every reading after the fit to all units [rad].
+    unseen
+        Residual of every reading after the fit to all units but its own [rad].
+    noise
+        Standard deviation of every reading [rad].
+    unit
+        Unit of every reading [-].
+    """
+
+    parameters: tuple[Parameter, ...]
+    left: Float[np.ndarray, " datum"]
+    unseen: Float[np.ndarray, " datum"]
+    noise: Float[np.ndarray, " datum"]
+    unit: Int[np.ndarray, " datum"]
+
+    @property
+    def name(self) -> str:
+        """What is fitted, in symbols."""
+        return " + ".join(item.symbol for item in self.parameters) or "nothing (the reducer as given)"
+
+    @property
+    def by_unit(self) -> Float[np.ndarray, " unit"]:
+        """Mean squared unseen residual over noise of each unit [-]."""
+        square = (self.unseen / self.noise) ** 2
+        return np.array([square[self.unit == unit].mean() for unit in np.unique(self.unit)])
+
+    @property
+    def score(self) -> float:
+        """Root of the mean over units of the squared unseen residual over noise [-]."""
+        return float(np.sqrt(self.by_unit.mean()))
+
+    def rms(self, data: Data, kind: str, *, unseen: bool) -> float:
+        """Return the root-mean-square residual of one kind of reading [rad].
+
+        Parameters
+        ----------
+        data
+            The readings.
+        kind
+            One of `tolalloc.bench.identification.data.PEAK_TO_PEAK`, ``CURVE``, ``LOOP``.
+        unseen
+            Whether each unit is judged by the fit without it.
+        """
+        rows = np.concatenate(
+            [np.arange(data.measured.size)[block.rows] for block in data.blocks if block.kind == kind]
+        )
+        values = (self.unseen if unseen else self.left)[rows]
+        return float(np.sqrt((values**2).mean()))
+
+
+def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequence[Parameter]) -> Candidate:
+    """Return how well a choice of parameters predicts units that it has not seen.
+
+    Parameters
+    ----------
+    problem
+        The data, all units counted.
+    stand_in
+        Polynomials of at least these parameters.
+    parameters
+        What is fitted; the rest keeps the reducer's value.
+    """
+    own = tuple(parameters)
+    asked, data = problem.of(own, stand_in.of(own)), problem.data
+    everywhere = _left(asked, _fit(asked))
+    unseen = np.empty(data.measured.size)
+    for unit in data.units:
+        weight = problem.weight.copy()
+        weight[unit] = 0.0
+        rows = data.unit == unit
+        unseen[rows] = _left(asked, _fit(asked.weighed(weight)))[rows]
+    return Candidate(parameters=own, left=everywhere, unseen=unseen, noise=data.noise, unit=data.unit)
+
+
+def _fit(problem: IdentificationProblem) -> Float[np.ndarray, " parameter"]:
+    """Return the least coordinates, from the reducer as given."""
+    return gauss_newton(problem, problem.start[np.newaxis]).coordinates if problem.parameters else problem.start
+
+
+def _left(problem: IdentificationProblem, coordinates: Float[np.ndarray, " parameter"]) -> Float[np.ndarray, " datum"]:
+    """Return what a fit leaves of every reading, δ of liu2020: predicted less measured [rad]."""
+    return np.asarray(problem.predictor.values(coordinates[np.newaxis])[0] - problem.data.measured)
+
+
+def simplest(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the candidate with the fewest parameters that is as good as the best within a standard error.
+
+    Parameters
+    ----------
+    candidates
+        All of the same data.
+
+    Notes
+    -----
+    Differences of squared residuals are taken unit by unit, so what all candidates share cancels.
+    """
+    best = min(candidates, key=lambda item: item.score)
+    good = []
+    for item in candidates:
+        worse = item.by_unit - best.by_unit
+        error = worse.std(ddof=1) / np.sqrt(worse.size) if worse.size > 1 else 0.0
+        if worse.mean() <= error:
+            good.append(item)
+    return min(good, key=lambda item: (len(item.parameters), item.score))

@@ -1,0 +1,259 @@
+"""From measured units to stiffnesses: fit, what the data fix, and what simpler explanations would do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import isfinite
+
+import numpy as np
+
+from tolalloc.bench.identification.answer.results import IdentificationResults
+from tolalloc.bench.identification.data import LOOP, Data, data_of
+from tolalloc.bench.identification.estimate import estimates
+from tolalloc.bench.identification.gauss_newton import NAME as GAUSS_NEWTON
+from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
+from tolalloc.bench.identification.information import information
+from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, parameter
+from tolalloc.bench.identification.prediction import KernelPredictor
+from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
+from tolalloc.bench.identification.profile import profile
+from tolalloc.bench.identification.resampling import FEWEST_UNITS, Candidate, bootstrap, judged, simplest
+from tolalloc.bench.identification.result import Comparison, Identified
+from tolalloc.bench.identification.searches import ALGORITHMS, search
+from tolalloc.bench.identification.stand_in import LARGE_DRIFT, StandIn, anchored, fit_stand_in
+from tolalloc.bench.measurement.records import Measurements
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.progress import Progress
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.units import ARCSECOND
+
+METHODS = {
+    "gauss_newton": GAUSS_NEWTON,
+    "improved_pso": "improved particle swarm",
+    "pso": "particle swarm",
+    "ga": "genetic algorithm",
+}
+"""Name on the command line → method."""
+
+_ANY_BIAS = (-3600.0, 3600.0)
+_STARTS = 8
+"""Starts of Gauss–Newton: flat directions end in several corners of the box [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentificationStudy:
+    """What is to be identified, and how.
+
+    Parameters
+    ----------
+    parameters
+        The unknowns.
+    method
+        One of `METHODS`.
+    compare
+        Seeds over which every method is compared; none if 0 [-].
+    seed
+        Seed of every random number [-].
+    data
+        Where the data were read, for errors.
+    """
+
+    parameters: tuple[Parameter, ...]
+    method: str = "gauss_newton"
+    compare: int = 0
+    seed: int = 1
+    data: str = "measurements"
+
+    def __post_init__(self) -> None:
+        place = "tolalloc identify"
+        if self.method not in METHODS:
+            raise UnknownNameError.among(place, "method", self.method, METHODS)
+        names = [item.name for item in self.parameters]
+        if not set(names) - {BIAS}:
+            raise InputError.at(place, "parameters", names, "one or more besides the bias, which is the baseline")
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError.at(place, "parameter", name, "each parameter once")
+        for name, value, good, allowed in (
+            ("compare", self.compare, 0 <= self.compare <= 1000, "0 to 1000 seeds"),
+            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
+        ):
+            if not good:
+                raise InputError.at(place, name, value, allowed)
+
+
+def identify(
+    study: IdentificationStudy, measurements: Measurements, reducer: Reducer, progress: Progress
+) -> IdentificationResults:
+    """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
+
+    Parameters
+    ----------
+    study
+        What is to be identified.
+    measurements
+        Readings of finished units.
+    reducer
+        Nominal design; its stiffness is where every search begins.
+    progress
+        Told of every stage and of the units answered for.
+
+    Raises
+    ------
+    InputError
+        Too few readings or units for the parameters.
+    SolveError
+        A unit has no equilibrium.
+    """
+    data, seeds = data_of(measurements, study.data), SeedTree(study.seed).child("identification")
+    _require_visible(study, data)
+    kernel = KernelPredictor(reducer, study.parameters, measurements, data, progress.advance)
+    problem = IdentificationProblem(
+        parameters=study.parameters,
+        data=data,
+        predictor=kernel,
+        weight=np.ones(len(measurements.units)),
+        place=study.data,
+    )
+    require_enough(problem)
+    progress.begin("polynomials of the model")
+    stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
+    _require_close(study, data, stand_in)
+    quick = problem.of(study.parameters, stand_in)
+    progress.begin(METHODS[study.method])
+    found = _found(study, problem, quick, seeds)
+    prediction = kernel(found.coordinates)
+    own = information(problem, prediction, found.coordinates)
+    widened = problem.widened(own.variance_factor)
+    written = gauss_newton(replace(widened, evenly=True), found.coordinates[np.newaxis]).coordinates
+    at_written = kernel(written)
+    progress.begin("what the data fix")
+    here = widened.of(study.parameters, anchored(stand_in, found.coordinates, prediction))
+    near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
+    profiles = tuple(profile(here, near, at, own) for at in range(len(study.parameters)))
+    drift = float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max())
+    if drift > LARGE_DRIFT:
+        profiles = tuple(item.widened(own.interval[:, at]) for at, item in enumerate(profiles))
+    several = data.units.size >= FEWEST_UNITS
+    progress.begin("other choices")
+    candidates = judged_candidates(quick, stand_in, reducer) if several else ()
+    spread = information(widened, at_written, written)
+    return IdentificationResults(
+        measurements=measurements,
+        reducer=reducer,
+        data=data,
+        parameters=study.parameters,
+        found=found,
+        at_start=kernel(problem.start),
+        at_found=prediction,
+        at_written=at_written,
+        information=own,
+        written=spread,
+        profiles=profiles,
+        drift=drift,
+        estimates=estimates(study.parameters, own, spread, profiles),
+        bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
+        candidates=candidates,
+        chosen=simplest(candidates) if candidates else None,
+        stand_in=stand_in.polynomial,
+        comparison=compare(problem, quick, study, progress) if study.compare else (),
+        seed=study.seed,
+    )
+
+
+def _require_visible(study: IdentificationStudy, data: Data) -> None:
+    """Refuse a bias or a torque where no reading shows one, and a prior against readings without a stated noise."""
+    names = [item.name for item in study.parameters]
+    if BIAS in names and data.peak_to_peak is None:
+        raise InputError(
+            f"{study.data}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
+        )
+    if not data.noise_stated and any(isfinite(item.prior) for item in study.parameters):
+        raise InputError(f"{study.data}: a prior can only be weighed against readings whose noise_arcsec is stated.")
+    if TORQUE in names and all(block.kind == LOOP for block in data.blocks):
+        raise InputError(
+            f"{study.data}: parameter 'torque' needs peak-to-peaks or curves; loops measure their torque themselves."
+        )
+
+
+def _require_close(study: IdentificationStudy, data: Data, stand_in: StandIn) -> None:
+    """Refuse bounds within which polynomials are no stand-in for the model."""
+    off = stand_in.polynomial.rms_error
+    if off > data.noise.min():
+        bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in study.parameters)
+        raise InputError(
+            f"tolalloc identify: bounds {bounds} are too wide, polynomials of the model are off by "
+            f"{off / ARCSECOND:.2g}″ where the noise is {data.noise.min() / ARCSECOND:.2g}″; allowed are narrower "
+            "ones, such as half to double."
+        )
+
+
+def _found(
+    study: IdentificationStudy, problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree
+) -> Identified:
+    """Return the answer of the chosen method on polynomials, finished on the model by Gauss–Newton from there.
+
+    The reducer as given is another start on the model, should polynomials lead astray.
+    """
+    name = METHODS[study.method]
+    if name == GAUSS_NEWTON:
+        near = gauss_newton(quick, starts(quick, _STARTS, seeds.child("starts")), study.seed)
+    else:
+        near = search(quick, name, study.seed)
+    found = gauss_newton(problem, np.stack([near.coordinates, problem.start]), study.seed)
+    return replace(found, method=name, history=near.history.then(found.history))
+
+
+def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[Candidate, ...]:
+    """Return nothing, a bias, each parameter alone, all, and all with a bias, each judged by units not seen.
+
+    Parameters
+    ----------
+    quick
+        The data, predicted by the stand-in.
+    stand_in
+        Polynomials of all parameters.
+    reducer
+        Nominal design.
+    """
+    asked = tuple(item for item in quick.parameters if item.name != BIAS)
+    choices: list[tuple[Parameter, ...]] = [(), *((item,) for item in asked)]
+    if len(asked) > 1:
+        choices.append(asked)
+    if quick.data.peak_to_peak is not None:
+        bias = parameter(BIAS, reducer, _ANY_BIAS)
+        choices[1:1] = [(bias,)]
+        choices.append((*asked, bias))
+    most = quick.data.units.size - 2 if quick.data.only_peak_to_peak else quick.readings
+    return tuple(judged(quick, stand_in, choice) for choice in choices if len(choice) <= most)
+
+
+def compare(
+    problem: IdentificationProblem, quick: IdentificationProblem, study: IdentificationStudy, progress: Progress
+) -> tuple[Comparison, ...]:
+    """Return every method's answers from many seeds, on the same stand-in; the best of each is put to the model.
+
+    Parameters
+    ----------
+    problem, quick
+        The data, predicted by the model and by the stand-in.
+    study
+        Seeds.
+    progress
+        Told of every method.
+    """
+    methods = []
+    for name in (GAUSS_NEWTON, *ALGORITHMS):
+        progress.begin(f"{name}, {study.compare} seeds")
+        runs = []
+        for seed in range(study.seed, study.seed + study.compare):
+            if name == GAUSS_NEWTON:  # from random starts, as every other method
+                begin = starts(quick, _STARTS + 1, SeedTree(seed).child("identification", name))[1:]
+                runs.append(gauss_newton(quick, begin, seed))
+            else:
+                runs.append(search(quick, name, seed))
+        best = min(runs, key=lambda run: run.objective)
+        on_model = float(problem.objectives(best.coordinates[np.newaxis])[0])
+        methods.append(Comparison(runs=tuple(runs), on_model=on_model))
+    return tuple(methods)

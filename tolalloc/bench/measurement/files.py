@@ -1,0 +1,202 @@
+"""Measurement files: which units were measured, and where the readings of the finished reducers stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from tolalloc.bench.measurement.cleaning import LARGEST_RANGE, Cleaned, clean_curve, clean_loop
+from tolalloc.bench.measurement.readings import (
+    ANGLE,
+    PEAK_TO_PEAK,
+    TORQUE,
+    TRANSMISSION_ERROR,
+    TWIST,
+    load_readings,
+    read_column,
+)
+from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.drawing.table_file import read_text_table
+from tolalloc.drawing.unit_file import BuiltUnit, load_unit
+from tolalloc.drawing.unit_table import load_units, unit_names
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.files import Record, read_toml, validated
+from tolalloc.units import ARCSECOND, DEGREE
+
+
+def _loaded(torque: float) -> float:
+    if torque == 0.0:
+        raise ValueError("a torque of 0 is not allowed, as no pin carries; below 0 it resists the rotation")
+    return torque
+
+
+def _as_list(names: object) -> object:
+    return (names,) if isinstance(names, str) else names
+
+
+Text = Annotated[str, Field(min_length=1)]
+Torque = Annotated[float, Field(ge=-1e5, le=1e5), AfterValidator(_loaded)]
+Noise = Annotated[float, Field(gt=0, le=3600)]
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+
+
+class PeakToPeakRecord(Record):
+    """Table ``[peak_to_peak]``."""
+
+    file: Text
+    torque_nm: Torque
+    noise_arcsec: Noise | None = None
+
+
+class CurveRecord(Record):
+    """One table ``[[curves]]``."""
+
+    unit: Text
+    file: Text
+    torque_nm: Torque
+    noise_arcsec: Noise | None = None
+    angle_offset_deg: Degrees = 0.0
+    start_stop_deg: Annotated[float, Field(ge=0, le=180)] = 0.0
+
+
+class LoopRecord(Record):
+    """One table ``[[loops]]``."""
+
+    unit: Text
+    file: Text
+    carrier_angle_deg: Degrees
+    noise_arcsec: Noise | None = None
+
+
+class MeasurementRecord(Record):
+    """A measurement file; its inner tables are checked one by one, so that a sentence can number them."""
+
+    name: Text
+    source: Text
+    units: Annotated[tuple[Text, ...], BeforeValidator(_as_list), Field(min_length=1)]
+    neglected: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    peak_to_peak: dict[str, Any] | None = None
+    curves: tuple[dict[str, Any], ...] = ()
+    loops: tuple[dict[str, Any], ...] = ()
+
+
+def load_measurements(path: str | Path) -> Measurements:
+    """Return the measurements of a TOML file, cleaned; the files it names stand relative to it.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    """
+    path = Path(path)
+    record = validated(MeasurementRecord, read_toml(path), path)
+    if record.peak_to_peak is None and not (record.curves or record.loops):
+        raise InputError(f"{path}: there are no measured data; give [peak_to_peak], [[curves]] or [[loops]].")
+    units = _units(record, path)
+    positions = {unit.name: number for number, unit in enumerate(units)}
+    return Measurements(
+        name=record.name,
+        source=record.source,
+        units=units,
+        peak_to_peak=None if record.peak_to_peak is None else _peak_to_peak(record.peak_to_peak, path, positions),
+        curves=tuple(
+            _curve(data, path, f"{path}, curve {number}", positions) for number, data in enumerate(record.curves, 1)
+        ),
+        loops=tuple(
+            _loop(data, path, f"{path}, loop {number}", positions) for number, data in enumerate(record.loops, 1)
+        ),
+        assumptions=record.assumptions,
+    )
+
+
+def _units(record: MeasurementRecord, path: Path) -> tuple[BuiltUnit, ...]:
+    """Return the units of tables and unit files, each name once."""
+    units: list[BuiltUnit] = []
+    for name in record.units:
+        if name.lower().endswith(".toml"):
+            unit = load_unit(path.parent / name)
+            units.append(replace(unit, neglected=unit.neglected + record.neglected))
+        else:
+            units.extend(load_units(path.parent / name, record.neglected))
+    names = [unit.name for unit in units]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError.at(path, "the name of a unit", name, "each name once in all of its unit files")
+    return tuple(units)
+
+
+def _position(name: str, place: Path | str, positions: Mapping[str, int]) -> int:
+    if name not in positions:
+        raise UnknownNameError.among(place, "unit", name, positions)
+    return positions[name]
+
+
+def _in_radians(noise: float | None, factor: float = 1.0) -> float | None:
+    return None if noise is None else noise * ARCSECOND * factor
+
+
+def _peak_to_peak(data: Mapping[str, Any], path: Path, positions: Mapping[str, int]) -> MeasuredPeakToPeak:
+    record = validated(PeakToPeakRecord, data, f"{path}, peak_to_peak")
+    table = read_text_table(path.parent / record.file)
+    names = unit_names(table)
+    header, factor, values = read_column(table, PEAK_TO_PEAK)
+    units = []
+    for row, name, cells, value in zip(table.rows, names, table.cells, values, strict=True):
+        units.append(_position(name, f"{table.path}, row {row}", positions))
+        if not 0.0 <= value <= LARGEST_RANGE:
+            raise InputError.at(
+                f"{table.path}, row {row} (unit {name})",
+                header,
+                cells[table.headers.index(header)],
+                f"a number from 0 to {LARGEST_RANGE / factor:g}",
+            )
+    if values.size > 1 and np.ptp(values) == 0:
+        raise InputError(
+            f"{table.path}: all {values.size} values of column {header!r} are {values[0] / factor:.6g}; an instrument "
+            "that does not move is no measurement."
+        )
+    return MeasuredPeakToPeak(
+        unit=np.array(units), values=values, torque=record.torque_nm, noise=_in_radians(record.noise_arcsec)
+    )
+
+
+def _prefixed(file: str, cleaned: Cleaned) -> tuple[str, ...]:
+    return tuple(f"{file}: {repair}" for repair in cleaned.repairs)
+
+
+def _curve(data: Mapping[str, Any], path: Path, place: str, positions: Mapping[str, int]) -> MeasuredCurve:
+    record = validated(CurveRecord, data, place)
+    unit = _position(record.unit, place, positions)
+    cleaned = clean_curve(
+        load_readings(path.parent / record.file, ANGLE, TRANSMISSION_ERROR),
+        offset=record.angle_offset_deg * DEGREE,
+        start_stop=record.start_stop_deg * DEGREE,
+    )
+    return MeasuredCurve(
+        unit=unit,
+        torque=record.torque_nm,
+        carrier_angle=cleaned.along,
+        transmission_error=cleaned.values,
+        noise=_in_radians(record.noise_arcsec, cleaned.noise_factor),
+        repairs=_prefixed(record.file, cleaned),
+    )
+
+
+def _loop(data: Mapping[str, Any], path: Path, place: str, positions: Mapping[str, int]) -> MeasuredLoop:
+    record = validated(LoopRecord, data, place)
+    unit = _position(record.unit, place, positions)
+    cleaned = clean_loop(load_readings(path.parent / record.file, TORQUE, TWIST))
+    return MeasuredLoop(
+        unit=unit,
+        carrier_angle=record.carrier_angle_deg * DEGREE,
+        torque=cleaned.along,
+        twist=cleaned.values,
+        noise=_in_radians(record.noise_arcsec, cleaned.noise_factor),
+        repairs=_prefixed(record.file, cleaned),
+    )

@@ -1,0 +1,190 @@
+"""Readings of an instrument: two columns of a CSV file, units in its header, into arrays in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
+from tolalloc.exceptions import InputError
+from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
+
+MISSING = ("", "nan", "na", "n/a", "-", "inf", "+inf", "-inf")
+"""What instruments write where they have no number."""
+
+
+FEWEST = 3
+"""Fewest readings of a curve and levels of a loop; the mean takes one away [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A column that a file may hold.
+
+    Parameters
+    ----------
+    name
+        Header without its unit.
+    units
+        Unit as written → factor to SI [-].
+    """
+
+    name: str
+    units: dict[str, float]
+
+
+_SMALL_ANGLES = {
+    "arcsec": ARCSECOND,
+    "arcmin": ARCMINUTE,
+    "deg": DEGREE,
+    "rad": 1.0,
+    "µrad": MICRORADIAN,
+    "urad": MICRORADIAN,
+}
+ANGLE = Quantity(name="angle", units={"deg": DEGREE, "rad": 1.0, "arcmin": ARCMINUTE})
+TRANSMISSION_ERROR = Quantity(name="transmission error", units=_SMALL_ANGLES)
+TWIST = Quantity(name="twist", units=_SMALL_ANGLES)
+PEAK_TO_PEAK = Quantity(name="peak_to_peak", units=_SMALL_ANGLES)
+TORQUE = Quantity(name="torque", units={"N·m": 1.0, "Nm": 1.0})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Readings:
+    """Readings in the order of the file; not a number where the instrument gave none.
+
+    Parameters
+    ----------
+    path
+        Where they were read.
+    header
+        Header of the column that they are taken along, as in the file.
+    factor
+        SI units per unit of that column [-].
+    row
+        Line of each reading as counted in the file [-].
+    along
+        Angle or torque at which each was taken [rad or N·m].
+    values
+        What the instrument showed [rad].
+    averaged
+        Readings that each value is the mean of [-].
+    """
+
+    path: Path
+    header: str
+    factor: float
+    row: Int[np.ndarray, " reading"]
+    along: Float[np.ndarray, " reading"]
+    values: Float[np.ndarray, " reading"]
+    averaged: Float[np.ndarray, " reading"]
+
+    def chosen(self, which: np.ndarray) -> Readings:
+        """Return the readings that a mask or a list of positions names, in its order."""
+        return Readings(
+            path=self.path,
+            header=self.header,
+            factor=self.factor,
+            row=self.row[which],
+            along=self.along[which],
+            values=self.values[which],
+            averaged=self.averaged[which],
+        )
+
+
+def read_column(table: TextTable, quantity: Quantity) -> tuple[str, float, Float[np.ndarray, " row"]]:
+    """Return header, factor to SI, and values in SI units of one column; not a number where a cell holds none.
+
+    Raises
+    ------
+    InputError
+        The column is missing or there twice, its unit is missing or unknown, or a cell holds text.
+    """
+    headers = [header for header in table.headers if _same_name(header, quantity.name)]
+    units = " or ".join(quantity.units)
+    if not headers:
+        raise InputError(
+            f"{table.path}: the column {quantity.name!r} with its unit in square brackets ({units}) is missing; the "
+            f"columns are {', '.join(map(repr, table.headers))}."
+        )
+    if len(headers) > 1:
+        raise InputError(
+            f"{table.path}: the column {quantity.name!r} stands there {len(headers)} times; allowed is once."
+        )
+    unit = split_header(headers[0])[1]
+    if unit not in quantity.units:
+        raise InputError.at(table.path, f"the unit of column {headers[0]!r}", unit, f"{units} in square brackets")
+    position, factor = table.headers.index(headers[0]), quantity.units[unit]
+    values = np.full(len(table.rows), np.nan)
+    for number, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
+        if cells[position].lower() in MISSING:
+            continue
+        try:
+            value = float(cells[position])
+        except ValueError:
+            value = np.inf
+        if not isfinite(value):
+            raise InputError.at(
+                f"{table.path}, row {row}",
+                headers[0],
+                cells[position],
+                "a number with a decimal point, or nothing where the instrument gave none",
+            )
+        values[number] = value * factor
+    return headers[0], factor, values
+
+
+def _same_name(header: str, name: str) -> bool:
+    return split_header(header)[0].lower().replace("_", " ") == name.replace("_", " ")
+
+
+def load_readings(path: Path, along: Quantity, values: Quantity) -> Readings:
+    """Return the two columns of a file in SI units; columns of other names are not read.
+
+    Parameters
+    ----------
+    path
+        CSV file; lines that start with # are comments.
+    along
+        `ANGLE` or `TORQUE`.
+    values
+        `TRANSMISSION_ERROR` or `TWIST`.
+
+    Raises
+    ------
+    InputError
+        The file, row, column and value that are not allowed; also a column whose values are all equal.
+    """
+    table = read_text_table(path)
+    header, factor, places = read_column(table, along)
+    value_header, value_factor, shown = read_column(table, values)
+    for name, column, unit in ((header, places, factor), (value_header, shown, value_factor)):
+        finite = column[np.isfinite(column)]
+        if finite.size > 1 and np.ptp(finite) == 0:
+            raise InputError(
+                f"{path}: all {finite.size} values of column {name!r} are {finite[0] / unit:.6g}; an instrument that "
+                "does not move is no measurement."
+            )
+    return Readings(
+        path=path,
+        header=header,
+        factor=factor,
+        row=np.array(table.rows),
+        along=places,
+        values=shown,
+        averaged=np.ones(len(table.rows)),
+    )
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number and a noun in singular or plural."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def require_readings(readings: Readings, what: str) -> None:
+    """Raise unless enough readings are left for a shape."""
+    if readings.along.size < FEWEST:
+        raise InputError.at(readings.path, f"the number of {what}s", readings.along.size, f"{FEWEST} or more")

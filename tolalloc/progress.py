@@ -1,0 +1,67 @@
+"""How far the work has come: what a person is shown, and what the manifest keeps of statuses and times."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import UInt8
+
+
+@runtime_checkable
+class Progress(Protocol):
+    """What shows a person how far the work has come."""
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage."""
+        ...
+
+    def advance(self, units: int) -> None:
+        """So many more units are solved."""
+        ...
+
+
+@dataclass
+class Record:
+    """What the manifest says of the run itself: statuses and times per stage.
+
+    Parameters
+    ----------
+    progress
+        Told of every stage and every chunk of units.
+    outcomes
+        Status → outcome in words; the model's own.
+    """
+
+    progress: Progress
+    outcomes: Mapping[int, str]
+    statuses: Counter[int] = field(default_factory=Counter)
+    stages: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage and count its units."""
+        self.progress.begin(name)
+        units, start = sum(self.statuses.values()), time.perf_counter()
+        yield
+        seconds, solved = time.perf_counter() - start, sum(self.statuses.values()) - units
+        self.stages[name] = {
+            "seconds": round(seconds, 3),
+            "units": solved,
+            "units per second": round(solved / seconds, 1),
+        }
+
+    def observe(self, status: UInt8[np.ndarray, " sample"]) -> None:
+        """Count the statuses of one chunk."""
+        self.statuses.update(int(value) for value in status)
+        self.progress.advance(status.size)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Outcome → number of units [-]."""
+        return {sentence: self.statuses[status] for status, sentence in self.outcomes.items()}

@@ -1,0 +1,1 @@
+"""The RV reducer: one model of this package, and its own tools."""

@@ -1,0 +1,125 @@
+"""How stiff one pin against one tooth is: what every contact law takes, along the whole tooth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.rv.cycloid.mesh import Angles, path_curvature
+from tolalloc.rv.reducer.design import CycloidStage
+from tolalloc.rv.reducer.stiffness import Stiffness
+
+APPROACH = 2.0 / 3.0
+"""Constant of the approach F/c·(ln(cL/F) + 2/3) of pin and tooth: Roark's and Li Lixing's, who write it
+2/3 + ln(16·r·ρ/(2a)²) with Hertz's half width a [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactStiffness:
+    """What `tolalloc.rv.cycloid.solvers.contact_law.pin_force` takes, pin by pin.
+
+    Parameters
+    ----------
+    stiffness
+        Of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m].
+    log_length
+        ln(λ/1 m) of the logarithmic law [-].
+    """
+
+    stiffness: Float[np.ndarray, "*angles"]
+    log_length: Float[np.ndarray, "*angles"]
+
+
+def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> ContactStiffness:
+    """Return the stiffness of pins against the teeth that they meet.
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    stiffness
+        Contact law, its scale and the bending of the pins.
+    pin_angle
+        Angle φ of the pins from the crank direction [rad].
+    """
+    contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
+    if law == "table2":
+        contact = pin_contact_table2(stage, stiffness.pin_contact, pin_angle)
+    log_length = np.log(equivalent_length(stage, pin_angle))
+    if law == "logarithmic":
+        # A spring in series adds F/k to F/c·ln(cλ/F), which a longer λ does as well.
+        log_length = log_length + 2.0 * stiffness.pin_contact / stiffness.pin_bending
+    else:
+        contact = contact / (1.0 + contact / stiffness.pin_bending)
+    return ContactStiffness(stiffness=contact, log_length=log_length)
+
+
+def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return K_djk along the tooth: C(ρ−r)/(ρ+r) on the concave part, C on the convex part [N/m].
+
+    Notes
+    -----
+    With the curvature κ of the pin centre's path it is C/(1 + 2rκ). The printed formula with its signed curvature is
+    singular or negative on the convex part for pin radii above about 2.5 mm on an RV-20E, so only the concave part
+    follows the print.
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    convex_stiffness
+        C of `tolalloc.rv.reducer.stiffness.line_contact` [N/m].
+    pin_angle
+        Angle φ of the pin from the crank direction [rad].
+
+    References
+    ----------
+    liu2020, Table 2 (K_djk).
+    """
+    return np.asarray(convex_stiffness / (1 + 2 * stage.pin_radius * np.maximum(path_curvature(stage, pin_angle), 0.0)))
+
+
+def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return λ = L·exp(2/3) of the approach F/c·ln(cλ/F), theory page equation (30) [m].
+
+    Notes
+    -----
+    L is the radius of curvature of the path of the pin's centre on the disc: the flank's radius plus r_rp where the
+    flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
+    alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length
+    is an assumption.
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    pin_angle
+        Angle φ of the pin from the crank direction [rad].
+    """
+    bend = np.abs(path_curvature(stage, pin_angle))
+    return np.asarray(exp(APPROACH) / np.maximum(bend, 1 / stage.pin_circle_radius))
+
+
+def peak_pressure(
+    stage: CycloidStage, contact_modulus: float, pin_angle: Angles, force: Float[np.ndarray, "*angles"]
+) -> Float[np.ndarray, "*angles"]:
+    """Return Hertz's peak pressure √(F·E*/(πb·R)), R from the pin and the tooth's own curvature where it touches [Pa].
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    contact_modulus
+        E* of pin and disc [Pa].
+    pin_angle
+        Angle φ of the pins from the crank direction [rad].
+    force
+        Their forces [N].
+    """
+    path, pin = path_curvature(stage, pin_angle), stage.pin_radius
+    # 1/R = 1/r + 1/ρ with ρ = −1/κ − r of the tooth, convex positive.
+    sum_of_curvatures = 1 / pin - path / (1 + pin * path)
+    return np.asarray(np.sqrt(force * contact_modulus * sum_of_curvatures / (np.pi * stage.face_width)))

@@ -1,0 +1,110 @@
+"""Loaded contact by Li Lixing's linear method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.rv.cycloid.clearance import gap_of
+from tolalloc.rv.cycloid.contact_stiffness import contact_stiffness
+from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, loaded
+from tolalloc.rv.cycloid.mesh import flank_angle, normals
+from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.units import MICROMETRE
+
+_ITERATIONS = 500
+_SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
+
+
+def pressed_linear(
+    discs: PressedDiscs, phase: Float[np.ndarray, " phase"], deflection: float | None = None
+) -> LoadedContact:
+    """Return the contact by Li Lixing's method: forces in proportion to the compressions.
+
+    Parameters
+    ----------
+    discs
+        What is pressed.
+    phase
+        Angles from the crank direction of disc 1 to the next pin [rad].
+    deflection
+        δ_max where it is known [m]; otherwise it is iterated until it is the approach under the largest force, by the
+        reducer's law with the curvature at φ0.
+
+    Raises
+    ------
+    InputError
+        The deflection reaches no pin.
+    SolveError
+        The iteration does not settle.
+
+    Notes
+    -----
+    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
+
+    References
+    ----------
+    xi2015, equations (5)–(7); Li Lixing (1984).
+    """
+    stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
+    gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
+    lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
+
+    def shares(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
+        return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
+
+    def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+        return np.asarray(discs.torque / (stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))))
+
+    nearest = np.where(lever > _SHORTEST, distance / np.maximum(lever, _SHORTEST), np.inf).min(axis=(1, 2))
+    if deflection is not None:
+        if deflection <= nearest.max():
+            raise InputError(
+                f"{discs.reducer.name}: a deflection of {deflection / MICROMETRE:.3g} µm reaches no pin; "
+                f"allowed is above {nearest.max() / MICROMETRE:.3g} µm."
+            )
+        depth, steps = np.full(phase.size, deflection), 0
+        method = "Li Lixing's linear method, deflection given"
+    else:
+        depth, steps = _iterated(discs, nearest, largest_force)
+        method = "Li Lixing's linear method"
+    force = largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth)
+    return replace(loaded(discs, method, phase, depth, force), iterations=steps)
+
+
+def _iterated(
+    discs: PressedDiscs,
+    nearest: Float[np.ndarray, " phase"],
+    largest_force: Callable[[Float[np.ndarray, " phase"]], Float[np.ndarray, " phase"]],
+) -> tuple[Float[np.ndarray, " phase"], int]:
+    """Return the deflections that are the approach under their own largest force [m], and the steps it took.
+
+    The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
+    middle of what brackets the answer where that mean leaves it and at every third step, as the mean may creep.
+    """
+    low, high = nearest, np.full(nearest.size, np.inf)
+    lever = discs.reducer.cycloid_stage.disc_pitch_radius
+    depth = nearest + _approach(discs.reducer, np.full(nearest.size, discs.torque / lever))
+    for step in range(1, _ITERATIONS + 1):
+        wanted = _approach(discs.reducer, largest_force(depth))
+        if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
+            return depth, step
+        low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
+        mean, middle = 0.5 * (depth + wanted), 0.5 * (low + np.minimum(high, 4 * depth))
+        depth = np.where((low < mean) & (mean < high) & (step % 3 != 0), mean, middle)
+    raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
+
+
+def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+    """Return how far pin and tooth at φ0 approach each other under forces [m]."""
+    stage, stiffness = reducer.cycloid_stage, reducer.stiffness
+    contact = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
+    if LAWS[stiffness.pin_contact_law] == LINEAR:
+        return np.asarray(force / contact.stiffness)
+    scale = 2 * contact.stiffness
+    return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))

@@ -1,0 +1,176 @@
+"""Simulation of the equivalent model in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import Inertia
+from tolalloc.rv.dynamics.integrator import Integrator
+from tolalloc.rv.dynamics.motion import Motion
+from tolalloc.rv.dynamics.solvers.stepping import Parts, Record, Scheme, State, advance
+from tolalloc.rv.dynamics.tables import Steps
+from tolalloc.rv.equivalent.model import EquivalentModel
+
+Progress = Callable[[float], None]
+"""Told how much of the time is simulated, from 0 to 1."""
+
+
+def _untold(share: float) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """The whole state of every sample at chosen times.
+
+    Parameters
+    ----------
+    time
+        These times [s].
+    displacement, velocity, acceleration
+        Deviations q from the nominal motion, in the order of `tolalloc.rv.equivalent.kinematics.Coordinates`, and their
+        derivatives [m, rad, and per s, per s²].
+    pin_forces
+        Normal force between every pin and every disc [N].
+    """
+
+    time: Float[np.ndarray, " observed"]
+    displacement: Float[np.ndarray, "sample observed coordinate"]
+    velocity: Float[np.ndarray, "sample observed coordinate"]
+    acceleration: Float[np.ndarray, "sample observed coordinate"]
+    pin_forces: Float[np.ndarray, "sample observed disc pin"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulated:
+    """Samples over time; from a step that found no equilibrium on, not a number and its status.
+
+    Parameters
+    ----------
+    time, carrier_angle
+        Times and nominal carrier angles θc [s, rad].
+    transmission_error
+        Carrier rotation beyond θc, output side [rad].
+    output_speed, output_acceleration
+        Of the carrier, nominal motion included [rad/s, rad/s²].
+    input_torque
+        Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it
+        [N·m].
+    pins_in_contact
+        Number of pins that carry load [-].
+    status
+        Values of `tolalloc.rv.equivalent.status.Status` [-].
+    residual
+        Largest component of the unbalanced force over the largest force [-].
+    observed
+        The whole state at the times asked for.
+    """
+
+    time: Float[np.ndarray, " time"]
+    carrier_angle: Float[np.ndarray, " time"]
+    transmission_error: Float[np.ndarray, "sample time"]
+    output_speed: Float[np.ndarray, "sample time"]
+    output_acceleration: Float[np.ndarray, "sample time"]
+    input_torque: Float[np.ndarray, "sample time"]
+    pins_in_contact: UInt16[np.ndarray, "sample time disc"]
+    status: UInt8[np.ndarray, "sample time"]
+    residual: Float[np.ndarray, "sample time"]
+    observed: Observed
+
+
+def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -> Record:
+    reducer, times, size = steps.reducer, steps.motion.time.size, steps.coordinates.count
+    slot = np.full(times, -1)
+    slot[observe] = np.arange(observe.size)
+    curve, whole = (samples, times), (samples, observe.size, size)
+    return Record(
+        rotation=np.empty(curve),
+        speed=np.empty(curve),
+        acceleration=np.empty(curve),
+        input_torque=np.empty(curve),
+        touching=np.empty((*curve, reducer.disc_count), np.uint16),
+        status=np.empty(curve, np.uint8),
+        residual=np.empty(curve),
+        slot=slot,
+        coordinate=np.empty(whole),
+        velocity=np.empty(whole),
+        second=np.empty(whole),
+        pin_force=np.empty((samples, observe.size, reducer.disc_count, reducer.cycloid_stage.pin_count)),
+    )
+
+
+def simulate(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "sample column"],
+    motion: Motion,
+    inertia: Inertia,
+    damping: Damping,
+    integrator: Integrator,
+    observe: Int[np.ndarray, " observed"] | None = None,
+    progress: Progress = _untold,
+) -> Simulated:
+    """Return what every sample does over time.
+
+    Parameters
+    ----------
+    model
+        The equivalent model.
+    errors
+        Deviations in the order of the model's columns [m, angles rad].
+    motion
+        Nominal motion and load.
+    inertia, damping
+        Of the parts and interfaces.
+    integrator
+        `tolalloc.rv.dynamics.integrator.newmark` or `tolalloc.rv.dynamics.integrator.generalised_alpha`.
+    observe
+        Numbers of the steps at which the whole state is given, each once; none unless given [-].
+    progress
+        Told the share of the time that is simulated [-].
+
+    Raises
+    ------
+    InputError
+        Damping of an interface that is not there or has play.
+
+    Notes
+    -----
+    M·q̈ + C·q̇ + ∂V(q, θc)/∂q = f − M·a, with V the energy of the static model, f the torque on the carrier and a the
+    acceleration of the nominal motion; the sun's rotation is prescribed. At time 0 every sample is in the equilibrium
+    of the static model, its deviations have no velocity and the acceleration −a that follows.
+    """
+    steps = Steps(model=model, motion=motion, inertia=inertia, damping=damping, integrator=integrator)
+    columns, coordinates, samples = model.error_columns, steps.coordinates, errors.shape[0]
+    chosen = np.array([], np.int64) if observe is None else observe
+    record, rotation = _record(steps, samples, chosen), coordinates.carrier + 2
+    nothing = np.zeros((4, samples, coordinates.count))
+    state = State(nothing[0], nothing[1], nothing[2], nothing[3], np.zeros(samples, np.uint8))
+    scale, given = steps.scale, np.ascontiguousarray(errors)
+    parts = Parts(steps.mass, steps.kept, rotation, float(scale[rotation]), steps.played_meshes, steps.sun_base_radius)
+    scheme = Scheme(integrator.alpha_m, integrator.alpha_f, integrator.beta, integrator.gamma, motion.step)
+    for first, angles, tables in steps.parts():
+        advance(first, angles, tables, parts, scheme, columns.layout, columns.map, model.design, given, state, record)
+        progress((first + len(angles.stiffness)) / motion.time.size)
+    return Simulated(
+        time=motion.time,
+        carrier_angle=motion.carrier_angle,
+        transmission_error=record.rotation,
+        output_speed=motion.carrier_speed + record.speed,
+        output_acceleration=motion.carrier_acceleration + record.acceleration,
+        input_torque=record.input_torque,
+        pins_in_contact=record.touching,
+        status=record.status,
+        residual=record.residual,
+        observed=Observed(
+            time=motion.time[chosen],
+            displacement=record.coordinate * scale,
+            velocity=record.velocity * scale,
+            acceleration=record.second * scale,
+            pin_forces=record.pin_force,
+        ),
+    )

@@ -1,0 +1,206 @@
+"""Where orders of the transmission error meet natural frequencies, and how they grow with the speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from tolalloc.exceptions import InputError
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import Inertia
+from tolalloc.rv.dynamics.integrator import Integrator
+from tolalloc.rv.dynamics.modes import Modes
+from tolalloc.rv.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.simulation import simulate
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import order_spectrum
+
+
+@dataclass(frozen=True, kw_only=True)
+class CriticalSpeed:
+    """Output speeds at which an order excites a mode.
+
+    Parameters
+    ----------
+    order
+        Waves per output turn [-].
+    mode
+        Number of the mode from the lowest frequency on, from 0 [-].
+    slowest, fastest
+        Output speeds between which the order meets the mode's frequency at some carrier angle [rad/s].
+    carrier_share
+        Share of the carrier's rotation in the mode's kinetic energy, mean over the angles [-].
+    """
+
+    order: int
+    mode: int
+    slowest: float
+    fastest: float
+    carrier_share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Campbell:
+    """Natural frequencies against the orders that excite them.
+
+    Parameters
+    ----------
+    lowest, highest
+        Frequency of every mode over the carrier angles [Hz].
+    critical
+        Critical speeds inside the range asked for, slowest first.
+    """
+
+    lowest: Float[np.ndarray, " mode"]
+    highest: Float[np.ndarray, " mode"]
+    critical: tuple[CriticalSpeed, ...]
+
+
+def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]) -> Campbell:
+    """Return the frequency bands and the output speeds at which orders meet them.
+
+    Parameters
+    ----------
+    modes
+        Modes at carrier angles over a turn.
+    orders
+        Waves per output turn that excite [-].
+    output_speeds
+        Slowest and fastest output speed of interest [rad/s].
+
+    Raises
+    ------
+    InputError
+        An order below 1.
+
+    Notes
+    -----
+    An order n excites with n·Ω/2π at the output speed Ω. A mode is told by its rank in frequency at every angle, not by
+    its shape; where two frequencies cross over a turn, their bands share the crossing.
+    """
+    if min(orders, default=1) < 1:
+        raise InputError.at("speeds", "orders", orders, "1 or more waves per output turn")
+    lowest, highest = modes.frequency.min(axis=0), modes.frequency.max(axis=0)
+    share, found = modes.carrier_share.mean(axis=0), []
+    for order in orders:
+        for mode, band in enumerate(np.stack([lowest, highest], axis=1)):
+            slowest, fastest = (float(speed) for speed in 2 * pi * band / order)
+            if slowest <= output_speeds[1] and fastest >= output_speeds[0]:
+                found.append(
+                    CriticalSpeed(
+                        order=order,
+                        mode=mode,
+                        slowest=slowest,
+                        fastest=fastest,
+                        carrier_share=float(share[mode]),
+                    )
+                )
+    critical = tuple(sorted(found, key=lambda meeting: (meeting.slowest, meeting.fastest)))
+    return Campbell(lowest=lowest, highest=highest, critical=critical)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrdersAgainstSpeed:
+    """Orders of the transmission error at constant output speeds; NaN where a step found no equilibrium.
+
+    Parameters
+    ----------
+    speed
+        Output speeds [rad/s].
+    order
+        Waves per output turn [-].
+    amplitude
+        Half the peak-to-peak of each wave over the last turn, output side [rad].
+    peak_to_peak
+        Peak-to-peak transmission error of the last turn [rad].
+    unsettled
+        Largest difference between the second halves of the last turn and of the one before it [rad].
+    status
+        Worst value of `tolalloc.rv.equivalent.status.Status` of all steps [-].
+    """
+
+    speed: Float[np.ndarray, " speed"]
+    order: Int[np.ndarray, " order"]
+    amplitude: Float[np.ndarray, "sample speed order"]
+    peak_to_peak: Float[np.ndarray, "sample speed"]
+    unsettled: Float[np.ndarray, "sample speed"]
+    status: UInt8[np.ndarray, "sample speed"]
+
+
+def orders_against_speed(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "sample column"],
+    torque: float,
+    inertia: Inertia,
+    damping: Damping,
+    integrator: Integrator,
+    speeds: Float[np.ndarray, " speed"],
+    orders: tuple[int, ...],
+    steps_per_turn: int,
+    turns: int = 2,
+) -> OrdersAgainstSpeed:
+    """Return the orders of the transmission error at constant speeds under a constant torque.
+
+    Parameters
+    ----------
+    model
+        The equivalent model.
+    errors
+        Deviations in the order of the model's columns [m, angles rad].
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
+    inertia, damping
+        Of the parts and interfaces.
+    integrator
+        `tolalloc.rv.dynamics.integrator.newmark` or `tolalloc.rv.dynamics.integrator.generalised_alpha`.
+    speeds
+        Output speeds [rad/s].
+    orders
+        Waves per output turn whose amplitudes are wanted [-].
+    steps_per_turn
+        Time steps per output turn; a wave at resonance needs some twenty of them [-].
+    turns
+        Output turns of each run, of which the last is looked at [-].
+
+    Raises
+    ------
+    InputError
+        A speed that is not positive, fewer than two turns, or too few steps for an order.
+
+    Notes
+    -----
+    Every run starts at carrier angle 0 in the equilibrium of `tolalloc.rv.dynamics.simulation.simulate`, and
+    what the start sets swinging decays. Where the second half of a turn repeats itself in the next one, it has decayed
+    before the last turn begins; this holds for gear ratios that bring the sun back to its place after an output turn.
+    Newmark's method may feed modes too fast for the step while pins come and go; the generalised-α method with a
+    spectral radius below 1 damps them.
+    """
+    if not np.all((speeds > 0.0) & np.isfinite(speeds)):
+        raise InputError.at("speeds", "speeds", speeds.tolist(), "positive numbers")
+    if turns < 2:
+        raise InputError.at("speeds", "turns", turns, "2 or more")
+    if not 1 <= min(orders, default=1) <= max(orders, default=1) < steps_per_turn / 2:
+        raise InputError.at("speeds", "orders", orders, f"1 to less than half of the {steps_per_turn} steps per turn")
+    shape, order = (errors.shape[0], speeds.size), np.array(orders, np.int64)
+    peak_to_peak, unsettled, status = np.empty(shape), np.empty(shape), np.empty(shape, np.uint8)
+    amplitude = np.empty((*shape, order.size))
+    for at, speed in enumerate(speeds):
+        sun, duration = Profile.constant(float(speed) * model.reducer.ratio), turns * 2 * pi / float(speed)
+        motion = motion_of(model.reducer, sun, Profile.constant(torque), duration, turns * steps_per_turn)
+        found = simulate(model, errors, motion, inertia, damping, integrator)
+        before, last = np.split(found.transmission_error[:, -2 * steps_per_turn :], 2, axis=1)
+        difference = (last - before)[:, steps_per_turn // 2 :]
+        amplitude[:, at] = order_spectrum(last).amplitude[:, order - 1]
+        peak_to_peak[:, at], unsettled[:, at] = np.ptp(last, axis=1), np.abs(difference).max(axis=1)
+        status[:, at] = found.status.max(axis=1)
+    return OrdersAgainstSpeed(
+        speed=speeds,
+        order=order,
+        amplitude=amplitude,
+        peak_to_peak=peak_to_peak,
+        unsettled=unsettled,
+        status=status,
+    )

@@ -1,0 +1,212 @@
+"""What the time steps need at their carrier angles and what no sample changes, made for a few steps at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import Inertia
+from tolalloc.rv.dynamics.integrator import Integrator
+from tolalloc.rv.dynamics.motion import Motion, nominal_acceleration
+from tolalloc.rv.equivalent.condensation import (
+    CondensedAngles,
+    bilateral_groups,
+    condense,
+    kept_coordinates,
+    rotation_scale,
+)
+from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.design import Reducer
+
+_STEPS_AT_ONCE = 512
+
+
+class StepTables(NamedTuple):
+    """Tables of some successive steps, beside the condensed ones. All coordinates are lengths, as there.
+
+    Parameters
+    ----------
+    stiffness, damping
+        Of the interfaces without play; of these and the masses [N/m, N·s/m].
+    by_kept
+        Change of all coordinates per change of the kept ones [m/m].
+    flexibility
+        Change of all coordinates per force at fixed kept ones [m/N].
+    rates
+        What a displacement beyond the predicted one adds to algorithmic acceleration, velocity and acceleration
+        [1/s², 1/s, 1/s²]; zero at the start, which is a static equilibrium.
+    acceleration
+        Nominal acceleration [m/s²].
+    torque
+        Torque on the carrier [N·m].
+    drive_by_coordinate, drive_by_velocity, drive_by_load
+        Torque of the meshes without play on the sun, against its rotation, per coordinate, velocity and value
+        [N, N·s, N].
+    """
+
+    stiffness: Float[np.ndarray, "step coordinate coordinate"]
+    damping: Float[np.ndarray, "step coordinate coordinate"]
+    by_kept: Float[np.ndarray, "step coordinate kept"]
+    flexibility: Float[np.ndarray, "step coordinate coordinate"]
+    rates: Float[np.ndarray, "step 3"]
+    acceleration: Float[np.ndarray, "step coordinate"]
+    torque: Float[np.ndarray, " step"]
+    drive_by_coordinate: Float[np.ndarray, "step coordinate"]
+    drive_by_velocity: Float[np.ndarray, "step coordinate"]
+    drive_by_load: Float[np.ndarray, "step load"]
+
+
+class _Springs(NamedTuple):
+    """Bilateral springs of some steps: what `StepTables` says of them."""
+
+    stiffness: Float[np.ndarray, "step coordinate coordinate"]
+    damping: Float[np.ndarray, "step coordinate coordinate"]
+    load: Float[np.ndarray, "step coordinate load"]
+    drive_by_coordinate: Float[np.ndarray, "step coordinate"]
+    drive_by_velocity: Float[np.ndarray, "step coordinate"]
+    drive_by_load: Float[np.ndarray, "step load"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Everything but the samples of a simulation.
+
+    Parameters
+    ----------
+    model
+        The equivalent model.
+    motion
+        Nominal motion and load.
+    inertia, damping
+        Of its parts and interfaces.
+    integrator
+        Constants of the time integrator [-].
+
+    Raises
+    ------
+    InputError
+        Damping of an interface that is not there or has play.
+    """
+
+    model: EquivalentModel
+    motion: Motion
+    inertia: Inertia
+    damping: Damping
+    integrator: Integrator
+
+    def __post_init__(self) -> None:
+        self.damping.check(bilateral_groups(self._positions(slice(0, 1))))
+
+    @property
+    def reducer(self) -> Reducer:
+        """The nominal design."""
+        return self.model.reducer
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The layout of q."""
+        return Coordinates(self.reducer.crank_count, self.reducer.disc_count)
+
+    @cached_property
+    def scale(self) -> Float[np.ndarray, " coordinate"]:
+        """Coordinate of q per length that the tables have instead [m/m, rad/m]."""
+        return np.asarray(rotation_scale(self.reducer, self.coordinates))
+
+    @cached_property
+    def mass(self) -> Float[np.ndarray, " coordinate"]:
+        """Mass of every coordinate taken as a length [kg]."""
+        return np.asarray(self.inertia.diagonal(self.coordinates) * self.scale**2)
+
+    @cached_property
+    def kept(self) -> Int[np.ndarray, " kept"]:
+        """Which coordinates pins and play touch, the discs' first [-]."""
+        return kept_coordinates(self.reducer, self.coordinates, bilateral_groups(self._positions(slice(0, 1))))
+
+    @property
+    def played_meshes(self) -> int:
+        """Number of meshes with play; they are the first elements of all that can have play [-]."""
+        return self.reducer.crank_count if self.reducer.clearances.gear_mesh else 0
+
+    @property
+    def sun_base_radius(self) -> float:
+        """Base radius of the sun gear [m]."""
+        gears = self.reducer.first_stage
+        return self.reducer.planet_base_radius * gears.sun_teeth / gears.planet_teeth
+
+    def parts(self) -> Iterator[tuple[int, CondensedAngles, StepTables]]:
+        """Yield the first step and the tables of each part of the steps; memory holds one part at a time.
+
+        The condensed tables are as the contact solver takes them, with inertia and damping in ``stiffness`` [N/m] and
+        with the ``load`` on all coordinates instead of the kept ones [N/m, last N/(N·m)].
+        """
+        for first in range(0, self.motion.time.size, _STEPS_AT_ONCE):
+            yield first, *self._tables(slice(first, min(first + _STEPS_AT_ONCE, self.motion.time.size)))
+
+    def _positions(self, steps: slice) -> Positions:
+        return Positions(self.reducer, self.motion.carrier_angle[steps], self.model.orders)
+
+    def _springs(self, at: Positions) -> _Springs:
+        steps, size = at.carrier_angle.size, self.coordinates.count
+        loads = self.model.error_columns.layout.torque + 1
+        by_coordinate, by_velocity, by_load = np.zeros((steps, size)), np.zeros((steps, size)), np.zeros((steps, loads))
+        stiffness, load = np.zeros((steps, size, size)), np.zeros((steps, size, loads))
+        damping = np.zeros((steps, size, size)) + self.damping.mass_proportional * np.diag(self.mass)
+        first = 0
+        for group in bilateral_groups(at):
+            own = slice(first, first + len(group.columns))
+            first = own.stop
+            if group.contact == "play":
+                continue
+            rows, delay = group.displacement * self.scale, self.damping.per_stiffness(group.stiffness_name)
+            weighted = np.swapaxes(rows * group.stiffness[..., np.newaxis], 1, 2)
+            between = weighted @ rows
+            stiffness += between
+            damping += delay * between
+            load[:, :, own] = -(weighted @ group.error)
+            if group.stiffness_name == "gear_mesh":
+                by_coordinate[:] = self.sun_base_radius * weighted.sum(axis=2)
+                by_velocity[:] = delay * by_coordinate
+                by_load[:, own] = self.sun_base_radius * (group.stiffness[..., np.newaxis] * group.error).sum(axis=1)
+        rotation = self.coordinates.carrier + 2
+        load[:, rotation, -1] = self.scale[rotation]
+        return _Springs(stiffness, damping, load, by_coordinate, by_velocity, by_load)
+
+    def _tables(self, steps: slice) -> tuple[CondensedAngles, StepTables]:
+        at, motion = self._positions(steps), self.motion
+        springs, size, count = self._springs(at), self.coordinates.count, at.carrier_angle.size
+        rates = np.tile(self.integrator.rates(motion.step), (count, 1))
+        if steps.start == 0:
+            rates[0] = 0.0
+        kept, rest = self.kept, np.setdiff1d(np.arange(size), self.kept)
+        stiffness = springs.stiffness + rates[:, 1, None, None] * springs.damping
+        stiffness += rates[:, 2, None, None] * np.diag(self.mass)
+        by_kept, flexibility = np.zeros((count, size, kept.size)), np.zeros((count, size, size))
+        inverse = np.linalg.inv(stiffness[:, rest[:, np.newaxis], rest])
+        by_kept[:, kept] = np.eye(kept.size)
+        by_kept[:, rest] = -inverse @ stiffness[:, rest[:, np.newaxis], kept]
+        flexibility[:, rest[:, np.newaxis], rest] = inverse
+        condensed = stiffness[:, kept] @ by_kept
+        part = Motion(**{name: values[steps] for name, values in vars(motion).items()})
+        angles = condense(self.reducer, self.model.orders, at.carrier_angle)._replace(
+            stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
+            load=np.ascontiguousarray(np.swapaxes(springs.load, 1, 2)),
+        )
+        return angles, StepTables(
+            stiffness=springs.stiffness,
+            damping=springs.damping,
+            by_kept=by_kept,
+            flexibility=flexibility,
+            rates=rates,
+            acceleration=nominal_acceleration(at, part) / self.scale,
+            torque=part.torque,
+            drive_by_coordinate=springs.drive_by_coordinate,
+            drive_by_velocity=springs.drive_by_velocity,
+            drive_by_load=springs.drive_by_load,
+        )

@@ -1,0 +1,111 @@
+"""What the kernel answers: equilibria over a turn, extremes of the transmission error, derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+
+from tolalloc.rv.equivalent.columns import Columns
+from tolalloc.rv.equivalent.condensation import CondensedAngles
+from tolalloc.rv.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibria:
+    """Equilibria of samples at carrier angles: what every output is read from.
+
+    Parameters
+    ----------
+    reducer
+        The nominal design.
+    columns
+        Its error columns and the values that they move.
+    tables
+        Its condensed tables at the carrier angles.
+    errors
+        Deviations in the order of the model's columns [m, angles rad].
+    torque
+        Torque on the carrier [N·m].
+    carrier_angle
+        θc [rad].
+    transmission_error
+        Carrier rotation beyond θc, output side [rad].
+    kept
+        Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m].
+    status
+        Values of `tolalloc.rv.equivalent.status.Status` [-].
+    residual
+        Largest component of the unbalanced force over the largest force [-].
+    pins_in_contact
+        Number of pins that carry load, all discs [-].
+    """
+
+    reducer: Reducer
+    columns: Columns
+    tables: CondensedAngles
+    errors: Float[np.ndarray, "sample column"]
+    torque: float
+    carrier_angle: Float[np.ndarray, " angle"]
+    transmission_error: Float[np.ndarray, "sample angle"]
+    kept: Float[np.ndarray, "sample angle coordinate"]
+    status: UInt8[np.ndarray, "sample angle"]
+    residual: Float[np.ndarray, "sample angle"]
+    pins_in_contact: UInt16[np.ndarray, "sample angle"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extremes:
+    """Largest and smallest transmission error of each sample over one output turn.
+
+    Parameters
+    ----------
+    largest, smallest
+        Extremes of the transmission error, output side [rad].
+    carrier_angle
+        Where they occur [rad].
+    remaining
+        What still finer angles may add to the peak-to-peak, an estimate [rad].
+    solves
+        Equilibria solved [-].
+    status
+        Worst status of the sample's angles [-].
+    residual
+        Largest residual over the largest force of the sample's angles [-].
+    """
+
+    largest: Float[np.ndarray, " sample"]
+    smallest: Float[np.ndarray, " sample"]
+    carrier_angle: Float[np.ndarray, "sample 2"]
+    remaining: Float[np.ndarray, " sample"]
+    solves: Int[np.ndarray, " sample"]
+    status: UInt8[np.ndarray, " sample"]
+    residual: Float[np.ndarray, " sample"]
+
+    @property
+    def peak_to_peak(self) -> Float[np.ndarray, " sample"]:
+        """Peak-to-peak transmission error [rad]."""
+        return np.asarray(self.largest - self.smallest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivatives:
+    """Exact derivatives of an output, sample by sample or angle by angle.
+
+    Parameters
+    ----------
+    by_error
+        By every error column, modification included [rad/m, rad/rad].
+    by_torque
+        By the torque [rad/(N·m)].
+    by_stiffness
+        By the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [rad].
+    status
+        Worst status of the equilibria behind them [-].
+    """
+
+    by_error: Float[np.ndarray, "item column"]
+    by_torque: Float[np.ndarray, " item"]
+    by_stiffness: dict[str, Float[np.ndarray, " item"]]
+    status: UInt8[np.ndarray, " item"]

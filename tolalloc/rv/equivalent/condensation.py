@@ -1,0 +1,240 @@
+"""Spring rows condensed, angle by angle, onto the few coordinates that the nonlinear contacts touch.
+
+Geometry and bilateral stiffness do not depend on the errors. So everything but pin contact and play is
+eliminated once per angle and reducer; what is left for each sample is a small convex problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.rv.equivalent.bearings import carrier_support, crank_carrier, crank_disc
+from tolalloc.rv.equivalent.columns import Columns, columns_of
+from tolalloc.rv.equivalent.gears import gear_mesh, sun_support
+from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates, Positions
+from tolalloc.rv.equivalent.pins import PinContact, dense_rows, pin_contact
+from tolalloc.rv.equivalent.springs import SpringGroup, harmonic_waves
+from tolalloc.rv.reducer.design import Reducer
+
+GROUPS: tuple[Callable[[Positions], SpringGroup], ...] = (
+    sun_support,
+    gear_mesh,
+    crank_disc,
+    crank_carrier,
+    carrier_support,
+)
+_ANGLES_AT_ONCE = 512
+
+
+class CondensedAngles(NamedTuple):
+    """What the contact solvers need at each angle. Kept coordinates are lengths, the discs' (x, y, r_d·θ) first.
+
+    Parameters
+    ----------
+    stiffness
+        Condensed stiffness of the kept coordinates, one zero eigenvalue [N/m].
+    load
+        Force on them per value of the spring rows and, last, per torque [N/m, last N/(N·m)].
+    carrier_by_kept
+        Carrier rotation per kept coordinate [rad/m].
+    carrier_by_load
+        Carrier rotation at fixed kept coordinates per value and, last, per torque [rad/m, last rad/(N·m)].
+    row_by_kept, row_by_load
+        Compression of every bilateral row per kept coordinate; per value and torque [m/m, last m/(N·m)].
+    row_stiffness
+        Stiffness of the bilateral rows [N/m].
+    play_by_kept, play_by_load
+        Compression x, y of every element with play, as for the rows [m/m].
+    play_stiffness
+        Stiffness of the elements with play [N/m].
+    contact_by_disc
+        Pin compression per displacement of its disc [m/m].
+    contact_by_error
+        Pin compression per deviation: pin radial and tangential, harmonic amplitudes of the disc's pitch and run-out,
+        pitch and run-out of the tooth met [m/m].
+    tooth
+        Number of the tooth that each pin meets [-].
+    contact_stiffness, contact_log_length
+        Stiffness of each pin contact [N/m] and L of the logarithmic law [m].
+    turn
+        Cosine and sine of the carrier angle [-].
+    """
+
+    stiffness: Float[np.ndarray, "angle kept kept"]
+    load: Float[np.ndarray, "angle load kept"]
+    carrier_by_kept: Float[np.ndarray, "angle kept"]
+    carrier_by_load: Float[np.ndarray, "angle load"]
+    row_by_kept: Float[np.ndarray, "angle row kept"]
+    row_by_load: Float[np.ndarray, "angle row load"]
+    row_stiffness: Float[np.ndarray, "angle row"]
+    play_by_kept: Float[np.ndarray, "angle element 2 kept"]
+    play_by_load: Float[np.ndarray, "angle element 2 load"]
+    play_stiffness: Float[np.ndarray, "angle element"]
+    contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]
+    contact_by_error: Float[np.ndarray, "angle disc deviation pin"]
+    tooth: Int[np.ndarray, "angle disc pin"]
+    contact_stiffness: Float[np.ndarray, "angle contact"]
+    contact_log_length: Float[np.ndarray, "angle contact"]
+    turn: Float[np.ndarray, "angle 2"]
+
+
+def bilateral_groups(at: Positions) -> list[SpringGroup]:
+    """Return all spring groups but the pin contact."""
+    return [group(at) for group in GROUPS]
+
+
+def spring_groups(
+    reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"], orders: tuple[int, ...] = HARMONICS
+) -> list[SpringGroup]:
+    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
+
+    Parameters
+    ----------
+    reducer
+        Nominal design.
+    carrier_angle
+        Carrier angles [rad].
+    orders
+        Orders of the harmonic deviations [-].
+    """
+    at = Positions(reducer, carrier_angle, orders)
+    return [*bilateral_groups(at), dense_rows(at)]
+
+
+def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
+    """Return the error columns of a reducer with harmonic deviations of the given orders [-]."""
+    return columns_of(reducer, bilateral_groups(Positions(reducer, np.zeros(1), orders)), orders)
+
+
+def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
+    """Return the lever by which each coordinate is divided so that all are lengths [m or 1]."""
+    scale = np.ones(coordinates.count)
+    for crank in range(reducer.crank_count):
+        scale[coordinates.planet(crank) + 2] = 1 / reducer.planet_base_radius
+    for disc in range(reducer.disc_count):
+        scale[coordinates.disc(disc) + 2] = 1 / reducer.cycloid_stage.disc_pitch_radius
+    scale[coordinates.carrier + 2] = 1 / reducer.crank_circle_radius
+    return scale
+
+
+def kept_coordinates(reducer: Reducer, coordinates: Coordinates, groups: list[SpringGroup]) -> Int[np.ndarray, " kept"]:
+    """Return the coordinates that pins or elements with play touch, the discs' first."""
+    disc = np.arange(coordinates.disc(0), coordinates.disc(reducer.disc_count))
+    touched = [np.any(group.displacement != 0.0, axis=(0, 1)) for group in groups if group.contact == "play"]
+    others = np.flatnonzero(np.any(touched, axis=0)) if touched else np.array([], np.int64)
+    return np.concatenate([disc, np.setdiff1d(others, disc)])
+
+
+def _elements(
+    groups: list[SpringGroup], scale: Float[np.ndarray, " coordinate"], angles: int, loads: int
+) -> tuple[
+    Float[np.ndarray, "angle element 2 coordinate"],
+    Float[np.ndarray, "angle element 2 load"],
+    Float[np.ndarray, "angle element"],
+]:
+    """Return displacement, error and stiffness of all elements with play; a mesh's second direction is zero."""
+    displacement, error, stiffness = [], [], []
+    first = 0
+    for group in groups:
+        last = first + len(group.columns)
+        if group.contact == "play":
+            rows = group.stiffness.shape[1] // len(group.clearance_columns)
+            for row in range(0, group.stiffness.shape[1], rows):
+                moved, disturbed = np.zeros((angles, 2, scale.size)), np.zeros((angles, 2, loads))
+                moved[:, :rows] = group.displacement[:, row : row + rows] * scale
+                disturbed[:, :rows, first:last] = group.error[:, row : row + rows]
+                displacement.append(moved)
+                error.append(disturbed)
+                stiffness.append(group.stiffness[:, row])
+        first = last
+    if not stiffness:
+        return np.zeros((angles, 0, 2, scale.size)), np.zeros((angles, 0, 2, loads)), np.zeros((angles, 0))
+    return np.stack(displacement, axis=1), np.stack(error, axis=1), np.stack(stiffness, axis=1)
+
+
+def _contact_by_error(contact: PinContact, orders: tuple[int, ...]) -> Float[np.ndarray, "angle disc deviation pin"]:
+    """Return the pin compressions per deviation, in the order of `CondensedAngles.contact_by_error`."""
+    waves = np.moveaxis(harmonic_waves(contact.tooth_angle, orders), -1, 2)
+    harmonic = (contact.by_tooth[:, :, :, np.newaxis] * waves[:, :, np.newaxis]).reshape(
+        *waves.shape[:2], 2 * waves.shape[2], -1
+    )
+    return np.concatenate([contact.by_pin, harmonic, contact.by_tooth], axis=2)
+
+
+def _condense_some(at: Positions) -> CondensedAngles:
+    """Return the condensed model at a few angles; memory grows with their number."""
+    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
+    scale, groups, contact = rotation_scale(reducer, coordinates), bilateral_groups(at), pin_contact(at)
+    size, loads = coordinates.count, sum(len(group.columns) for group in groups) + 1
+    rows, errors, stiffnesses, first = [], [], [], 0
+    for group in groups:
+        if group.contact == "bilateral":
+            error = np.zeros((angles, group.stiffness.shape[1], loads))
+            error[:, :, first : first + len(group.columns)] = group.error
+            rows.append(group.displacement * scale)
+            errors.append(error)
+            stiffnesses.append(group.stiffness)
+        first += len(group.columns)
+    row, error, row_stiffness = (np.concatenate(parts, axis=1) for parts in (rows, errors, stiffnesses))
+    weighted = np.swapaxes(row * row_stiffness[..., np.newaxis], 1, 2)
+    stiffness, load = weighted @ row, -(weighted @ error)
+    rotation = coordinates.carrier + 2
+    load[:, rotation, -1] = scale[rotation]
+    kept = kept_coordinates(reducer, coordinates, groups)
+    rest = np.setdiff1d(np.arange(size), kept)
+    # Displacement of all coordinates per kept coordinate and per load, the kept ones fixed.
+    by_kept, by_load = np.zeros((angles, size, kept.size)), np.zeros((angles, size, loads))
+    by_kept[:, kept] = np.eye(kept.size)
+    solved = np.linalg.solve(
+        stiffness[:, rest[:, np.newaxis], rest],
+        np.concatenate([-stiffness[:, rest[:, np.newaxis], kept], load[:, rest]], axis=2),
+    )
+    by_kept[:, rest], by_load[:, rest] = solved[..., : kept.size], solved[..., kept.size :]
+    condensed = stiffness[:, kept] @ by_kept
+    moved, disturbed, play_stiffness = _elements(groups, scale, angles, loads)
+    lever = np.array([1.0, 1.0, 1 / reducer.cycloid_stage.disc_pitch_radius])[:, np.newaxis]
+    return CondensedAngles(
+        stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
+        load=np.swapaxes(load[:, kept] - stiffness[:, kept] @ by_load, 1, 2),
+        carrier_by_kept=by_kept[:, rotation] * scale[rotation],
+        carrier_by_load=by_load[:, rotation] * scale[rotation],
+        row_by_kept=row @ by_kept,
+        row_by_load=row @ by_load + error,
+        row_stiffness=row_stiffness,
+        play_by_kept=moved @ by_kept[:, np.newaxis],
+        play_by_load=moved @ by_load[:, np.newaxis] + disturbed,
+        play_stiffness=play_stiffness,
+        contact_by_disc=contact.by_disc * lever,
+        contact_by_error=_contact_by_error(contact, at.orders),
+        tooth=contact.tooth,
+        contact_stiffness=contact.stiffness.reshape(angles, -1),
+        contact_log_length=contact.log_length.reshape(angles, -1),
+        turn=np.stack([np.cos(at.carrier_angle), np.sin(at.carrier_angle)], axis=1),
+    )
+
+
+def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+    """Return the condensed model of a reducer at the carrier angles.
+
+    Parameters
+    ----------
+    reducer
+        Nominal design and stiffness.
+    orders
+        Orders of the harmonic deviations [-].
+    angle
+        Carrier angles [rad].
+
+    Notes
+    -----
+    Theory page, equations (19)–(21).
+    """
+    parts = [
+        _condense_some(Positions(reducer, angle[start : start + _ANGLES_AT_ONCE], orders))
+        for start in range(0, angle.size, _ANGLES_AT_ONCE)
+    ]
+    return CondensedAngles(*(np.ascontiguousarray(np.concatenate(field)) for field in zip(*parts, strict=True)))

@@ -1,0 +1,134 @@
+"""Torque against twist: lost motion, backlash, torsional stiffness, and the error in both directions of rotation.
+
+Without friction the loop is one curve, measured with the torque in either direction; its width is the play of pins,
+bearings and meshes and the elastic twist.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.rv.equivalent.model import EquivalentModel
+
+LOST_MOTION, BACKLASH = 0.03, 1e-4
+"""Torque over rated torque at which the loop's width is read; 3 % by custom, 0.01 % for zero is an assumption."""
+
+LOOP_ASSUMPTION = "backlash: loop width at ±0.01 % of rated torque; no friction, so the loop is one curve"
+
+LOOP_ANGLES = 2.0 * np.pi * np.arange(180) / 180
+"""Angles of one output turn at which a loop is read unless asked otherwise [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HysteresisLoop:
+    """Twist of the carrier against torque, the sun held.
+
+    Parameters
+    ----------
+    torque
+        Torques on the carrier, ascending and symmetrical about 0 [N·m].
+    twist
+        Transmission error at each torque, output side [rad].
+    """
+
+    torque: Float[np.ndarray, " level"]
+    twist: Float[np.ndarray, "sample level angle"]
+
+    def _at(self, torque: float) -> Float[np.ndarray, "sample angle"]:
+        return self.twist[:, int(np.argmin(np.abs(self.torque - torque)))]
+
+    def width(self, share: float) -> Float[np.ndarray, "sample angle"]:
+        """Return the twist between both directions of a share of the rated torque, angle by angle [rad].
+
+        Parameters
+        ----------
+        share
+            `LOST_MOTION`, `BACKLASH` or 1 [-].
+        """
+        torque = share * self.torque[-1]
+        return np.asarray(self._at(torque) - self._at(-torque))
+
+    @property
+    def lost_motion(self) -> Float[np.ndarray, " sample"]:
+        """Width of the loop at ±3 % of rated torque, mean over the turn [rad]."""
+        return np.asarray(self.width(LOST_MOTION).mean(axis=1))
+
+    @property
+    def backlash(self) -> Float[np.ndarray, " sample"]:
+        """Width of the loop as the torque goes to zero, mean over the turn [rad]."""
+        return np.asarray(self.width(BACKLASH).mean(axis=1))
+
+    @property
+    def torsional_stiffness(self) -> Float[np.ndarray, " sample"]:
+        """Torque over twist between 3 % and 100 % of rated torque, mean of both directions and the turn [N·m/rad]."""
+        rated, low = self.torque[-1], LOST_MOTION * self.torque[-1]
+        twist = self.width(1.0).mean(axis=1) - self.lost_motion
+        return np.asarray(2.0 * (rated - low) / twist)
+
+
+def hysteresis_loop(
+    model: EquivalentModel, errors: Float[np.ndarray, "sample column"], carrier_angle: Float[np.ndarray, " angle"]
+) -> HysteresisLoop:
+    """Return torque against twist between minus and plus the rated torque.
+
+    Parameters
+    ----------
+    model
+        The reducer.
+    errors
+        Deviations in the order of the model's columns [m, angles rad].
+    carrier_angle
+        Angles of the turn at which the loop is read [rad].
+    """
+    shares = np.array([BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0])
+    torque = model.reducer.load.rated_torque * np.concatenate([-shares[::-1], shares])
+    twist = [model.equilibria(errors, float(level), carrier_angle).transmission_error for level in torque]
+    return HysteresisLoop(torque=torque, twist=np.stack(twist, axis=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Directions:
+    """Transmission error with the torque resisting either direction of rotation.
+
+    Parameters
+    ----------
+    forward, backward
+        Curves while turning counter-clockwise and clockwise [rad].
+    """
+
+    forward: Float[np.ndarray, "sample angle"]
+    backward: Float[np.ndarray, "sample angle"]
+
+    @property
+    def difference(self) -> Float[np.ndarray, "sample angle"]:
+        """What reversing adds at each angle: backward minus forward [rad]."""
+        return np.asarray(self.backward - self.forward)
+
+
+def both_directions(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "sample column"],
+    torque: float,
+    carrier_angle: Float[np.ndarray, " angle"] | None = None,
+) -> Directions:
+    """Return the transmission error of both directions of rotation.
+
+    Parameters
+    ----------
+    model
+        The reducer.
+    errors
+        Deviations in the order of the model's columns [m, angles rad].
+    torque
+        Magnitude of the resisting torque on the carrier [N·m].
+    carrier_angle
+        Angles of the turn; the coarse angles of the model's search unless given [rad].
+    """
+    forward, backward = (
+        model.equilibria(errors, resisting, carrier_angle).transmission_error
+        for resisting in (-abs(torque), abs(torque))
+    )
+    return Directions(forward=forward, backward=backward)

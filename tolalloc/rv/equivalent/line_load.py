@@ -1,0 +1,126 @@
+"""Load along the width of teeth: even where disc and pin are parallel, heavier towards one end where they are not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
+from tolalloc.rv.equivalent.answers import Equilibria
+from tolalloc.rv.equivalent.forces import Forces
+from tolalloc.rv.equivalent.kinematics import Positions
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineContact:
+    """Contacts of pins and teeth as springs side by side along the width of the tooth, theory page equation (31).
+
+    Parameters
+    ----------
+    force
+        Normal force [N].
+    stiffness
+        Of the whole width, bending of the pin included [N/m].
+    slope
+        By how much the tooth lies deeper in the pin per length along the width [rad].
+    face_width
+        Width b of the tooth [m].
+
+    Notes
+    -----
+    What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
+    stiffness and `deformation` mean nothing.
+    """
+
+    force: Float[np.ndarray, "*contacts"]
+    stiffness: Float[np.ndarray, "*contacts"]
+    slope: Float[np.ndarray, "*contacts"]
+    face_width: float
+
+    @property
+    def peak(self) -> Float[np.ndarray, "*contacts"]:
+        """Line load at the deeper end, F/b + C|γ|/2; where one end is lifted, √(2C|γ|F/b) [N/m]."""
+        # Force at which the shallower end just touches.
+        lifting = 0.5 * self.stiffness * self.face_width * np.abs(self.slope)
+        deep = np.where(self.force < lifting, 2.0 * np.sqrt(lifting * self.force), self.force + lifting)
+        return np.asarray(deep / self.face_width)
+
+    def of(self, place: tuple[int, ...]) -> LineContact:
+        """Return the contacts at a place, the first indices of the arrays [-]."""
+        return replace(self, force=self.force[place], stiffness=self.stiffness[place], slope=self.slope[place])
+
+    @property
+    def deformation(self) -> Float[np.ndarray, "*contacts"]:
+        """Compression at the deeper end, 0 without contact [m]."""
+        return np.asarray(self.peak * self.face_width / self.stiffness)
+
+    def line_load(self, position: Float[np.ndarray, " position"]) -> Float[np.ndarray, "*contacts position"]:
+        """Return the line load along the width [N/m].
+
+        Parameters
+        ----------
+        position
+            Places along the width, 0 in the middle of the tooth, −b/2 to b/2 [m].
+        """
+        slope = self.slope[..., np.newaxis]
+        below_the_end = 0.5 * self.face_width * np.abs(slope) - slope * position
+        rise = self.stiffness[..., np.newaxis] / self.face_width
+        return np.asarray(np.maximum(self.peak[..., np.newaxis] - rise * below_the_end, 0.0))
+
+
+def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
+    """Return the contacts of all pins and discs, [sample, angle, disc, pin].
+
+    Parameters
+    ----------
+    equilibria
+        Equilibria of samples over angles.
+    forces
+        Forces in them.
+
+    Notes
+    -----
+    A tilt γ moves a tooth at height z by z·(γy, −γx) in the housing's plane; the tilt turns with the disc.
+    """
+    tables, layout = equilibria.tables, equilibria.columns.layout
+    tilt = (equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T).T
+    x, y = (tilt.reshape(-1, 1, tables.contact_by_disc.shape[1], 2)[..., axis] for axis in (0, 1))
+    cosine, sine = (tables.turn[:, part, np.newaxis] for part in (0, 1))
+    along_x, along_y = (tables.contact_by_disc[:, :, axis] for axis in (0, 1))
+    slope = (sine * x + cosine * y)[..., np.newaxis] * along_x - (cosine * x - sine * y)[..., np.newaxis] * along_y
+    return LineContact(
+        force=forces.pins,
+        stiffness=np.broadcast_to(tables.contact_stiffness.reshape(slope.shape[1:]), slope.shape),
+        slope=slope,
+        face_width=equilibria.reducer.cycloid_stage.face_width,
+    )
+
+
+def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
+    """Return the largest line load of every pin and disc [N/m].
+
+    Parameters
+    ----------
+    equilibria
+        Equilibria of samples over angles.
+    forces
+        Forces in them.
+    """
+    return line_contact(equilibria, forces).peak
+
+
+def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
+    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa].
+
+    Parameters
+    ----------
+    equilibria
+        Equilibria over angles.
+    """
+    reducer, at = equilibria.reducer, Positions(equilibria.reducer, equilibria.carrier_angle)
+    discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(reducer.disc_count)]
+    pin_angle, stage = np.stack(discs, axis=1), reducer.cycloid_stage
+    even = np.full_like(pin_angle, stage.face_width)
+    return peak_pressure(stage, reducer.contact_modulus, pin_angle, even)

@@ -1,0 +1,145 @@
+"""What engineers read off the equilibria, each output one small function over the same solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from tolalloc.rv.equivalent.answers import Equilibria
+from tolalloc.rv.equivalent.forces import Forces, forces
+from tolalloc.units import ARCSECOND
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orders:
+    """Waves of the transmission error per output turn.
+
+    Parameters
+    ----------
+    order
+        Waves per output turn [-].
+    amplitude
+        Half the peak-to-peak of each wave, output side [rad].
+    phase
+        Angle by which the wave, written as a cosine, leads [rad].
+    """
+
+    order: Int[np.ndarray, " order"]
+    amplitude: Float[np.ndarray, "sample order"]
+    phase: Float[np.ndarray, "sample order"]
+
+    def main(self, count: int, sample: int = 0) -> list[tuple[int, float, float]]:
+        """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first."""
+        strongest = np.argsort(-self.amplitude[sample])[:count]
+        return [
+            (int(self.order[at]), float(self.amplitude[sample, at]), float(self.phase[sample, at])) for at in strongest
+        ]
+
+
+def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
+    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn.
+
+    Parameters
+    ----------
+    transmission_error
+        Curves over one whole turn, the end point left out [rad].
+    """
+    found = waves(transmission_error)
+    return Orders(order=np.arange(1, found.shape[1] + 1), amplitude=np.abs(found), phase=np.angle(found))
+
+
+def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row order"]:
+    """Return the orders 1, 2, … of curves; the real part is the cosine's, minus the imaginary part the sine's.
+
+    Parameters
+    ----------
+    curve
+        Curves on equally spaced angles of one turn, the end point left out [any].
+    """
+    angles = curve.shape[1]
+    return np.asarray(np.fft.rfft(curve, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """One solve over a turn, with what several outputs need.
+
+    Parameters
+    ----------
+    equilibria
+        Equilibria of all samples over one turn.
+    forces
+        Forces in them.
+    """
+
+    equilibria: Equilibria
+    forces: Forces
+
+    @classmethod
+    def of(cls, equilibria: Equilibria) -> Solved:
+        """Return the equilibria with their forces."""
+        return cls(equilibria=equilibria, forces=forces(equilibria))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """A number per sample.
+
+    Parameters
+    ----------
+    name, unit
+        What it is, and its unit of measurement.
+    value
+        From a solve, the number of each sample.
+    """
+
+    name: str
+    unit: str
+    value: Callable[[Solved], Float[np.ndarray, " sample"]]
+
+
+def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
+    """Return the share of all pin force that each disc carries, mean over the turn [-]."""
+    total = pins.sum(axis=(1, 3))
+    return np.asarray(total / total.sum(axis=1, keepdims=True))
+
+
+def _mean(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.transmission_error.mean(axis=1) / ARCSECOND)
+
+
+def _fewest(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.pins_in_contact.min(axis=1), float)
+
+
+def _most(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.equilibria.pins_in_contact.max(axis=1), float)
+
+
+def _pin_force(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(solved.forces.pins.max(axis=(1, 2, 3)))
+
+
+def _interface_force(interface: str) -> Callable[[Solved], Float[np.ndarray, " sample"]]:
+    return lambda solved: np.asarray(solved.forces.of(interface).max(axis=(1, 2)))
+
+
+def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
+    return np.asarray(load_share(solved.forces.pins).max(axis=1))
+
+
+OUTPUTS = (
+    Output(name="mean transmission error", unit="arcsec", value=_mean),
+    Output(name="pins in contact, least", unit="-", value=_fewest),
+    Output(name="pins in contact, most", unit="-", value=_most),
+    Output(name="largest pin force", unit="N", value=_pin_force),
+    Output(name="largest mesh force", unit="N", value=_interface_force("gear_mesh")),
+    Output(name="largest crank–disc bearing force", unit="N", value=_interface_force("crank_disc_bearing")),
+    Output(name="largest crank–carrier bearing force", unit="N", value=_interface_force("crank_carrier_bearing")),
+    Output(name="largest carrier bearing force", unit="N", value=_interface_force("carrier_bearing")),
+    Output(name="share of the pin force on the most loaded disc", unit="-", value=_largest_share),
+)
+"""Every output of one solve; a new one is one function and one line here."""

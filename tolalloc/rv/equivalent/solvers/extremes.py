@@ -1,0 +1,151 @@
+"""The two extremes of each sample's transmission error, refined between the coarse angles.
+
+The extremes of the curve are kinks, where one pin takes over from another, so the peak is searched by
+halving the step around the candidates and not by a parabola.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
+from tolalloc.rv.equivalent.solvers.interpolation import make_memory, solve_anywhere
+from tolalloc.rv.equivalent.solvers.problem import values_of
+from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile
+
+
+class Halving(NamedTuple):
+    """How the extremes are searched among the nodes of the tables.
+
+    Parameters
+    ----------
+    first
+        Node of the turn's first angle; as many nodes stand before it and behind the turn [-].
+    stride
+        Nodes per coarse angle [-].
+    coarse
+        Coarse angles of the turn [-].
+    levels
+        Halvings of the coarse step [-].
+    safety
+        A candidate is followed while this many times its flank's rise could make it the extreme [-].
+    """
+
+    first: int
+    stride: int
+    coarse: int
+    levels: int
+    safety: float
+
+
+class Found(NamedTuple):
+    """Extremes of samples, filled in by `solve_extremes`.
+
+    Parameters
+    ----------
+    extreme
+        Largest and smallest carrier rotation [rad].
+    position
+        Where they are, counted in nodes [-].
+    left_over
+        What finer angles may add to their difference [rad].
+    solves
+        Equilibria solved [-].
+    status, residual
+        Worst outcome, and largest residual over the largest force [-].
+    """
+
+    extreme: Float[np.ndarray, "sample 2"]
+    position: Float[np.ndarray, "sample 2"]
+    left_over: Float[np.ndarray, " sample"]
+    solves: Int[np.ndarray, " sample"]
+    status: UInt8[np.ndarray, " sample"]
+    residual: Float[np.ndarray, " sample"]
+
+
+@jit
+def _gain(left, centre, right):
+    """Return how much a peak near ``centre`` may rise above it: the steeper flank carried on for one step."""
+    return max(centre - left, centre - right)
+
+
+@jit
+def _refine(sign, rotation, kept, halving, tables, layout, design, values, memory):
+    """Return the largest sign·rotation, its position, the error that may be left, solves, and the worst outcome.
+
+    ``rotation`` and ``kept`` begin and end one coarse angle outside the turn, so that every angle has two neighbours
+    of its own, also where the ratio leaves the curve not periodic.
+    """
+    inside = sign * rotation[1:-1]
+    best_at = inside.argmax()
+    best, position = inside[best_at], halving.first + best_at * float(halving.stride)
+    left_over, solves, worst_status, worst_residual = 0.0, 0, CONVERGED, 0.0
+    sides, here, at_side = np.empty(2), np.empty(kept.shape[1]), np.empty((2, kept.shape[1]))
+    peaks = np.flatnonzero((inside >= sign * rotation[:-2]) & (inside >= sign * rotation[2:]))
+    for i in peaks[np.argsort(-inside[peaks])]:
+        left, centre, right = sign * rotation[i], inside[i], sign * rotation[i + 2]
+        at, step = halving.first + i * float(halving.stride), float(halving.stride)
+        here[:] = kept[i + 1]
+        for _ in range(halving.levels):
+            if centre + halving.safety * _gain(left, centre, right) <= best and centre < best:
+                break
+            step *= 0.5
+            for side in range(2):
+                at_side[side] = here
+                turned, status, ratio, _ = solve_anywhere(
+                    at + (2 * side - 1) * step, tables, layout, design.face_width, values, at_side[side], memory
+                )
+                sides[side] = sign * turned if status == CONVERGED else -np.inf
+                solves += 1
+                worst_status, worst_residual = max(worst_status, status), max(worst_residual, ratio)
+            if sides[0] > centre and sides[0] >= sides[1]:
+                left, centre, right, at = left, sides[0], centre, at - step
+                here[:] = at_side[0]
+            elif sides[1] > centre:
+                left, centre, right, at = centre, sides[1], right, at + step
+                here[:] = at_side[1]
+            else:
+                left, right = sides[0], sides[1]
+        if centre > best or at == position:
+            best, position, left_over = max(centre, best), at, _gain(left, centre, right)
+    return best, position, left_over, solves, worst_status, worst_residual
+
+
+@jit
+def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, errors, torque, halving, found):
+    a, b = number * samples, min((number + 1) * samples, errors.shape[0])
+    size, angles = tables.load.shape[2], halving.coarse + 2
+    values = np.empty((b - a, layout.end))
+    finite = values_of(errors[a:b], torque, layout, mapped, values)
+    memory, turn = make_memory(design.law, tables), make_turn(b - a, angles, size)
+    before = halving.first - halving.stride
+    solve_tile(discs, before, halving.stride, tables, layout, design, values, finite, memory, turn)
+    for s in range(a, b):
+        own = s - a
+        found.solves[s], found.left_over[s] = angles, 0.0
+        found.status[s], found.residual[s] = turn.status[own].max(), turn.residual[own].max()
+        if found.status[s] == NOT_FINITE:
+            found.extreme[s], found.position[s] = np.nan, np.nan
+            continue
+        memory[2].first[:] = -1
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            best, at, left, count, worst_status, worst_residual = _refine(
+                sign, turn.rotation[own], turn.kept[own], halving, tables, layout, design, values[own], memory
+            )
+            found.extreme[s, side], found.position[s, side] = sign * best, at
+            found.left_over[s] += left
+            found.solves[s] += count
+            found.status[s] = max(found.status[s], worst_status)
+            found.residual[s] = max(found.residual[s], worst_residual)
+
+
+@parallel_jit
+def solve_extremes(size, discs, tables, layout, mapped, design, errors, torque, halving, found):
+    """Fill the extremes of every sample."""
+    for number in prange((errors.shape[0] + size - 1) // size):
+        _extremes_of_tile(np.int64(number), size, discs, tables, layout, mapped, design, errors, torque, halving, found)

@@ -1,0 +1,138 @@
+"""Equilibria of one sample between the tabulated angles, all tables interpolated by cubics."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.compiled import jit
+from tolalloc.rv.cycloid.solvers.contact_law import LINEAR
+from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
+from tolalloc.rv.equivalent.solvers.energy import make_work
+from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sample_constants, solve_at_node
+
+
+class Nodes(NamedTuple):
+    """Loads of one sample at the four nodes around two neighbouring intervals, kept while the search stays there.
+
+    Parameters
+    ----------
+    first
+        First of the four nodes, per slot; −1 for an empty one [-].
+    rotation
+        Carrier rotation at fixed discs [rad].
+    force, undisturbed, play_offset
+        As in `Problem` [N, m, m].
+    """
+
+    first: Int[np.ndarray, "2"]
+    rotation: Float[np.ndarray, "2 4"]
+    force: Float[np.ndarray, "2 4 kept"]
+    undisturbed: Float[np.ndarray, "2 4 contact"]
+    play_offset: Float[np.ndarray, "2 4 element 2"]
+
+
+@jit
+def make_nodes(kept, contacts, elements):
+    """Return two empty slots."""
+    return Nodes(
+        np.full(2, -1),
+        np.empty((2, 4)),
+        np.empty((2, 4, kept)),
+        np.empty((2, 4, contacts)),
+        np.empty((2, 4, elements, 2)),
+    )
+
+
+@jit
+def interpolation(position):
+    """Return the first of four nodes around a position, and the weights of the cubic through them."""
+    x = position - np.floor(position)
+    weights = (
+        -x * (x - 1.0) * (x - 2.0) / 6.0,
+        (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0,
+        -(x + 1.0) * x * (x - 2.0) / 2.0,
+        (x + 1.0) * x * (x - 1.0) / 6.0,
+    )
+    return int(np.floor(position)) - 1, weights
+
+
+@jit
+def blend(table, weights, out):
+    """Set out to the weighted sum of the table's first four rows."""
+    a, b, c, d, flat = table[0].ravel(), table[1].ravel(), table[2].ravel(), table[3].ravel(), out.ravel()
+    for i in range(flat.size):
+        flat[i] = (weights[0] * a[i] + weights[1] * b[i]) + (weights[2] * c[i] + weights[3] * d[i])
+
+
+@jit
+def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_kept):
+    """Fill ``own`` with the problem between nodes, all tables interpolated; return the rotation at fixed discs."""
+    first, weights = interpolation(position)
+    slot = first % 2
+    if nodes.first[slot] != first:
+        nodes.first[slot] = first
+        for node in range(4):
+            nodes.rotation[slot, node] = fill_loads(
+                first + node,
+                tables,
+                layout,
+                values,
+                nodes.force[slot, node],
+                nodes.undisturbed[slot, node],
+                nodes.play_offset[slot, node],
+            )
+    here = slice(first, first + 4)
+    blend(tables.stiffness[here], weights, own.stiffness)
+    blend(nodes.force[slot], weights, own.force)
+    blend(tables.contact_by_disc[here], weights, own.by_disc)
+    blend(nodes.undisturbed[slot], weights, own.undisturbed)
+    blend(tables.contact_stiffness[here], weights, own.contact)
+    if own.law != LINEAR:
+        blend(tables.contact_log_length[here], weights, own.log_length)
+    blend(tables.play_by_kept[here], weights, own.play_by_kept)
+    blend(nodes.play_offset[slot], weights, own.play_offset)
+    blend(tables.play_stiffness[here], weights, own.play_stiffness)
+    blend(tables.carrier_by_kept[here], weights, carrier_by_kept)
+    turn = np.empty(2)
+    blend(tables.turn[here], weights, turn)
+    sample_constants(own, turn, face_width, layout, values)
+    rotation = 0.0
+    for node in range(4):
+        rotation += weights[node] * nodes.rotation[slot, node]
+    return rotation
+
+
+@jit
+def solve_between(position, tables, layout, face_width, values, q, memory):
+    """Solve one sample between nodes from the guess q; return rotation, status, residual, pins in contact."""
+    own, work, nodes, carrier_by_kept = memory
+    rotation = problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_kept)
+    status, ratio, touching = equilibrium(own, q, work)
+    for i in range(q.size):
+        rotation += carrier_by_kept[i] * q[i]
+    return rotation, status, ratio, touching
+
+
+@jit
+def solve_anywhere(position, tables, layout, face_width, values, q, memory):
+    """Solve one sample at a node or between nodes; positions count nodes."""
+    node = int(np.floor(position))
+    if node == position:
+        return solve_at_node(node, tables, layout, face_width, values, q, memory[0], memory[1])
+    return solve_between(position, tables, layout, face_width, values, q, memory)
+
+
+@jit
+def make_memory(law, tables):
+    """Return the memory of one thread: a problem, Newton's work space, loads at nodes, the carrier's row."""
+    kept, contacts = tables.stiffness.shape[1], tables.contact_stiffness.shape[1]
+    elements = tables.play_stiffness.shape[1]
+    return (
+        make_problem(law, tables),
+        make_work(kept, contacts, elements),
+        make_nodes(kept, contacts, elements),
+        np.empty(kept),
+    )

@@ -1,0 +1,181 @@
+"""All samples over a turn of angles: tiles of samples in parallel, each from its own last angle's equilibrium.
+
+Pins on linear springs without play go eight samples to a register; whatever needs more care goes one by one. Which way
+a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, UInt8, UInt16
+
+from tolalloc.compiled import jit, parallel_jit, prange, thread_count
+from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
+from tolalloc.rv.equivalent.solvers.interpolation import make_memory
+from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
+from tolalloc.rv.equivalent.solvers.problem import solve_at_node, values_of
+from tolalloc.rv.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.rv.reducer.design import Reducer
+
+
+class Design(NamedTuple):
+    """What a reducer is to the solvers, next to its tables.
+
+    Parameters
+    ----------
+    law
+        `tolalloc.rv.cycloid.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+    face_width
+        Loaded width of a disc [m].
+    """
+
+    law: int
+    face_width: float
+
+
+def design_of(reducer: Reducer) -> Design:
+    """Return a reducer as the solvers take it."""
+    return Design(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
+
+
+class Turn(NamedTuple):
+    """Equilibria of samples over angles, filled in by the solvers.
+
+    Parameters
+    ----------
+    rotation
+        Carrier rotation [rad].
+    kept
+        Kept coordinates at equilibrium [m].
+    status, residual, touching
+        Outcome, residual over the largest force, pins in contact [-].
+    """
+
+    rotation: Float[np.ndarray, "sample angle"]
+    kept: Float[np.ndarray, "sample angle coordinate"]
+    status: UInt8[np.ndarray, "sample angle"]
+    residual: Float[np.ndarray, "sample angle"]
+    touching: UInt16[np.ndarray, "sample angle"]
+
+
+@jit
+def make_turn(samples, angles, kept):
+    """Return an empty turn."""
+    return Turn(
+        np.empty((samples, angles)),
+        np.empty((samples, angles, kept)),
+        np.empty((samples, angles), np.uint8),
+        np.empty((samples, angles)),
+        np.empty((samples, angles), np.uint16),
+    )
+
+
+@jit
+def _give_up(turn, s):
+    turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
+    turn.kept[s] = np.nan
+
+
+@jit
+def _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve some samples at every ``stride``-th node, one after another."""
+    for s in range(values.shape[0]):
+        if not finite[s]:
+            _give_up(turn, s)
+            continue
+        guess = np.zeros(turn.kept.shape[2])
+        for angle in range(turn.rotation.shape[1]):
+            _alone(s, angle, first + angle * stride, tables, layout, design, values, guess, memory, turn)
+
+
+@jit
+def _alone(s, angle, at, tables, layout, design, values, guess, memory, turn):
+    """Solve one sample at one node from the guess, which becomes the next one: the equilibrium, or zero without one."""
+    rotation, status, ratio, touching = solve_at_node(
+        at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+    )
+    turn.rotation[s, angle], turn.status[s, angle] = rotation, status
+    turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
+    turn.kept[s, angle] = guess
+    if status != CONVERGED:
+        guess[:] = 0.0
+
+
+def tile_size(samples: int) -> int:
+    """Return how many samples go into a tile so that every thread has one: whole fours of registers, `TILE` at most."""
+    share = FOUR * thread_count()
+    return int(min(FOUR * max((samples + share - 1) // share, 1), TILE))
+
+
+@jit
+def _fill_tile(layout, values, finite, used, tile, tilted):
+    """Set the values of a tile, its last sample filling the room that is left; set which samples have tilted discs."""
+    for s in range(used):
+        own = min(s, values.shape[0] - 1)
+        for m in range(layout.end):
+            tile.values[m, s] = values[own, m] if finite[own] else 0.0
+        tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
+
+
+@jit
+def _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
+    samples, size, contacts = values.shape[0], turn.kept.shape[2], tables.contact_stiffness.shape[1]
+    used = (samples + FOUR - 1) // FOUR * FOUR
+    tile, careful, tilted = make_tile(layout, size, contacts), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    _fill_tile(layout, values, finite, used, tile, tilted)
+    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
+    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
+    guess = np.empty(size)
+    for angle in range(turn.rotation.shape[1]):
+        at = first + angle * stride
+        solve_tile_at(discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
+        for s in range(samples):
+            turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
+            turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
+            for i in range(size):
+                turn.kept[s, angle, i] = tile.q[i, s]
+            if finite[s] and (careful[s] or tilted[s]):
+                guess[:] = tile.last[:, s]
+                _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
+                tile.q[:, s] = guess
+        if angle == 0:
+            tile.last[:] = tile.q
+        guess_next(used, tile)
+    for s in range(samples):
+        if not finite[s]:
+            _give_up(turn, s)
+
+
+@jit
+def solve_tile(discs, first, stride, tables, layout, design, values, finite, memory, turn):
+    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
+    if design.law == LINEAR and tables.play_stiffness.shape[1] == 0:
+        _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn)
+    else:
+        _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn)
+
+
+@jit
+def _curves_of_tile(number, size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+    a, b = number * size, min((number + 1) * size, errors.shape[0])
+    values = np.empty((b - a, layout.end))
+    finite = values_of(errors[a:b], torque, layout, mapped, values)
+    part = Turn(turn.rotation[a:b], turn.kept[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
+    solve_tile(discs, first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
+
+
+@parallel_jit
+def solve_curves(size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+    """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on.
+
+    ``size`` is that of a tile, `tile_size`; the answer does not depend on it.
+    ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
+    """
+    for number in prange((errors.shape[0] + size - 1) // size):
+        _curves_of_tile(
+            np.int64(number), size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn
+        )

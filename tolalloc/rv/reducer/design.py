@@ -1,0 +1,233 @@
+"""The nominal design of an RV reducer: what the drawing would say if nothing had an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import cos, sqrt
+
+from tolalloc.exceptions import InputError
+from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstStage:
+    """Sun gear and planet gears, an involute pair.
+
+    Parameters
+    ----------
+    sun_teeth, planet_teeth
+        Numbers of teeth Z1 and Z2 [-].
+    module
+        Module m [m].
+    pressure_angle
+        Pressure angle α [rad].
+    """
+
+    sun_teeth: int
+    planet_teeth: int
+    module: float
+    pressure_angle: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycloidStage:
+    """Cycloid discs against the ring of pins.
+
+    Parameters
+    ----------
+    pin_count, disc_teeth
+        Numbers zp and zc [-]; the pair has one tooth difference.
+    pin_circle_radius
+        Radius Rp of the circle of pin centres [m].
+    pin_radius
+        Radius r_rp of a pin [m].
+    eccentricity
+        Crank eccentricity e [m].
+    face_width
+        Loaded width b of a disc [m].
+    disc_spacing
+        Distance between the middle planes of neighbouring discs [m].
+    """
+
+    pin_count: int
+    disc_teeth: int
+    pin_circle_radius: float
+    pin_radius: float
+    eccentricity: float
+    face_width: float
+    disc_spacing: float = 0.0
+
+    @property
+    def shortening(self) -> float:
+        """Ratio K1 = e·zp/Rp [-]."""
+        return self.eccentricity * self.pin_count / self.pin_circle_radius
+
+    @property
+    def disc_pitch_radius(self) -> float:
+        """Lever r_d = e·zc of the pin forces about the disc centre [m]."""
+        return self.eccentricity * self.disc_teeth
+
+    @property
+    def flank_ratio(self) -> float:
+        """Q = √(1 − K1²), part of a shift that is felt on the flank where cos φ = K1 [-]."""
+        return sqrt(1 - self.shortening**2)
+
+    @property
+    def smallest_convex_radius(self) -> float:
+        """Smallest convex radius of the pin centre's path on the disc [m]; a larger pin undercuts the teeth.
+
+        It stands where the derivative of the curvature, theory page equation (33), vanishes, or else at the tip.
+        """
+        pins, shortening = self.pin_count, self.shortening
+        cosine = max((2 - pins + shortening**2 * (2 * pins - 1)) / (shortening * (1 + pins)), -1.0)
+        bend = 1 + pins * shortening**2 - shortening * (1 + pins) * cosine
+        return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
+
+
+SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
+"""Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
+(li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modification:
+    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34).
+
+    Parameters
+    ----------
+    equidistant
+        Δr_rp: the grinding pin radius is r_rp + Δr_rp [m].
+    shift
+        Δr_p: the pin circle radius at grinding is Rp + Δr_p [m].
+    rotation
+        δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad].
+    """
+
+    equidistant: float
+    shift: float
+    rotation: float = 0.0
+
+    @classmethod
+    def from_convention(cls, convention: str, equidistant: float, shift: float) -> Modification:
+        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m].
+
+        Raises
+        ------
+        KeyError
+            Another convention.
+        """
+        return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift)
+
+    def flank_clearance(self, stage: CycloidStage) -> float:
+        """Return the nominal gap on the flank where cos φ = K1: Δr_rp − Δr_p·√(1−K1²) + δ·r_d [m].
+
+        It is the smallest gap unless the shift is positive.
+        """
+        return self.equidistant - self.shift * stage.flank_ratio + self.rotation * stage.disc_pitch_radius
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The two amounts as error columns of the model, the equidistant first [m]."""
+        return {"modification.equidistant": self.equidistant, "modification.shift": self.shift}
+
+    @property
+    def radial_clearance(self) -> float:
+        """The nominal gap at tooth tip and root, Δr_rp − Δr_p [m]."""
+        return self.equidistant - self.shift
+
+    @classmethod
+    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage) -> Modification:
+        """Return the two amounts that give a flank and a radial clearance [m]."""
+        shift = (flank - radial) / (1 - stage.flank_ratio)
+        return cls(equidistant=radial + shift, shift=shift)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clearances:
+    """Nominal clearance of the bilateral interfaces; where it is 0 the interface has no play.
+
+    Parameters
+    ----------
+    gear_mesh
+        Half the normal backlash of a sun–planet mesh [m].
+    crank_disc_bearing, crank_carrier_bearing, carrier_bearing
+        Radial clearance of a bearing, half its diametral one [m].
+    """
+
+    gear_mesh: float = 0.0
+    crank_disc_bearing: float = 0.0
+    crank_carrier_bearing: float = 0.0
+    carrier_bearing: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """Torques on the carrier [N·m]; negative resists the positive direction of rotation."""
+
+    test_torque: float
+    rated_torque: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reducer:
+    """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
+
+    name: str
+    source: str
+    crank_count: int
+    disc_count: int
+    first_stage: FirstStage
+    cycloid_stage: CycloidStage
+    disc_material: Material
+    pin_material: Material
+    stiffness: Stiffness
+    modification: Modification
+    load: Load
+    clearances: Clearances = field(default_factory=Clearances)
+    assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def crank_circle_radius(self) -> float:
+        """Radius a_sp of the circle of crank axes, m(Z1+Z2)/2 [m]."""
+        return self.first_stage.module * (self.first_stage.sun_teeth + self.first_stage.planet_teeth) / 2
+
+    @property
+    def planet_base_radius(self) -> float:
+        """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
+        return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of pins and discs [Pa]."""
+        return contact_modulus(self.disc_material, self.pin_material)
+
+    def with_face_width(self, width: float) -> Reducer:
+        """Return the reducer with discs of another loaded width [m]; the pin contact becomes that of Table 2."""
+        return replace(
+            self,
+            cycloid_stage=replace(self.cycloid_stage, face_width=width),
+            stiffness=replace(self.stiffness, pin_contact=line_contact(width, self.contact_modulus)),
+        )
+
+    def with_pin_span(self, span: float) -> Reducer:
+        """Return the reducer with pins that bend between two supports at a distance [m]."""
+        diameter, modulus = 2 * self.cycloid_stage.pin_radius, self.pin_material.elastic_modulus
+        return replace(self, stiffness=replace(self.stiffness, pin_bending=pin_bending(diameter, span, modulus)))
+
+    def torque_on_carrier(self, asked: float | None, place: str) -> float:
+        """Return the torque to use, the test torque unless one is asked for [N·m].
+
+        Raises
+        ------
+        InputError
+            Zero, where the play leaves the equilibrium undetermined, or beyond ten times the rated torque.
+        """
+        torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
+        if not 0 < abs(torque) <= largest:
+            raise InputError.at(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
+        return torque
+
+    @property
+    def ratio(self) -> float:
+        """Sun turns per carrier turn, 1 + (Z2/Z1)·zp, with the pin housing fixed [-]."""
+        return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count

@@ -1,0 +1,174 @@
+"""The equivalent model as a response with several outputs: all that requirements limit, and the waves of its orders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.chunks import map_chunks
+from tolalloc.model import Evaluation
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, waves
+from tolalloc.rv.equivalent.radial_clearance import radial_clearance
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
+
+Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
+
+_EVERY = 9
+"""The loop and the forces are read at every so many of the angles at which a single loop is drawn [-]."""
+_ANGLES = LOOP_ANGLES[::_EVERY]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One solve and the outputs that are read off it.
+
+    Parameters
+    ----------
+    outputs
+        Names of the outputs with their units.
+    read
+        From model, errors in the order of its columns, and test torque, the outputs and the status of every sample.
+    """
+
+    outputs: tuple[str, ...]
+    read: Callable[[EquivalentModel, Float[np.ndarray, "chunk column"], float], Answer]
+
+
+def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    found = model.extremes(errors, torque)
+    return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
+
+
+def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    loop = hysteresis_loop(model, errors, _ANGLES)
+    values = np.stack(
+        [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE], axis=1
+    )
+    # A loop keeps no statuses: an angle without an equilibrium is not a number in it.
+    status = np.where(np.isfinite(values).all(axis=1), Status.CONVERGED, Status.NOT_CONVERGED)
+    return values, status.astype(np.uint8)
+
+
+def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    solved = Solved.of(model.equilibria(errors, np.copysign(model.reducer.load.rated_torque, torque), _ANGLES))
+    own = [output.value(solved) for output in OUTPUTS if output.name in _FORCES]
+    values = np.stack([*own, *_pin_stress(solved)], axis=1)
+    return values, np.asarray(solved.equilibria.status.max(axis=1))
+
+
+def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
+    """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
+
+    Notes
+    -----
+    Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
+    """
+    line_load = peak_line_load(solved.equilibria, solved.forces)
+    pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
+    return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+
+
+def _radial_clearance(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "chunk column"],
+    torque: float,  # noqa: ARG001
+) -> Answer:
+    clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
+    status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
+    return clearance, status.astype(np.uint8)
+
+
+_FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
+
+REQUIREMENTS = (
+    Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
+    Reading(outputs=("lost motion [arcmin]", "backlash [arcmin]", "torsional stiffness [N·m/arcmin]"), read=_loop),
+    Reading(
+        outputs=(
+            *(f"{output.name}, rated torque [{output.unit}]" for output in OUTPUTS if output.name in _FORCES),
+            "largest line load, rated torque [N/mm]",
+            "peak pressure, rated torque [MPa]",
+        ),
+        read=_rated_load,
+    ),
+    Reading(outputs=("radial clearance at tip and root [µm]",), read=_radial_clearance),
+)
+"""What a requirement may limit: transmission error, torque against twist, load at rated torque, gap at tip and root."""
+
+
+OTHER_OUTPUTS = tuple(name for reading in REQUIREMENTS[1:] for name in reading.outputs)
+"""Names of the outputs besides the peak-to-peak, with their units."""
+
+
+def wave_outputs(order: int) -> tuple[str, str]:
+    """Return the names of the outputs that hold the cosine and the sine of an order of the output turn."""
+    return (f"order {order} cosine [arcsec]", f"order {order} sine [arcsec]")
+
+
+def orders_reading(orders: tuple[int, ...]) -> Reading:
+    """Return the reading of the waves of the transmission error, cosine and sine of every order.
+
+    Parameters
+    ----------
+    orders
+        Waves per output turn [-].
+    """
+
+    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+        found = model.equilibria(errors, torque)
+        # An unconverged angle is NaN and would spread over all waves; the status keeps the sample out.
+        wave = waves(np.nan_to_num(found.transmission_error))[:, np.array(orders) - 1] / ARCSECOND
+        return np.stack([wave.real, -wave.imag], axis=2).reshape(errors.shape[0], -1), found.status.max(axis=1)
+
+    return Reading(outputs=tuple(name for order in orders for name in wave_outputs(order)), read=read)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputsResponse:
+    """All outputs of several readings, one row per sample.
+
+    Parameters
+    ----------
+    kernel
+        Model, torque, columns, and who observes.
+    readings
+        What is read.
+    """
+
+    kernel: KernelResponse
+    readings: tuple[Reading, ...] = REQUIREMENTS
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns."""
+        return self.kernel.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of all outputs with their units."""
+        return tuple(name for reading in self.readings for name in reading.outputs)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return all outputs of every sample; a sample fails where one of its readings does."""
+        values, status = np.empty((x.shape[0], len(self.outputs))), np.empty(x.shape[0], np.uint8)
+        alone = replace(self, kernel=self.kernel.alone)
+        for rows, (answer, worst) in map_chunks(alone.read, x, self.kernel.mapper):
+            values[rows], status[rows] = answer, worst
+            self.kernel.observe(worst)
+        return Evaluation(values=values, status=status)
+
+    def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
+        """Return the outputs of one chunk and the worst status of every sample."""
+        errors = self.kernel.errors(x)
+        answers = [reading.read(self.kernel.model, errors, self.kernel.torque) for reading in self.readings]
+        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
+            np.max([status for _, status in answers], axis=0)
+        )

@@ -1,0 +1,220 @@
+"""Stiffness as columns of the response: its exact derivative by ln K, and how far that first order holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, inf
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.model import Evaluation
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
+
+NAME = "stiffness (identified)"
+PREFIX = "stiffness."
+
+SEEN = 0.05
+"""Accuracy of a peak-to-peak, below which no difference means anything [arcsec]."""
+
+
+def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> CorrelatedSource:
+    """Return what is not known of the identified stiffnesses as a source of relative changes ln K/K0 [-].
+
+    Parameters
+    ----------
+    identified
+        Values, standard uncertainties and correlation.
+    reducer
+        The reducer with these values.
+
+    Raises
+    ------
+    InputError
+        A contact whose uncertainty the derivative does not tell from that of the bending pins.
+    """
+    if reducer.stiffness.pin_bending < inf and identified.standard_uncertainty.get("pin_contact", 0.0) > 0.0:
+        raise InputError.at(
+            identified.source,
+            "standard_uncertainty of pin_contact",
+            identified.standard_uncertainty["pin_contact"],
+            f"0 where pins bend, as those of {reducer.name} do (pin_span_mm)",
+        )
+    return CorrelatedSource(
+        name=NAME, columns=tuple(PREFIX + name for name in identified.values), covariance=identified.covariance
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessResponse:
+    """The kernel's peak-to-peak with stiffnesses as further columns, to first order in ln K.
+
+    Parameters
+    ----------
+    kernel
+        The real model.
+    stiffnesses
+        Fields of `rv.reducer.stiffness.Stiffness` that vary, in the order of their columns, which are the last.
+    """
+
+    kernel: KernelResponse
+    stiffnesses: tuple[str, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns [m, angles rad], then ``stiffness.<field>`` [-]."""
+        return (*self.kernel.columns, *(PREFIX + name for name in self.stiffnesses))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The one output of the kernel."""
+        return self.kernel.outputs
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the peak-to-peak of every sample [arcsec]."""
+        own = len(self.kernel.columns)
+        answers = self.kernel.with_derivatives(np.ascontiguousarray(x[:, :own]))
+        change = (self.gradient(answers) * x[:, own:]).sum(axis=1, keepdims=True)
+        return replace(answers.evaluation, values=answers.evaluation.values + change)
+
+    def gradient(self, answers: WithDerivatives) -> Float[np.ndarray, "sample stiffness"]:
+        """Return the derivative of the peak-to-peak by ln K of every stiffness [arcsec]."""
+        return np.stack([answers.by_stiffness[name] for name in self.stiffnesses], axis=1)
+
+    def changed(self, change: Float[np.ndarray, " stiffness"]) -> KernelResponse:
+        """Return the kernel of the reducer whose stiffnesses are changed, by ln K/K0 [-]; it knows no first order."""
+        model = self.kernel.model
+        old = model.reducer.stiffness
+        values: dict[str, Any] = {
+            name: getattr(old, name) * exp(by) for name, by in zip(self.stiffnesses, change, strict=True)
+        }
+        reducer = replace(model.reducer, stiffness=replace(old, **values))
+        return replace(self.kernel, model=replace(model, reducer=reducer))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrderError:
+    """First order minus kernel at changed stiffnesses.
+
+    Parameters
+    ----------
+    root_mean_square, largest
+        Of the difference [arcsec].
+    effect
+        Root-mean-square of what the same changes do to the peak-to-peak [arcsec].
+    units, changes
+        Units and changes of the stiffnesses behind it [-].
+    """
+
+    root_mean_square: float
+    largest: float
+    effect: float
+    units: int
+    changes: int
+
+    @property
+    def fails(self) -> bool:
+        """Whether the error is half of the effect or more, and more than the angles of the search leave."""
+        return self.root_mean_square > max(0.5 * self.effect, SEEN)
+
+
+def first_order_error(
+    response: StiffnessResponse,
+    x: Float[np.ndarray, "unit kernel_column"],
+    changes: Float[np.ndarray, "change stiffness"],
+) -> FirstOrderError:
+    """Return how far the first order is from the kernel whose reducer has the changed stiffnesses.
+
+    Parameters
+    ----------
+    response
+        The first order.
+    x
+        Units, in the kernel's columns [m, angles rad].
+    changes
+        Joint changes ln K/K0; each takes tables of its own, about a third of a second [-].
+
+    Raises
+    ------
+    SolveError
+        No unit has an answer at any of the changes.
+    """
+    answers = response.kernel.with_derivatives(x)
+    predicted = response.gradient(answers) @ changes.T
+    exact = [response.changed(change)(x).values[:, 0] - answers.evaluation.values[:, 0] for change in changes]
+    effect = np.stack(exact, axis=1)
+    error = predicted - effect
+    good = np.isfinite(error)
+    if not good.any():
+        raise SolveError(
+            f"{NAME}: no unit has an answer at stiffnesses changed by up to a factor of "
+            f"{exp(float(np.abs(changes).max())):.3g}; allowed are standard uncertainties that leave a reducer."
+        )
+    return FirstOrderError(
+        root_mean_square=float(np.sqrt((error[good] ** 2).mean())),
+        largest=float(np.abs(error[good]).max()),
+        effect=float(np.sqrt((effect[good] ** 2).mean())),
+        units=x.shape[0],
+        changes=changes.shape[0],
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessEffect:
+    """What not knowing the stiffness does to the peak-to-peak, and how well that is known.
+
+    Parameters
+    ----------
+    source
+        The source.
+    sigma
+        Standard deviation of one unit's peak-to-peak from the stiffness alone, root-mean-square over units [arcsec].
+    sigma_of_mean
+        Standard deviation of the mean over all units, which the stiffness shifts together [arcsec].
+    first_order
+        First order against kernel.
+    """
+
+    source: CorrelatedSource
+    sigma: float
+    sigma_of_mean: float
+    first_order: FirstOrderError
+
+
+def stiffness_effect(
+    response: StiffnessResponse,
+    source: CorrelatedSource,
+    x: Float[np.ndarray, "unit kernel_column"],
+    directions: Float[np.ndarray, "direction stiffness"],
+    units_on_kernel: int,
+) -> StiffnessEffect:
+    """Return what the source alone does to units, with the first order checked at ±2σ.
+
+    Parameters
+    ----------
+    response
+        The first order.
+    source
+        The uncertainty.
+    x
+        Units, in the kernel's columns [m, angles rad].
+    directions
+        Any directions of independent standard values; both ends at a distance of 2 are checked [-].
+    units_on_kernel
+        How many of the units the kernel solves again at changed stiffnesses [-].
+    """
+    answers = response.kernel.with_derivatives(x)
+    gradient = response.gradient(answers)[answers.evaluation.good]
+    mean = gradient.mean(axis=0)
+    ends = 2.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True) @ source.factor.T
+    return StiffnessEffect(
+        source=source,
+        sigma=float(np.sqrt(((gradient @ source.factor) ** 2).sum(axis=1).mean())),
+        sigma_of_mean=float(np.linalg.norm(mean @ source.factor)),
+        first_order=first_order_error(response, x[:units_on_kernel], np.concatenate([ends, -ends])),
+    )

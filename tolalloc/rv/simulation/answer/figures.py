@@ -1,0 +1,97 @@
+"""Figures of a simulated reducer: speeds, accelerations and contacts over time, transmission error over the angle."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from tolalloc.report.figure import Figure, Series
+from tolalloc.rv.simulation.answer.results import SimulationResults
+from tolalloc.units import RPM
+
+_POINTS = 2000
+"""Points of a line, about two for every dot of a screen; the file of the whole series has all [-]."""
+
+
+def _thinned(values: Shaped[np.ndarray, " time"]) -> Int[np.ndarray, " shown"]:
+    """Return which points show a line: least and most of each stretch, so that no vibration hides between them."""
+    stretches = np.array_split(np.arange(values.size), min(_POINTS // 2, values.size))
+    ends = [(part[np.argmin(values[part])], part[np.argmax(values[part])]) for part in stretches]
+    return np.unique(np.array(ends))
+
+
+def line(label: str, x: Float[np.ndarray, " time"], y: Shaped[np.ndarray, " time"]) -> Series:
+    """Return a line thin enough for a page.
+
+    Parameters
+    ----------
+    label
+        Name in the legend.
+    x, y
+        Data.
+    """
+    shown = _thinned(y)
+    return Series(label=label, kind="line", x=x[shown].tolist(), y=y[shown].tolist())
+
+
+def _over_time(name: str, title: str, label: str, *lines: Series) -> Figure:
+    return Figure(name=name, title=title, x_label="time [s]", y_label=label, series=lines)
+
+
+def run_figures(results: SimulationResults) -> tuple[Figure, ...]:
+    """Return the whole run over time: input and output speed, their accelerations, contacts of each disc."""
+    series, contacts = results.series, results.series.pins_in_contact
+    time, who = series.time, results.engine
+    speeds = (("input", series.input_speed), ("output", series.output_speed))
+    accelerations = (("input", series.input_acceleration), ("output", series.output_acceleration))
+    return (
+        *(
+            _over_time(f"{name}_speed", f"Speed of the {name}", "speed [rpm]", line(who, time, speed / RPM))
+            for name, speed in speeds
+        ),
+        *(
+            _over_time(
+                f"{name}_acceleration",
+                f"Acceleration of the {name}",
+                "angular acceleration [rad/s²]",
+                line(who, time, acceleration),
+            )
+            for name, acceleration in accelerations
+        ),
+        _over_time(
+            "contacts",
+            "Pins that carry",
+            "pins in contact [-]",
+            *(line(f"disc {disc + 1}", time, contacts[:, disc]) for disc in range(contacts.shape[1])),
+        ),
+    )
+
+
+def error_figure(found: dict[str, SimulationResults], passes: float = np.inf) -> Figure:
+    """Return the transmission error over the last of the steady part, of several engines and at rest.
+
+    Parameters
+    ----------
+    found
+        Label → results on the same reducer, speed and load.
+    passes
+        How many pin passes are shown [-].
+    """
+    first = next(iter(found.values()))
+    stage = first.reducer.cycloid_stage
+    shown = passes * 360.0 / (stage.disc_teeth * stage.pin_count)
+    lines = []
+    for label, results in found.items():
+        angle, moving, _ = results.arcseconds
+        last = angle >= angle[-1] - shown
+        lines.append(line(label, angle[last], moving[last]))
+    angle, _, resting = first.arcseconds
+    last = angle >= angle[-1] - shown
+    lines.append(line("at rest", angle[last], resting[last]))
+    return Figure(
+        name="transmission_error",
+        title="Transmission error of the steady part, in motion and at rest",
+        x_label="carrier angle [°]",
+        y_label="transmission error [″]",
+        series=tuple(lines),
+    )

@@ -1,0 +1,216 @@
+"""A reducer driven through a speed and a torque profile, and the static model at the same angles."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.progress import Progress
+from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.inertia import ASSUMPTIONS
+from tolalloc.rv.dynamics.modes import modes
+from tolalloc.rv.dynamics.motion import Motion
+from tolalloc.rv.dynamics.simulation import simulate as simulate_model
+from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.multibody.drive import Damping as PrototypeDamping
+from tolalloc.rv.multibody.drive import Drive
+from tolalloc.rv.multibody.masses import Masses
+from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
+from tolalloc.rv.multibody.time_course import TimeCourse
+from tolalloc.rv.simulation.answer.results import AtRest, SimulationResults, TimeSeries
+from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
+
+MOST_ANGLES = 5000
+"""Angles at which the static model is asked beside the simulation [-]."""
+MODE_ANGLES = 200
+"""Angles at which natural frequencies are looked for [-]."""
+
+
+def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResults:
+    """Return what a reducer does over time, and the static model at the same angles.
+
+    Parameters
+    ----------
+    prepared
+        The simulation.
+    progress
+        Told the simulated milliseconds.
+
+    Raises
+    ------
+    SolveError
+        A time step or an angle without equilibrium.
+    """
+    asked, motion = prepared.asked, prepared.motion
+    progress.begin(f"in motion, {asked.engine}")
+    start = time.perf_counter()
+    simulated = _prototype if asked.engine == "exudyn" else _equivalent
+    series = simulated(prepared, motion, _milliseconds(asked.duration, progress))
+    seconds = time.perf_counter() - start
+    count = round(prepared.crank_turns * prepared.crank_turn / motion.step)
+    steady = slice(motion.time.size - count, motion.time.size)
+    progress.begin("at rest")
+    at_rest = _at_rest(prepared, motion, steady)
+    return SimulationResults(
+        reducer=prepared.reducer,
+        engine=asked.engine,
+        unit=prepared.unit.name,
+        speed=prepared.speed,
+        load=prepared.load,
+        series=series,
+        steady=steady,
+        crank_turns=prepared.crank_turns,
+        at_rest=at_rest,
+        natural_frequency=_natural_frequency(prepared, motion, steady),
+        seconds=seconds,
+        assumptions=_assumptions(prepared),
+    )
+
+
+def _milliseconds(duration: float, progress: Progress) -> Callable[[float], None]:
+    """Return what turns the share of the time that is simulated into further milliseconds."""
+    told = 0
+
+    def tell(share: float) -> None:
+        nonlocal told
+        new = int(1e3 * duration * share + 1e-6) - told
+        if new > 0:
+            progress.advance(new)
+            told += new
+
+    return tell
+
+
+def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
+    """Simulate the equivalent model."""
+    asked, every = prepared.asked, np.arange(motion.time.size)
+    damping = Damping(mass_proportional=prepared.mass_damping, stiffness_proportional=asked.damping)
+    found = simulate_model(
+        prepared.model, prepared.errors, motion, prepared.inertia, damping, INTEGRATORS[asked.engine], every, tell
+    )
+    failed = np.flatnonzero(found.status[0] != Status.CONVERGED)
+    if failed.size:
+        outcome = Status(int(found.status[0, failed[0]])).sentence
+        raise SolveError(f"unit {prepared.unit.name}: no motion from {motion.time[failed[0]]:.4g} s on: {outcome}.")
+    return _series(
+        prepared,
+        motion,
+        output_speed=found.output_speed[0],
+        output_acceleration=found.output_acceleration[0],
+        transmission_error=found.transmission_error[0],
+        input_torque=found.input_torque[0],
+        pin_forces=found.observed.pin_forces[0],
+    )
+
+
+def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
+    """Simulate the virtual prototype."""
+    asked, inertia = prepared.asked, prepared.inertia
+    found = simulate_prototype(
+        prepared.reducer,
+        Masses(
+            crank_mass=inertia.planet,
+            crank_inertia=inertia.planet_moment,
+            disc_mass=inertia.disc,
+            disc_inertia=inertia.disc_moment,
+            carrier_mass=inertia.carrier,
+            carrier_inertia=inertia.carrier_moment,
+        ),
+        Drive(
+            speed=TimeCourse.step(prepared.speed, 0.0, asked.ramp),
+            torque=TimeCourse.step(-prepared.load, asked.ramp, prepared.loaded),
+        ),
+        TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=PROTOTYPE_RADIUS),
+        PrototypeDamping(bearings=asked.damping, output=prepared.mass_damping * inertia.carrier_moment),
+        prepared.prototype_errors,
+        tell,
+    )
+    if found.time.size != motion.time.size:
+        raise SolveError(f"virtual prototype: {found.time.size} answers in {motion.time.size} time steps.")
+    return _series(
+        prepared,
+        motion,
+        output_speed=found.output_speed,
+        output_acceleration=found.output_acceleration,
+        transmission_error=found.transmission_error,
+        input_torque=found.input_torque,
+        pin_forces=found.pin_forces,
+    )
+
+
+def _series(prepared: PreparedSimulation, motion: Motion, **found: np.ndarray) -> TimeSeries:
+    """Return what an engine found beside what drove it."""
+    ratio = prepared.reducer.ratio
+    return TimeSeries(
+        time=motion.time,
+        carrier_angle=motion.carrier_angle,
+        input_speed=motion.carrier_speed * ratio,
+        input_acceleration=motion.carrier_acceleration * ratio,
+        output_torque=motion.torque,
+        **found,
+    )
+
+
+def _at_rest(prepared: PreparedSimulation, motion: Motion, steady: slice) -> AtRest:
+    """Return the static model at some angles of the steady part."""
+    steps = np.arange(motion.time.size)[steady]
+    steps = steps[:: -(-steps.size // MOST_ANGLES)]
+    start = time.perf_counter()
+    found = prepared.model.equilibria(prepared.errors, -prepared.load, motion.carrier_angle[steps])
+    pins, worst = forces(found).pins[0], Status(int(found.status.max()))
+    if worst is not Status.CONVERGED:
+        raise SolveError(f"unit {prepared.unit.name}: no equilibrium at rest at some angle: {worst.sentence}.")
+    return AtRest(
+        steps=steps,
+        transmission_error=found.transmission_error[0],
+        pin_forces=pins,
+        seconds=time.perf_counter() - start,
+    )
+
+
+def _natural_frequency(prepared: PreparedSimulation, motion: Motion, steady: slice) -> float | None:
+    """Return the lowest natural frequency over the steady part [Hz]."""
+    angle = motion.carrier_angle[steady]
+    try:
+        found = modes(
+            prepared.model,
+            prepared.errors[0],
+            -prepared.load,
+            prepared.inertia,
+            angle[:: -(-angle.size // MODE_ANGLES)],
+        )
+    except InputError:  # springs that are not linear have no natural frequency
+        return None
+    return float(found.frequency.min())
+
+
+def _assumptions(prepared: PreparedSimulation) -> tuple[str, ...]:
+    """Return what no source prints."""
+    asked = prepared.asked
+    prototype = asked.engine == "exudyn"
+    damped = "the carrier's rotation alone" if prototype else "every part"
+    stiffened = "bearings" if prototype else "meshes and bearings"
+    return (
+        *prepared.reducer.assumptions,
+        *prepared.unit.assumptions,
+        *(
+            (f"{asked.pin_stiffness:g} N/m at every pin contact, in place of the reducer's own law",)
+            if asked.pin_stiffness is not None
+            else ()
+        ),
+        *ASSUMPTIONS,
+        f"the carrier turns {asked.output_inertia:g} kg·m² besides its own",
+        f"damping: {asked.damping:g} s times the stiffness of {stiffened} and {prepared.mass_damping:.3g} 1/s times "
+        f"the mass of {damped}, on the deviation from the nominal motion; none in pin contacts",
+        "speed and load rise by the cubic 3s² − 2s³, the load in half the time of the speed and after it",
+        "no friction, no lubricant film",
+        *(
+            ("the first stage does not yield, in the prototype and in the static model beside it",)
+            if asked.engine == "exudyn"
+            else ()
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Stand-ins for the equivalent model that use its structure."""

@@ -1,0 +1,1 @@
+"""What the modified teeth do without errors, and the profile for a drawing."""

@@ -1,0 +1,139 @@
+"""What a modification does to clearance and contact: figures and report of one assessment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.report.document import Document, Section
+from tolalloc.report.figure import Figure, Series
+from tolalloc.rv.cycloid.assessment import Assessment
+from tolalloc.rv.cycloid.clearance import FLANK, linear_clearance
+from tolalloc.rv.cycloid.mesh import normals
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.teeth.contact_tables import answer, contact_table, pin_table, profile_table, summary
+from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+
+
+def profile_figure(profile: ToothProfile) -> Figure:
+    """Draw one tooth, exact and with the modification magnified."""
+    exact, angle = ToothProfile(stage=profile.stage), np.linspace(0.0, np.pi, 361)
+    removed = linear_clearance(profile.stage, profile.modification, angle)
+    places, apart = exact.points(angle), removed[:, np.newaxis] * exact.normals(angle)
+    largest = max(float(np.abs(removed).max()), 1e-12)
+    height = exact.tip_radius - exact.root_radius
+    factor = max(float(f"{0.12 * height / largest:.0e}"), 1.0)
+    middle = np.exp(1j * (np.pi / profile.stage.disc_teeth + np.pi / 2))  # the tooth's middle upright
+
+    def upright(points: np.ndarray) -> tuple[list[float], list[float]]:
+        own = (points[:, 0] + 1j * points[:, 1]) * middle / MILLIMETRE
+        x, y = own.real.tolist(), own.imag.tolist()
+        return x + [-value for value in x[::-1]], y + y[::-1]
+
+    drawn = (("exact tooth", places), (f"modified, {factor:g} times magnified", places + factor * apart))
+    # What is removed along the normal is drawn, not the slip of points along the flank, which changes nothing.
+    return Figure(
+        name="profile",
+        title=f"One tooth of the disc, exact and modified ({factor:g} times magnified)",
+        x_label="across the tooth [mm]",
+        y_label="from the disc's centre [mm]",
+        series=tuple(
+            Series(label=label, kind="line", x=upright(points)[0], y=upright(points)[1]) for label, points in drawn
+        ),
+        equal=True,
+    )
+
+
+def clearance_figure(found: Assessment) -> Figure:
+    """Draw clearance and deflection against the angle, and the zone where pins carry."""
+    lever = normals(found.reducer.cycloid_stage.shortening, FLANK).lever
+    angle = list(FLANK / DEGREE)
+    low, high = found.single.zone.mean(axis=0) / DEGREE
+    formula = [Series(label="Li Lixing's formula", kind="line", x=angle, y=list(found.clearance.formula / MICROMETRE))]
+    if found.clearance.formula_error < 0.01 * MICROMETRE:  # the same line as the clearance
+        formula = []
+    return Figure(
+        name="clearance",
+        title="Clearance after the first contact, and what the load closes",
+        x_label="angle of the pin from the crank direction [°]",
+        y_label="clearance, deflection [µm]",
+        series=(
+            Series(label="clearance", kind="line", x=angle, y=list(found.clearance.after / MICROMETRE)),
+            *formula,
+            *(
+                Series(
+                    label=f"deflection, {name}",
+                    kind="line",
+                    x=angle,
+                    y=list(lever * contact.deflection.mean() / MICROMETRE),
+                )
+                for name, contact in (("linear method", found.linear), ("law at every pin", found.single))
+            ),
+        ),
+        vertical=((low, f"carrying from {low:.1f}°"), (high, f"to {high:.1f}°")),
+    )
+
+
+def force_figure(found: Assessment) -> Figure:
+    """Draw the force of each pin."""
+    frame = pin_table(found)
+    at = list(frame["pin at [deg]"])
+    return Figure(
+        name="forces",
+        title="Force of each pin, one of them in the crank direction",
+        x_label="angle of the pin from the crank direction [°]",
+        y_label="force [N]",
+        series=(
+            Series(label="linear method", kind="points", x=at, y=list(frame["force, linear method [N]"])),
+            Series(label="law at every pin", kind="points", x=at, y=list(frame["force, law at every pin [N]"])),
+        ),
+    )
+
+
+def phase_figure(found: Assessment) -> Figure:
+    """Draw how the number of pins in contact changes while one pin takes over from the next."""
+    phase = list(found.single.phase / DEGREE)
+    return Figure(
+        name="pins_in_contact",
+        title="Pins in contact on the more loaded disc over one pin pitch",
+        x_label="angle from the crank direction to the next pin [°]",
+        y_label="pins in contact [-]",
+        series=tuple(
+            Series(label=name, kind="points", x=phase, y=[int(count) for count in contact.pins_in_contact[:, 0]])
+            for name, contact in (("linear method", found.linear), ("law at every pin", found.single))
+        ),
+    )
+
+
+def contact_sections(found: Assessment) -> tuple[Section, ...]:
+    """Return the sections of a report that show what a modification does."""
+    return (
+        Section(
+            heading="Profile and clearance",
+            figures=(profile_figure(found.profile), clearance_figure(found)),
+            tables=(("profile", profile_table(found)),),
+        ),
+        Section(
+            heading="Under load",
+            paragraphs=(
+                "Linear method: Li Lixing's, forces in proportion to the compressions, the largest deflection "
+                "iterated. Law at every pin: the force law of the contact solved tooth by tooth.",
+            ),
+            figures=(force_figure(found), phase_figure(found)),
+            tables=(("loaded contact", contact_table(found)), ("pins", pin_table(found))),
+        ),
+    )
+
+
+def contact_document(found: Assessment) -> Document:
+    """Return the report of one assessment."""
+    width = found.reducer.cycloid_stage.face_width / MILLIMETRE
+    return Document(
+        title=f"{found.reducer.name}: what the tooth modification does",
+        subtitle=f"{found.torque:g} N·m on the carrier, {found.share * found.torque:.4g} N·m on the more loaded disc, "
+        f"face width {width:g} mm, {found.single.phase.size} phases of the pin pitch.",
+        answer=answer(found),
+        warnings=found.warnings,
+        sections=contact_sections(found),
+        assumptions=found.assumptions,
+        summary=summary(found),
+    )

@@ -1,1 +1,0 @@
-"""How a search came to its answer, whatever was searched."""

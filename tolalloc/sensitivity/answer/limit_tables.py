@@ -1,0 +1,151 @@
+"""The tables of what the limits do, as frames with a unit in every header."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from tolalloc.capability.indices import Limits, capability, quantile_interval
+from tolalloc.capability.monte_carlo import proportion
+from tolalloc.sensitivity.answer.results import RankingResults
+from tolalloc.units import MICROMETRE
+
+
+def capability_table(results: RankingResults) -> pd.DataFrame:
+    """Return every requirement with its distribution, capability and yield."""
+    rows = []
+    for at, output in enumerate(results.outputs):
+        values, limits = (
+            results.sample.evaluation.values[results.sample.evaluation.good, at],
+            results.limits.get(output),
+        )
+        name, unit = output.rsplit(" [", 1)
+        row: dict[str, object] = {
+            "requirement": name,
+            "unit": unit.rstrip("]"),
+            "Mean": float(values.mean()),
+            "Sigma": float(values.std(ddof=1)),
+            "Min": float(values.min()),
+            "Max": float(values.max()),
+        }
+        kept = quantile_interval(values, results.target)
+        row |= {
+            f"{results.target:.2%} quantile, low 2.5 %": kept.low,
+            f"{results.target:.2%} quantile, high 97.5 %": kept.high if np.isfinite(kept.high) else "sample too small",
+        }
+        if limits:
+            row |= _kept(results, values, limits)
+        rows.append(row)
+    return pd.DataFrame(rows).dropna(axis="columns", how="all")
+
+
+def _kept(results: RankingResults, values: Float[np.ndarray, " unit"], limits: Limits) -> dict[str, object]:
+    """Return limits, capability and yield of one output; units without an answer count as outside."""
+    units = results.sample.evaluation.status.size
+    inside = proportion(units, units - values.size + limits.outside(values))
+    row: dict[str, object] = {
+        "LSL": np.nan if limits.lower is None else limits.lower,
+        "USL": np.nan if limits.upper is None else limits.upper,
+        "Yield [%]": inside.estimate * 100,
+        "Yield low 2.5 % [%]": inside.low * 100,
+        "Yield high 97.5 % [%]": inside.high * 100,
+        "% out [%]": (1 - inside.estimate) * 100,
+        "PPM [1e-6]": (1 - inside.estimate) * 1e6,
+        "OK": "yes" if inside.bound >= results.target else "no",
+    }
+    if np.ptp(values) > 0:
+        found = capability(values, limits)
+        row |= {
+            "Pp [-]": np.nan if found.pp is None else found.pp,
+            "Ppk [-]": found.ppk,
+            "PPM if normal [1e-6]": found.normal_ppm,
+        }
+    return row
+
+
+def beyond_table(results: RankingResults) -> pd.DataFrame:
+    """Return the share beyond the limit by every method that was asked."""
+    found = results.beyond
+    return pd.DataFrame(
+        [
+            {
+                "method": item.method,
+                "probability beyond the limit [-]": item.probability,
+                "standard error [-]": item.standard_error,
+                "coefficient of variation [-]": item.coefficient_of_variation,
+                "units solved [-]": item.calls,
+                "relied on": "yes" if item is found.estimate else "no",
+                "cautions": "; ".join(item.cautions),
+            }
+            for item in found.estimates
+        ]
+    )
+
+
+def stack_up_table(results: RankingResults) -> pd.DataFrame:
+    """Return worst case, root-sum-square and Monte Carlo side by side."""
+    sample = results.sample
+    rows = [
+        ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
+        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),
+        ("Monte Carlo mean", float(sample.values.mean()), "real model, all errors together"),
+        (
+            f"Monte Carlo {results.target:.2%} quantile",
+            sample.quantile(results.target),
+            "real model, all errors together",
+        ),
+    ]
+    return pd.DataFrame(rows, columns=["estimate", "peak-to-peak [arcsec]", "assumes"])
+
+
+def reject_table(results: RankingResults) -> pd.DataFrame:
+    """Return what the units outside have in common, the strongest source first."""
+    found = results.reject
+    first, lift, excess = found.first_interval, found.lift_interval, found.excess_interval
+    frame = pd.DataFrame(
+        {
+            "source": found.sources,
+            "excess [-]": found.excess,
+            "excess low 5 % [-]": excess[0],
+            "excess high 95 % [-]": excess[1],
+            "columns [-]": found.columns,
+            "lift [-]": found.lift,
+            "lift low 5 % [-]": lift[0],
+            "lift high 95 % [-]": lift[1],
+            "target index S1 [-]": found.first,
+            "target S1 low 5 % [-]": first[0],
+            "target S1 high 95 % [-]": first[1],
+            "p-value of no effect [-]": found.p_value,
+            "median of all [µm]": found.median / MICROMETRE,
+            "median outside [µm]": found.median_outside / MICROMETRE,
+        }
+    )
+    return frame.sort_values("excess [-]", ascending=False, kind="stable").reset_index(drop=True)
+
+
+def inverse_table(results: RankingResults) -> pd.DataFrame:
+    """Return how far each zone may open alone, or must close."""
+    found = results.inverse
+    now = [source.zone / MICROMETRE for source in results.errors.active if source.name in found.sources]
+    frame = pd.DataFrame(
+        {
+            "source": found.sources,
+            "zone now [µm]": now,
+            "factor alone [-]": found.factor,
+            "factor low 5 % [-]": found.low,
+            "factor high 95 % [-]": found.high,
+            "zone alone [µm]": found.zone / MICROMETRE,
+            "reading": [_reading(value) for value in found.factor],
+        }
+    )
+    return frame.sort_values("factor alone [-]", kind="stable", na_position="first").reset_index(drop=True)
+
+
+def _reading(factor: float) -> str:
+    """Return a factor as words."""
+    if np.isnan(factor):
+        return "cannot meet the limit alone, not even at zone 0"
+    if np.isinf(factor):
+        return "does not matter: 10 times the zone keeps the limit"
+    return f"may open by {factor - 1:.0%}" if factor >= 1 else f"must close by {1 - factor:.0%}"
