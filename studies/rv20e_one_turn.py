@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tolalloc.drawing.unit_file import load_unit
-from tolalloc.report.figure import Figure, Series, save_png
+from tolalloc.report.figure import Figure, Series
+from tolalloc.report.plots import save_png
 from tolalloc.rv.equivalent.attribution import attribute
 from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop

@@ -30,7 +30,7 @@ def assemble(
     from tolalloc.assembly.study import AssemblyStudy, prepare_assembly
     from tolalloc.assembly.study import assemble as assembled
     from tolalloc.cli.document_script import written
-    from tolalloc.study.run_folder import require_usable
+    from tolalloc.report.folder import require_usable
 
     prepared = prepare_assembly(AssemblyStudy(chain=chain, measured=measured, precision=precision, seed=seed))
     if out:

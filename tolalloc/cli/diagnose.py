@@ -32,8 +32,8 @@ def diagnose(
     from tolalloc.bench.diagnosis.answer.document import diagnosis_document, source_table
     from tolalloc.bench.diagnosis.study import DiagnosisStudy, diagnose_unit
     from tolalloc.cli.document_script import written
+    from tolalloc.report.folder import require_usable
     from tolalloc.study.definition import Study
-    from tolalloc.study.run_folder import require_usable
 
     asked = DiagnosisStudy(
         curve=curve,

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from tolalloc.cli.console import announce_compilation, messages, say
 from tolalloc.exceptions import TolallocError
-from tolalloc.report.document import Document, write_document
-from tolalloc.study.run_folder import claimed
+from tolalloc.report.document import Document
+from tolalloc.report.folder import claimed
+from tolalloc.report.writer import write_document
 
 
 def _nothing(folder: Path) -> None:

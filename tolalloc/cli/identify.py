@@ -58,7 +58,7 @@ def identify(
     from tolalloc.bench.identification.study import identify as identified
     from tolalloc.bench.measurement.files import load_measurements
     from tolalloc.cli.document_script import written
-    from tolalloc.study.run_folder import require_usable
+    from tolalloc.report.folder import require_usable
 
     design = load_reducer(reducer)
     study = IdentificationStudy(

@@ -273,8 +273,8 @@ def compare(
 
 def _require_writable(out: Path | None, file: Path | None, points: int) -> None:
     """Refuse a report or a profile that could not be written, before anything long runs."""
+    from tolalloc.report.folder import require_usable
     from tolalloc.rv.teeth.profile_files import require_profile_file
-    from tolalloc.study.run_folder import require_usable
 
     if out:
         require_usable(out)

@@ -27,7 +27,7 @@ def mount(
     from tolalloc.assembly.mounting.study import MountingStudy, prepare_mounting
     from tolalloc.assembly.mounting.study import mount as mounted
     from tolalloc.cli.document_script import written
-    from tolalloc.study.run_folder import require_usable
+    from tolalloc.report.folder import require_usable
 
     asked = MountingStudy(parts=parts, reducer=reducer, torque_nm=torque, starts=starts, seed=seed)
     prepared = prepare_mounting(asked)

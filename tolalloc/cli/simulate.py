@@ -45,11 +45,11 @@ def simulate(
     """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.cli.document_script import written
+    from tolalloc.report.folder import require_usable
     from tolalloc.rv.simulation.answer.document import simulation_document
     from tolalloc.rv.simulation.answer.tables import series_table, steady_table
     from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation
     from tolalloc.rv.simulation.run import simulate as simulated
-    from tolalloc.study.run_folder import require_usable
 
     asked = SimulationStudy(
         reducer=reducer,

@@ -1,25 +1,15 @@
-"""A report of headings, tables and figures about anything: page, workbook and pictures from one record."""
+"""A report of headings, tables and figures about anything: one record from which page, workbook and pictures come."""
 
 from __future__ import annotations
 
-import json
-import platform
-from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-from jinja2 import Environment, PackageLoader
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
+from tolalloc.report.figure import Figure, HeatMap
 
-from tolalloc.report.excel import write_sheets
-from tolalloc.report.figure import Figure, as_html, save_png
-from tolalloc.report.heat_map import HeatMap
-
-_LARGE = (24, 15)
-"""Rows and columns beyond which a table is folded [-]."""
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +54,8 @@ class Document:
         The answer for a program, units of measurement in the names.
     seed
         Seed of the random numbers; none if nothing is random [-].
+    manifest
+        What else is needed to repeat the run and to trust it.
     """
 
     title: str
@@ -74,78 +66,67 @@ class Document:
     assumptions: tuple[str, ...]
     summary: dict[str, Any]
     seed: int | None = None
+    manifest: dict[str, Any] | None = None
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All tables by name, in the order of the report."""
+        return {name: frame for section in self.sections for name, frame in section.tables}
+
+    @property
+    def figures(self) -> dict[str, Figure | HeatMap]:
+        """All figures by name, in the order of the report."""
+        return {figure.name: figure for section in self.sections for figure in section.figures}
 
 
-def _number(value: object) -> str:
-    """Return a cell as text with five significant digits at most."""
-    if isinstance(value, float):
-        if pd.isna(value):
-            return ""
-        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}"
-    return str(value)
-
-
-def _is_large(frame: pd.DataFrame) -> bool:
-    """Return whether a page shows a table only when it is asked for."""
-    return len(frame) > _LARGE[0] or frame.shape[1] > _LARGE[1]
-
-
-def html_table(frame: pd.DataFrame) -> Markup:
-    """Return a frame as an HTML table."""
-    text = frame.map(_number)
-    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))
-
-
-def environment() -> Environment:
-    """Return where the pages' templates come from."""
-    return Environment(loader=PackageLoader("tolalloc.report"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
-
-
-def write_document(document: Document, folder: Path) -> None:
-    """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json``, tables as CSV and figures as PNG.
+def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **manifest: Any) -> Document:
+    """Return several reports as one, in their order.
 
     Parameters
     ----------
-    document
-        The report.
-    folder
-        New or empty folder.
+    title, subtitle
+        Of the whole.
+    parts
+        Name and report of each; a table or figure whose name an earlier one has gets the part's name before its own.
+    manifest
+        What is needed to repeat the run and to trust it.
     """
-    figures = folder / "figures"
-    figures.mkdir(parents=True)
-    sections = [
-        {
-            "heading": section.heading,
-            "paragraphs": section.paragraphs,
-            "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
-            "tables": [(name, len(frame), _is_large(frame), html_table(frame)) for name, frame in section.tables],
-        }
-        for section in document.sections
-    ]
-    page = environment().get_template("document.html.j2")
-    content = page.render(document=document, sections=sections, plotly=Markup(get_plotlyjs()))
-    (folder / "report.html").write_text(content, encoding="utf-8")
-    sheets = {name: frame for section in document.sections for name, frame in section.tables}
-    (folder / "tables").mkdir()
-    for name, frame in sheets.items():
-        frame.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
-    write_sheets({**sheets, "assumptions": pd.DataFrame({"assumption": document.assumptions})}, folder / "results.xlsx")
-    for section in document.sections:
-        for figure in section.figures:
-            save_png(figure, figures / f"{figure.name}.png")
-    write_json(document.summary, folder / "summary.json")
-    versions = {"tolalloc": version("tolalloc"), "python": platform.python_version()}
-    libraries = ("numpy", "scipy", "numba", "pymoo", "cvxpy", "clarabel", "highspy", "SALib", "pandas")
-    write_json(
-        {
-            "title": document.title,
-            "seed": document.seed,
-            "versions": versions | {name: version(name) for name in libraries},
-        },
-        folder / "manifest.json",
+    sections: list[Section] = []
+    answer: list[str] = []
+    warnings: list[str] = []
+    assumptions: list[str] = []
+    summary: dict[str, Any] = {}
+    names: set[str] = set()
+    for part, document in parts:
+        tables = {name: _free(name, part, names) for name in document.tables}
+        figures = {name: _free(name, part, names) for name in document.figures}
+        for section in document.sections:
+            sections.append(
+                replace(
+                    section,
+                    tables=tuple((tables[name], frame) for name, frame in section.tables),
+                    figures=tuple(replace(figure, name=figures[figure.name]) for figure in section.figures),
+                )
+            )
+        answer += document.answer
+        warnings += document.warnings
+        assumptions += document.assumptions
+        summary[part] = document.summary
+    return Document(
+        title=title,
+        subtitle=subtitle,
+        answer=tuple(answer),
+        warnings=tuple(dict.fromkeys(warnings)),
+        sections=tuple(sections),
+        assumptions=tuple(dict.fromkeys(assumptions)),
+        summary=summary,
+        seed=manifest.get("seed"),
+        manifest=manifest,
     )
 
 
-def write_json(content: dict[str, Any], path: Path) -> None:
-    """Write a JSON file."""
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+def _free(name: str, part: str, taken: set[str]) -> str:
+    """Return a name that is not taken, and take it."""
+    free = f"{part} {name}" if name in taken else name
+    taken.add(free)
+    return free

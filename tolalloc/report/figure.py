@@ -1,21 +1,14 @@
-"""A figure said once, drawn twice: interactive in the page by plotly, as PNG by matplotlib.
-
-A still picture needs no browser on the user's machine, and the page keeps its zoom and hover.
-"""
+"""What a figure shows, said once; `tolalloc.report.plots` draws it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import singledispatch
-from math import log10
-from pathlib import Path
-from typing import Any, Literal
+from math import isfinite
+from typing import Literal
 
-import plotly.graph_objects as go
-from matplotlib.figure import Figure as Canvas
-
-COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
+_SHOWN = 0.005
+"""A value below is no number in its cell, so that the eye finds those that matter [of the largest]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,147 +74,41 @@ class Figure:
         return max((len(item.x) for item in self.series if item.kind == "bars"), default=0)
 
 
-def _draw_bars(axes: Any, figure: Figure, number: int) -> None:
-    """Draw one of several sets of horizontal bars."""
-    item, count = figure.series[number], sum(item.kind == "bars" for item in figure.series)
-    height = 0.8 / count
-    places = [row + height * (number - (count - 1) / 2) for row in range(len(item.x))]
-    error = None
-    if item.low:
-        error = [
-            [y - low for y, low in zip(item.y, item.low, strict=True)],
-            [high - y for y, high in zip(item.y, item.high, strict=True)],
-        ]
-    colour = COLOURS[number % len(COLOURS)]
-    axes.barh(places, item.y, height, xerr=error, label=item.label, color=colour, ecolor="#444444", capsize=2)
-    axes.set_yticks(range(len(item.x)), [str(name) for name in item.x])
+@dataclass(frozen=True, kw_only=True)
+class HeatMap:
+    """A figure of coloured cells.
 
+    Parameters
+    ----------
+    name
+        File name without ending.
+    title
+        What it shows, as a sentence.
+    columns, rows
+        Names of the columns and the rows.
+    x_label
+        What the columns are.
+    label
+        What a cell says, with its unit.
+    values
+        One row of numbers per row; the darkest is the largest.
+    """
 
-def _draw(axes: Any, figure: Figure, number: int) -> None:
-    """Draw one set of data by matplotlib."""
-    item, colour = figure.series[number], COLOURS[number % len(COLOURS)]
-    if item.kind == "line":
-        axes.plot(item.x, item.y, label=item.label, color=colour, linewidth=1.2)
-        if item.low:
-            axes.fill_between(item.x, item.low, item.high, color=colour, alpha=0.18, linewidth=0)
-    elif item.kind == "points":
-        axes.plot(item.x, item.y, "o", label=item.label, color=colour, markersize=7)
-    elif item.kind == "stems":
-        offset = 0.28 * (number - (len(figure.series) - 1) / 2)
-        axes.bar([float(x) + offset for x in item.x], item.y, 0.28, label=item.label, color=colour)
-    elif item.kind == "histogram":
-        axes.hist(item.x, bins=60, label=item.label, color=colour, alpha=0.55)
-    else:
-        _draw_bars(axes, figure, number)
+    name: str
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[str]
+    x_label: str
+    label: str
+    values: Sequence[Sequence[float]]
 
+    @property
+    def largest(self) -> float:
+        """The largest value; a cell without a number has no part in it."""
+        return max((value for row in self.values for value in row if isfinite(value)), default=0.0)
 
-@singledispatch
-def save_png(figure: object, path: Path) -> None:
-    """Draw a figure into a PNG file."""
-    raise TypeError(f"{type(figure).__name__} is no figure for {path}")
-
-
-@save_png.register
-def _(figure: Figure, path: Path) -> None:
-    canvas = Canvas(figsize=(9.0, max(4.5, 0.34 * figure.rows + 1.4)), layout="constrained")
-    axes = canvas.subplots()
-    for number in range(len(figure.series)):
-        _draw(axes, figure, number)
-    for value, name in figure.vertical:
-        axes.axvline(value, color="#b00020", linestyle="--", label=name)
-    for value, name in figure.horizontal:
-        axes.axhline(value, color="#b00020", linestyle="--", label=name)
-    if figure.rows:
-        axes.invert_yaxis()
-    axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
-    if figure.logarithmic:
-        axes.set_yscale("log")
-    if figure.logarithmic_x:
-        axes.set_xscale("log")
-    if figure.equal:
-        axes.set_aspect("equal", adjustable="datalim")
-    axes.grid(alpha=0.3)
-    axes.set_axisbelow(True)
-    axes.legend()
-    canvas.savefig(path, dpi=130)
-
-
-def _faint(colour: str) -> tuple[int, int, int, float]:
-    """Return red, green, blue and a small opacity of a colour."""
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    return red, green, blue, 0.18
-
-
-def _interval(item: Series) -> dict[str, Any] | None:
-    """Return plotly's error bars around the lengths of bars."""
-    if not item.low:
-        return None
-    return {
-        "type": "data",
-        "symmetric": False,
-        "array": [high - y for y, high in zip(item.y, item.high, strict=True)],
-        "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
-        "color": "#444444",
-    }
-
-
-def _add(canvas: go.Figure, item: Series, colour: str) -> None:
-    """Add one set of data by plotly."""
-    if item.kind == "line":
-        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
-        if item.low:
-            band = {"x": item.x, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-            canvas.add_scatter(y=item.low, **band)
-            canvas.add_scatter(y=item.high, fill="tonexty", fillcolor=f"rgba{_faint(colour)}", **band)
-    elif item.kind == "points":
-        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="markers", marker={"color": colour, "size": 10})
-    elif item.kind == "stems":
-        canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
-    elif item.kind == "histogram":
-        canvas.add_histogram(x=item.x, name=item.label, marker_color=colour, opacity=0.6, nbinsx=80)
-    else:
-        canvas.add_bar(
-            y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=_interval(item)
-        )
-
-
-@singledispatch
-def as_html(figure: object) -> str:
-    """Return a figure as a page fragment; the page itself carries plotly.js once."""
-    raise TypeError(f"{type(figure).__name__} is no figure")
-
-
-@as_html.register
-def _(figure: Figure) -> str:
-    canvas = go.Figure()
-    for number, item in enumerate(figure.series):
-        _add(canvas, item, COLOURS[number % len(COLOURS)])
-    # On a logarithmic axis plotly places a line by its value and a text by the logarithm of it.
-    for value, name in figure.vertical:
-        canvas.add_vline(x=value, line_dash="dash", line_color="#b00020")
-        place = log10(value) if figure.logarithmic_x else value
-        canvas.add_annotation(x=place, y=1, yref="paper", text=name, showarrow=False, xanchor="left", yanchor="top")
-    for value, name in figure.horizontal:
-        canvas.add_hline(y=value, line_dash="dash", line_color="#b00020")
-        place = log10(value) if figure.logarithmic else value
-        canvas.add_annotation(x=1, xref="paper", y=place, text=name, showarrow=False, xanchor="right", yanchor="bottom")
-    canvas.update_layout(
-        template="plotly_white",
-        barmode="overlay" if any(item.kind == "histogram" for item in figure.series) else "group",
-        xaxis_title=figure.x_label,
-        yaxis_title=figure.y_label,
-        height=max(420, 24 * figure.rows + 140),
-        # Room for the rows of the legend; the buttons stand beside the picture and not over it.
-        margin={"l": 60, "r": 60, "t": 36 + 20 * (len(figure.series) // 4), "b": 60},
-        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom"},
-        modebar={"orientation": "v"},
-    )
-    if figure.logarithmic:
-        canvas.update_yaxes(type="log", exponentformat="power")
-    if figure.logarithmic_x:
-        canvas.update_xaxes(type="log", exponentformat="power")
-    if figure.equal:
-        canvas.update_yaxes(scaleanchor="x", scaleratio=1)
-    if figure.rows:
-        canvas.update_yaxes(autorange="reversed", automargin=True)
-    return str(canvas.to_html(full_html=False, include_plotlyjs=False))
+    @property
+    def texts(self) -> list[list[str]]:
+        """The numbers in the cells."""
+        least, decimals = _SHOWN * self.largest, 2 if self.largest < 100 else 0
+        return [[f"{value:.{decimals}f}" if value >= least else "" for value in row] for row in self.values]

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from tolalloc.report import tables
-from tolalloc.report.document import environment, html_table
-from tolalloc.report.figure import as_html
 from tolalloc.report.figures import study_figures
+from tolalloc.report.plots import as_html
 from tolalloc.report.results import StudyResults
+from tolalloc.report.writer import html_table
 
 _RANKING_COLUMNS = (
     "rank [-]",
@@ -49,5 +50,9 @@ def write_page(results: StudyResults, path: Path) -> None:
         "verified": html_table(tables.verified(results)),
         "mappings": html_table(tables.mappings(results)),
     }
-    page = environment().get_template("report.html.j2").render(content)
+    page = (
+        Environment(loader=PackageLoader("tolalloc.report"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+        .get_template("report.html.j2")
+        .render(content)
+    )
     path.write_text(page, encoding="utf-8")

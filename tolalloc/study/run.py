@@ -6,11 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from tolalloc.progress import Progress, Record
+from tolalloc.report.folder import claimed, require_usable
 from tolalloc.report.results import StudyResults
 from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.study.definition import Study, prepare
 from tolalloc.study.effort import QUICK
-from tolalloc.study.run_folder import claimed, require_usable, write_run
+from tolalloc.study.run_folder import write_run
 from tolalloc.study.stages import run_stages
 
 

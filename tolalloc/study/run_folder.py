@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,15 +12,16 @@ import numba
 import pandas as pd
 
 from tolalloc.drawing.tolerance_table import table_frame
-from tolalloc.exceptions import InputError, RunFolderError
+from tolalloc.exceptions import InputError
 from tolalloc.progress import Record
 from tolalloc.report import tables
-from tolalloc.report.document import write_json
 from tolalloc.report.excel import write_workbook
-from tolalloc.report.figure import save_png
 from tolalloc.report.figures import study_figures
+from tolalloc.report.folder import require_usable
 from tolalloc.report.page import write_page
+from tolalloc.report.plots import save_png
 from tolalloc.report.results import StudyResults
+from tolalloc.report.writer import write_json
 from tolalloc.study.comparison import HIGH, LOW, TOTAL, FinishedRun
 from tolalloc.study.definition import Prepared
 
@@ -31,51 +29,6 @@ _NEEDED = ("limit [arcsec]", "met", "yield [-]", "cost [cost units]")
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
 _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
 _LIBRARIES = ("numpy", "scipy", "numba", "cvxpy", "clarabel", "pymoo", "SALib", "pandas", "scikit-learn")
-
-
-def require_usable(folder: Path) -> None:
-    """Raise unless the folder is new or empty.
-
-    Raises
-    ------
-    RunFolderError
-        Something is in the way.
-    """
-    if folder.is_file():
-        raise RunFolderError(f"{folder}: is a file; the run needs a folder that is new or empty (--out).")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise RunFolderError(
-            f"{folder}: the run folder is not empty; allowed is a new or empty one (--out), "
-            "so that nothing is overwritten."
-        )
-    above = next(parent for parent in folder.absolute().parents if parent.exists())
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise RunFolderError(f"{folder}: the run folder cannot be made in {above}; name another (--out).")
-
-
-@contextmanager
-def claimed(folder: Path) -> Iterator[None]:
-    """Make the folder before anything long runs; if the work inside fails, take it away again.
-
-    Raises
-    ------
-    RunFolderError
-        Something is in the way, or the folder cannot be made.
-    """
-    require_usable(folder)
-    new = not folder.exists()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunFolderError(
-            f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
-        ) from None
-    try:
-        yield
-    except BaseException:
-        if new and not any(folder.iterdir()):
-            folder.rmdir()
-        raise
 
 
 def manifest(prepared: Prepared, results: StudyResults, record: Record) -> dict[str, Any]:

@@ -7,8 +7,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer import tables, what_if_tables
 from tolalloc.allocation.answer.results import AllocationResults
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.heat_map import HeatMap
+from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.units import MICROMETRE
 
 

@@ -10,8 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.assembly.answer.results import TransmissionEffect
 from tolalloc.assembly.answer.tables import rounded
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.heat_map import HeatMap
+from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK
 from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 

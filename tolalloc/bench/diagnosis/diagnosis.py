@@ -21,7 +21,8 @@ from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.response.kernel import KernelResponse, Observer
+from tolalloc.model import Observer
+from tolalloc.rv.response.kernel import KernelResponse
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
 from tolalloc.chunks import Mapper, map_chunks
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.model import Evaluation
+from tolalloc.model import Evaluation, Observer, unobserved
 from tolalloc.rv.equivalent.answers import Derivatives, Extremes
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.units import ARCSECOND
 
 PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
-
-Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
-"""Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
-
-
-def _unobserved(status: UInt8[np.ndarray, " sample"]) -> None:
-    """Observe nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +73,7 @@ class KernelResponse:
     torque: float
     columns: tuple[str, ...]
     fixed: Mapping[str, float]
-    observe: Observer = _unobserved
+    observe: Observer = unobserved
     mapper: Mapper = map
 
     def __post_init__(self) -> None:
@@ -138,7 +131,7 @@ class KernelResponse:
     @property
     def alone(self) -> KernelResponse:
         """The response without what must stay in this process."""
-        return replace(self, observe=_unobserved, mapper=map)
+        return replace(self, observe=unobserved, mapper=map)
 
     def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
         return self.model.extremes(self.errors(x), self.torque)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.heat_map import HeatMap
+from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK
 from tolalloc.sensitivity.answer import driver_tables, limit_tables
 from tolalloc.sensitivity.answer.results import RankingResults

@@ -1,0 +1,201 @@
+"""What every answer is: a header, sentences, sections and a summary, said once; everything else is drawn from it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.report.document import Document, Section
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure as Canvas
+
+    from tolalloc.report.figure import Figure, HeatMap
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What every answer says of its run.
+
+    Parameters
+    ----------
+    name
+        Name of the study, or of what was measured.
+    model
+        Name of the model, such as the reducer's.
+    seed
+        Seed of the random numbers; none if nothing is random [-].
+    quick
+        Whether the effort was shortened.
+    digest
+        Of what was asked and of what its files hold; empty where nothing is compared later.
+    conditions
+        Under which conditions the model answered, units in the names, such as the torque on the carrier.
+    assumptions
+        What no source of the model states.
+    statuses
+        Outcome → number of solved units [-].
+    stages
+        Seconds and units of each stage.
+    """
+
+    name: str
+    model: str
+    seed: int | None = None
+    quick: bool = False
+    digest: str = ""
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    assumptions: tuple[str, ...] = ()
+    statuses: Mapping[str, int] = field(default_factory=dict)
+    stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> int:
+        """Number of units without an answer; the first outcome is the good one [-]."""
+        return sum(list(self.statuses.values())[1:])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer(ABC):
+    """The answer to one question.
+
+    Parameters
+    ----------
+    header
+        What every answer says of its run.
+
+    Notes
+    -----
+    Everything is made once, when it is first asked for. A notebook shows the first sentence, table and figure.
+    """
+
+    header: Header
+    kind: ClassVar[str]
+    """Word for the question, such as ``ranking``."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """What the answer is about."""
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        return ", ".join(f"{name} {value:g}" for name, value in self.header.conditions.items() if name != "unit")
+
+    @property
+    @abstractmethod
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return ()
+
+    @property
+    @abstractmethod
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their paragraphs, figures and tables."""
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        return self.header.assumptions
+
+    @property
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units of measurement in the names."""
+
+    def add_files(self, folder: Path) -> None:  # noqa: B027 (most answers add nothing)
+        """Add files of its own to a written report; nothing unless an answer says otherwise."""
+
+    @cached_property
+    def document(self) -> Document:
+        """The report on this answer alone."""
+        return Document(
+            title=self.title,
+            subtitle=self.subtitle,
+            answer=self.sentences,
+            warnings=self.warnings,
+            sections=self.sections,
+            assumptions=self.assumptions,
+            summary=self.summary,
+            seed=self.header.seed,
+            manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
+        )
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All tables by name, units in the headers."""
+        return self.document.tables
+
+    @property
+    def figures(self) -> dict[str, Figure | HeatMap]:
+        """All figures by name."""
+        return self.document.figures
+
+    def to_frame(self, name: str = "") -> pd.DataFrame:
+        """Return a table by name, the first one unless named.
+
+        Raises
+        ------
+        UnknownNameError
+            The answer has no such table.
+        """
+        return _picked(self.tables, name, f"the answer's tables ({self.kind})")
+
+    def plot(self, name: str = "") -> Canvas:
+        """Return a figure by name as a picture of matplotlib, the first one unless named.
+
+        Raises
+        ------
+        UnknownNameError
+            The answer has no such figure.
+        """
+        from tolalloc.report.plots import drawn
+
+        return drawn(_picked(self.figures, name, f"the answer's figures ({self.kind})"))
+
+    def save(self, folder: str | Path) -> Path:
+        """Write report, workbook, tables, pictures and summary into a new or empty folder, and return it.
+
+        Raises
+        ------
+        RunFolderError
+            Something is in the way.
+        """
+        from tolalloc.report.folder import claimed
+        from tolalloc.report.writer import write_document
+
+        path = Path(folder)
+        with claimed(path):
+            write_document(self.document, path)
+            self.add_files(path)
+        return path
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the key sentence, the first table, one figure."""
+        from tolalloc.report.writer import html_table, inline_png
+
+        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:1])]
+        shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]
+        shown += [inline_png(figure) for figure in list(self.figures.values())[:1]]
+        return "\n".join(shown)
+
+
+def _picked(known: Mapping[str, Item], name: str, place: str) -> Item:
+    """Return what has the name, the first one unless named."""
+    asked = name or next(iter(known), "")
+    if asked not in known:
+        raise UnknownNameError.among(place, "name", asked, known)
+    return known[asked]

@@ -1,0 +1,110 @@
+"""Page, workbook, tables and pictures of a report: one folder that works offline."""
+
+from __future__ import annotations
+
+import json
+import platform
+from base64 import b64encode
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from tolalloc.compiled import thread_count
+from tolalloc.report.document import Document
+from tolalloc.report.excel import write_sheets
+from tolalloc.report.figure import Figure, HeatMap
+from tolalloc.report.plots import as_html, drawn, save_png
+
+_LARGE = (24, 15)
+"""Rows and columns beyond which a table is folded [-]."""
+_LIBRARIES = (
+    *("numpy", "scipy", "numba", "cvxpy", "clarabel", "highspy"),
+    *("pymoo", "SALib", "pandas", "scikit-learn"),
+)
+
+
+def _number(value: object) -> str:
+    """Return a cell as text with five significant digits at most."""
+    if isinstance(value, float):
+        if pd.isna(value):
+            return ""
+        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}"
+    return str(value)
+
+
+def _is_large(frame: pd.DataFrame) -> bool:
+    """Return whether a page shows a table only when it is asked for."""
+    return len(frame) > _LARGE[0] or frame.shape[1] > _LARGE[1]
+
+
+def html_table(frame: pd.DataFrame) -> Markup:
+    """Return a frame as an HTML table."""
+    text = frame.map(_number)
+    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))
+
+
+def inline_png(figure: Figure | HeatMap) -> str:
+    """Return a figure as an image that stands in the page itself."""
+    buffer = BytesIO()
+    drawn(figure).savefig(buffer, dpi=80, format="png")
+    return f'<img alt="{figure.title}" src="data:image/png;base64,{b64encode(buffer.getvalue()).decode()}">'
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that computes."""
+    own = {"tolalloc": version("tolalloc"), "python": platform.python_version()}
+    return own | {name: version(name) for name in _LIBRARIES}
+
+
+def write_document(document: Document, folder: Path) -> None:
+    """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json``, tables as CSV and figures as PNG.
+
+    Parameters
+    ----------
+    document
+        The report.
+    folder
+        New or empty folder.
+    """
+    figures = folder / "figures"
+    figures.mkdir(parents=True)
+    _write_page(document, folder / "report.html")
+    (folder / "tables").mkdir()
+    for name, frame in document.tables.items():
+        frame.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
+    assumptions = pd.DataFrame({"assumption": document.assumptions})
+    write_sheets({**document.tables, "assumptions": assumptions}, folder / "results.xlsx")
+    for name, figure in document.figures.items():
+        save_png(figure, figures / f"{name}.png")
+    write_json(document.summary, folder / "summary.json")
+    known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
+    write_json({**known, "threads": thread_count(), "versions": versions()}, folder / "manifest.json")
+
+
+def _write_page(document: Document, path: Path) -> None:
+    """Write the page, plotly.js embedded once."""
+    sections = [
+        {
+            "heading": section.heading,
+            "paragraphs": section.paragraphs,
+            "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
+            "tables": [(name, len(frame), _is_large(frame), html_table(frame)) for name, frame in section.tables],
+        }
+        for section in document.sections
+    ]
+    loader = PackageLoader("tolalloc.report")
+    page = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    template = page.get_template("document.html.j2")
+    content = template.render(document=document, sections=sections, plotly=Markup(get_plotlyjs()))
+    path.write_text(content, encoding="utf-8")
+
+
+def write_json(content: dict[str, Any], path: Path) -> None:
+    """Write a JSON file."""
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
