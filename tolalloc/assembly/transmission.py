@@ -14,10 +14,10 @@ from tolalloc.assembly.trajectory import foreseen, random_numbers
 from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
+from tolalloc.model import Observer
 from tolalloc.rv.equivalent.contact_pattern import contact_pattern
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import Observer
 
 
 def transmission_effect(
