@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from published.zhang2025_genetic import genetic_allocation
 
 from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
-from tolalloc.assembly.angular.genetic import genetic_allocation
 from tolalloc.assembly.angular.precision import best_precision
 from tolalloc.assembly.mounting.drawn_parts import drawn_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting

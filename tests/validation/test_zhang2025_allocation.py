@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from studies.published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import allocate_angles, allocated
-from tolalloc.assembly.angular.genetic import genetic_allocation
 from tolalloc.assembly.angular.precision import best_precision
 from tolalloc.assembly.angular.retuning import retuned_allocation
 from tolalloc.assembly.chain_file import load_plan

@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
+from studies.published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import allocate_angles
-from tolalloc.assembly.angular.genetic import genetic_allocation
 from tolalloc.assembly.angular.precision import best_precision
 from tolalloc.assembly.angular.retuning import retuned_allocation
 from tolalloc.assembly.angular.verification import verify_angles

@@ -39,7 +39,7 @@ class GeneticAllocation:
     gap: float
 
 
-class _Searched(Problem):  # type: ignore[misc]
+class AngularSearch(Problem):  # type: ignore[misc]
     """The allocation as pymoo sees it; each feature has one process."""
 
     def __init__(self, problem: AllocationProblem) -> None:
@@ -55,8 +55,8 @@ class _Searched(Problem):  # type: ignore[misc]
     def _evaluate(self, x: Float[np.ndarray, "design gene"], out: dict[str, object], *_: object, **__: object) -> None:
         costs = sum(process.total(zones) for process, zones in zip(self.made, x.T, strict=True))
         out["F"] = costs + x**2 @ self.allocation.losses
-        overloads = [stack.load(x, np.empty((len(x), 0))) - stack.room for stack in self.allocation.stacks]
-        out["G"] = np.reshape(overloads, (-1, len(x))).T / self.allocation.scales
+        violations = [stack.load(x, np.empty((len(x), 0))) - stack.room for stack in self.allocation.stacks]
+        out["G"] = np.reshape(violations, (-1, len(x))).T / self.allocation.scales
 
 
 def genetic_allocation(
@@ -70,10 +70,8 @@ def genetic_allocation(
 
     Parameters
     ----------
-    plan
-        What is assembled.
-    allocation
-        The allocation that the run is held against.
+    plan, allocation
+        What is assembled, and the allocation that the run is held against.
     seeds
         Node of the seed tree.
     population, generations
@@ -96,7 +94,7 @@ def genetic_allocation(
     errors = allocation.gains.errors
     problem = angular_problem(plan, errors)
     found = minimize(
-        _Searched(problem),
+        AngularSearch(problem),
         GA(pop_size=population),
         ("n_gen", generations),
         seed=seeds.integer(),

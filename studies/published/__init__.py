@@ -1,0 +1,1 @@
+"""Replicas of published algorithms: evidence that the package is held against, no part of it."""
