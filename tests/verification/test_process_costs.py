@@ -226,7 +226,7 @@ def test_unknown_and_missing_columns_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "wrong", "sentence"),
     [
-        ("30,µm", "0.3,mm", r"row 2 \(hobbed\): tolerance is '0.3 mm'; allowed is 200 µm or less"),
+        ("30,µm", "3,mm", r"row 2 \(hobbed\): tolerance is '3 mm'; allowed is 2000 µm or less"),
         ("30,µm", "30,inch", "unit is 'inch'"),
         ("30,µm", "-30,µm", "tolerance is -30.0; input should be greater than 0"),
         ("hobbed,,30", ",,30", r"row 2 \(no process\): process is missing"),

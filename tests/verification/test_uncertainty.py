@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,10 @@ from tolalloc.drawing.distributions import Distribution
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import CHUNK, SeedTree
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame, with_zones
+from tolalloc.drawing.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
 from tolalloc.drawing.unit_file import load_unit
 from tolalloc.drawing.zones import Feature
+from tolalloc.exceptions import InputError
 
 SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
 CASES = [
@@ -123,6 +126,29 @@ def test_table_survives_writing_and_reading(tmp_path):
             assert other.zone == pytest.approx(source.zone, abs=1e-10)
             assert other.cost == pytest.approx(source.cost, abs=1e-6)
             assert (other.name, other.group, other.locked) == (source.name, source.group, source.locked)
+
+
+def test_zones_take_the_costs_that_they_were_bought_at_and_else_cost_1_over_zone():
+    sources = load_tolerance_table("rv20e_baseline")[:3]
+    moved = with_zones(sources, [0.5 * source.zone for source in sources], {sources[1].name: 7.0})
+    assert [source.cost for source in moved] == [2 * sources[0].cost, 7.0, 2 * sources[2].cost]
+    bought = with_zones(sources, [source.zone for source in sources], {sources[1].name: 7.0})
+    assert bought[0] is sources[0] and bought[1].cost == 7.0 and bought[1].grade == sources[1].grade
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"zone": 3e-4}, r"mine.csv \(s\): the zone plus − minus is 300 µm and must be 0 to 200 µm\."),
+        ({"maximum": 3e-4}, "between min and max, above 0 and up to 200 µm: min 0, zone 4, max 300 µm"),
+    ],
+)
+def test_a_model_may_refuse_zones_that_a_table_may_have(changes, sentence):
+    own = replace(source(Feature.SIZE, ()), maximum=2e-4)
+    require_small_zones([own], 200e-6, "mine.csv")
+    require_small_zones([replace(own, zone=0.0, maximum=1.0)], 200e-6, "mine.csv")
+    with pytest.raises(InputError, match=sentence):
+        require_small_zones([replace(own, **changes)], 200e-6, "mine.csv")
 
 
 def test_seed_tree_gives_the_same_bits_for_any_number_of_samples_and_tells_its_nodes_apart():

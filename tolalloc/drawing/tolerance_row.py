@@ -16,8 +16,8 @@ from tolalloc.drawing.zones import Feature
 from tolalloc.files import Record
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
-LARGEST_ZONE = 200.0
-"""Largest zone that is believed [µm]; a metre typed for a millimetre is far above it."""
+LARGEST_ZONE = 2000.0
+"""Largest zone that is believed [µm]; a metre typed for a millimetre is far above it, and a model may ask for less."""
 
 _DECIMALS = 12
 """Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""

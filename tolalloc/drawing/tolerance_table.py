@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -158,9 +158,51 @@ def _path_from(folder: Path | None, path: Path) -> str:
     return (Path(os.path.relpath(path, folder.resolve())) if folder else path).as_posix()
 
 
-def with_zones(sources: Sequence[Source], zones: Sequence[float]) -> tuple[Source, ...]:
-    """Return the sources at other zones [m], costs moved along."""
+def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:
+    """Raise unless all zones, and those that may be asked for, are as small as a model believes [m].
+
+    Raises
+    ------
+    InputError
+        The source with a larger one.
+    """
+    limit = largest / MICROMETRE
+    for source in sources:
+        zone, smallest, most = (length / MICROMETRE for length in (source.zone, source.minimum, source.maximum))
+        if zone > limit:
+            raise InputError(
+                f"{place} ({source.name}): the zone plus − minus is {zone:g} µm and must be 0 to {limit:g} µm."
+            )
+        if zone > 0 and not source.locked and most > limit:
+            raise InputError(
+                f"{place} ({source.name}): the zone must lie between min and max, above 0 and up to {limit:g} µm: "
+                f"min {smallest:g}, zone {zone:g}, max {most:g} µm."
+            )
+
+
+def with_zones(
+    sources: Sequence[Source], zones: Sequence[float], costs: Mapping[str, float] | None = None
+) -> tuple[Source, ...]:
+    """Return the sources at other zones [m], each at its cost.
+
+    Parameters
+    ----------
+    sources
+        The rows of the tolerance table.
+    zones
+        Their zones, in the same order [m].
+    costs
+        Source → what its zone costs; without one it falls as 1/zone [cost units].
+    """
+    known = costs or {}
     return tuple(
-        source if zone == source.zone else replace(source, zone=zone, cost=source.cost * source.zone / zone, grade="")
+        source
+        if zone == source.zone and source.name not in known
+        else replace(
+            source,
+            zone=zone,
+            cost=known[source.name] if source.name in known else source.cost * source.zone / zone,
+            grade=source.grade if zone == source.zone else "",
+        )
         for source, zone in zip(sources, zones, strict=True)
     )

@@ -22,7 +22,7 @@ from tolalloc.drawing.correlation import Correlation
 from tolalloc.drawing.correlation_file import load_correlations
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import Source, neglected_columns
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawing.tolerance_table import load_tolerance_table, require_small_zones
 from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
@@ -50,6 +50,8 @@ NEGLECTED = (
 )
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
+_LARGEST_ZONE = 200 * MICROMETRE
+"""Largest zone of a reducer that is believed [m]."""
 
 _FILES = ("reducer", "tolerances", "processes", "process_costs", "correlations", "unit", "stiffness")
 """Fields of a study that name files; what they hold counts, not where they stand."""
@@ -289,6 +291,7 @@ def prepare(study: Study) -> Prepared:
     if identified:
         reducer = with_stiffness(reducer, identified)
     sources = load_tolerance_table(study.tolerances, study.processes)
+    require_small_zones(sources, _LARGEST_ZONE, study.tolerances)
     errors = ErrorModel(sources, correlation=_correlation(study, sources))
     unit = load_unit(study.unit) if study.unit else None
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
