@@ -35,14 +35,14 @@ def test_contact_of_the_rv40e():
 
 
 def test_contact_for_a_person_names_units_and_takes_width_and_support():
-    result = tolalloc("contact", "--width", "16", "--support", "30.6", "--torque", "-572")
+    result = tolalloc("contact", "--reducer", "rv40e", "--width", "16", "--support", "30.6", "--torque", "-572")
     assert "backlash [arcmin]" in result.stdout
     assert "16…17 pins" in result.stdout
 
 
 def test_contact_writes_report_and_profile(tmp_path):
     folder, file = tmp_path / "report", tmp_path / "disc.dxf"
-    result = tolalloc("contact", "--out", folder, "--profile", file, "--points", "100")
+    result = tolalloc("contact", "--reducer", "rv40e", "--out", folder, "--profile", file, "--points", "100")
     assert result.returncode == 0, result.stderr
     assert "chord error at most 0.61 µm" in result.stderr
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
@@ -60,7 +60,7 @@ def test_contact_writes_report_and_profile(tmp_path):
 
 def test_profile_as_csv_carries_what_was_removed(tmp_path):
     file = tmp_path / "disc.csv"
-    assert tolalloc("contact", "--profile", file).returncode == 0
+    assert tolalloc("contact", "--reducer", "rv40e", "--profile", file).returncode == 0
     frame = pd.read_csv(file)
     assert len(frame) == 39 * 200
     tip = frame["angle [deg]"] == -180
@@ -100,19 +100,24 @@ def test_a_stage_that_cannot_be_built_is_refused(tmp_path, changes, words):
     ],
 )
 def test_contact_refuses_in_one_sentence(options, words):
-    refused(tolalloc("contact", *options), *words)
+    refused(tolalloc("contact", *([] if "--reducer" in options else ["--reducer", "rv40e"]), *options), *words)
 
 
 def test_nothing_is_overwritten(tmp_path):
     file = tmp_path / "disc.csv"
     file.write_text("mine", encoding="utf-8")
-    refused(tolalloc("contact", "--profile", file, "--out", tmp_path / "report"), "exists")
+    refused(tolalloc("contact", "--reducer", "rv40e", "--profile", file, "--out", tmp_path / "report"), "exists")
     assert file.read_text(encoding="utf-8") == "mine"
     assert not (tmp_path / "report").exists()
-    refused(tolalloc("contact", "--out", tmp_path), "not empty")
-    refused(tolalloc("contact", "--profile", tmp_path / "new.csv", "--points", "7", "--out", tmp_path / "report"), "7")
+    refused(tolalloc("contact", "--reducer", "rv40e", "--out", tmp_path), "not empty")
+    refused(tolalloc("contact", "--reducer", "rv40e", "--profile", tmp_path / "new.csv", "--points", "7", "--out", tmp_path / "report"), "7")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["disc.csv"]
-    refused(tolalloc("modify", "li2018", "--profile", file), "exists")
+    refused(tolalloc("modify", "li2018", "--reducer", "rv40e", "--profile", file), "exists")
+
+
+@pytest.mark.parametrize("written", [("contact", "--out", "report"), ("modify", "li2018", "--profile", "disc.csv")])
+def test_no_file_is_written_about_a_reducer_that_nobody_named(written):
+    refused(tolalloc(*written), "--reducer is missing", "rv20e, rv40e, rv80e")
 
 
 def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
@@ -171,4 +176,4 @@ def test_modify_li2018_gives_the_closed_form():
     ],
 )
 def test_modify_refuses_in_one_sentence(arguments, words):
-    refused(tolalloc("modify", *arguments), *words)
+    refused(tolalloc("modify", *arguments, "--reducer", "rv40e"), *words)

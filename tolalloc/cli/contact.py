@@ -1,14 +1,63 @@
-"""The answer of ``tolalloc contact``: what a modification does to clearance and contact."""
+"""The command ``tolalloc contact``: what a modification does to clearance and contact, and its profile in a file."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, messages, print_json, print_table, say
+from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.cycloid.assessment import Assessment, assess
 from tolalloc.rv.cycloid.solvers.contact_law import LAWS
 from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import MILLIMETRE
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.units import MICROMETRE, MILLIMETRE
 
+if TYPE_CHECKING:
+    from tolalloc.report.document import Document
+    from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+
+ProfileFile = Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")]
+ProfilePoints = Annotated[int, typer.Option(help="Points per tooth of that file.")]
 MOST_PHASES = 3600
+
+
+def contact(
+    reducer: ReducerOption = None,
+    torque: RatedTorqueOption = None,
+    width: Annotated[float | None, typer.Option(help="Loaded face width [mm].")] = None,
+    support: Annotated[
+        float | None, typer.Option(help="Distance of two supports between which the pins bend [mm].")
+    ] = None,
+    law: Annotated[str, typer.Option(help="Contact law: logarithmic (Hertz), constant, table2.")] = "logarithmic",
+    exact: Annotated[bool, typer.Option("--exact", help="Exact distances even for a small modification.")] = False,
+    phases: Annotated[int, typer.Option(help="Phases of the crank within one pin pitch.")] = 72,
+    profile: ProfileFile = None,
+    points: ProfilePoints = 200,
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
+    named = named_reducer(reducer, out, profile)
+    require_writable(out, profile, points)
+    design = asked_reducer(load_reducer(named), width, support)
+    announce_compilation("cycloid")
+    found = contact_answer(design, torque, law, exact, phases)
+    # The report's libraries take half a second to import, and only these lines need them.
+    from tolalloc.rv.teeth.contact import contact_document
+    from tolalloc.rv.teeth.contact_tables import contact_table, profile_table
+
+    document = contact_document(found)
+    write_asked(document, out, found.profile, profile, points)
+    if as_json:
+        print_json(document.summary)
+        return
+    print_table(profile_table(found), f"{design.name}: profile and clearance")
+    print_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier")
+    say(document)
 
 
 def asked_reducer(reducer: Reducer, width_mm: float | None, support_mm: float | None) -> Reducer:
@@ -68,3 +117,31 @@ def contact_answer(reducer: Reducer, torque: float | None, law: str, exact: bool
         raise InputError.at(place, "--phases", phases, f"1 to {MOST_PHASES}")
     asked = reducer.torque_on_carrier(reducer.load.rated_torque if torque is None else torque, place)
     return assess(reducer, asked, law=law, exact=True if exact else None, phases=phases)
+
+
+def require_writable(out: Path | None, file: Path | None, points: int) -> None:
+    """Refuse a report or a profile that could not be written, before anything long runs."""
+    from tolalloc.report.folder import require_usable
+    from tolalloc.rv.teeth.profile_files import require_profile_file
+
+    if out:
+        require_usable(out)
+    if file:
+        require_profile_file(file, points)
+
+
+def write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
+    """Write the report and the profile that were asked for."""
+    from tolalloc.cli.document_script import written
+    from tolalloc.rv.teeth.profile_files import write_profile
+
+    if out:
+        written(out, lambda: document)
+    if file:
+        made = write_profile(teeth, points, file)
+        messages.print(
+            f"Profile: {file}, {made.per_tooth} points per tooth, chord error at most "
+            f"{made.chord_error / MICROMETRE:.2g} µm.",
+            markup=False,
+            soft_wrap=True,
+        )

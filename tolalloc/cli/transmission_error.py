@@ -1,15 +1,18 @@
-"""The answer of ``tolalloc te``: one unit, one torque."""
+"""The command ``tolalloc te``: one unit, one torque."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from jaxtyping import Float
 from rich.markup import escape
 from rich.table import Table
 
-from tolalloc.drawing.unit_file import BuiltUnit
+from tolalloc.cli.console import AsJson, announce_compilation, print_json, screen
+from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
+from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import SolveError
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.attribution import attribute
@@ -19,7 +22,32 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, order_spectrum
 from tolalloc.rv.equivalent.status import Status, count_statuses
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
+
+
+def te(
+    reducer: ReducerOption = None,
+    unit: Annotated[str, typer.Option(help="Shipped unit (exact, table4 of an RV-20E) or TOML file.")] = "exact",
+    torque: TestTorqueOption = None,
+    stiffness: StiffnessOption = "",
+    attributed: Annotated[bool, typer.Option("--attribute", help="Show which source makes which order.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Transmission error of one built unit over one output turn."""
+    design = load_reducer(named_reducer(reducer))
+    if stiffness:
+        design = with_stiffness(design, load_identified_stiffness(stiffness))
+    announce_compilation()
+    answer = unit_answer(design, load_unit(unit), design.torque_on_carrier(torque, "tolalloc te"), attributed)
+    if as_json:
+        print_json(answer)
+    else:
+        screen.print(as_table(answer))
+        for warning in answer["warnings"]:
+            screen.print(warning, style="yellow", markup=False)
+        if attributed:
+            screen.print(attribution_table(answer))
 
 
 def unit_answer(reducer: Reducer, unit: BuiltUnit, torque: float, attributed: bool = False) -> dict[str, Any]:
