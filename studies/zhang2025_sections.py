@@ -20,7 +20,7 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Section

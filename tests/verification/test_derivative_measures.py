@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.correlation import Correlation, Pair
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
@@ -60,7 +61,7 @@ def test_the_bound_of_a_linear_output_is_its_total_index():
     """The measures are exact; the variance has a standard error of √(2/n), of which 4 are allowed."""
     errors = ErrorModel((source("a"), source("b", Feature.POSITION), source("c", over=2.0, shift=0.3, middle=1.0)))
     weights = [1.0, 0.5, -2.0, 3.0]
-    found = derivative_measures(linear(errors, weights), errors, errors.zones, SeedTree(0), 4096)
+    found = derivative_measures(Experiment.of(linear(errors, weights), errors, SeedTree(0)), 4096)
     middle, one_deviation = errors.deviations(
         errors.standard_values(ndtr(np.array([[0.0] * 4, [1.0] * 4]))), errors.zones
     )
@@ -86,7 +87,7 @@ def test_the_bound_is_above_the_total_index_of_the_ishigami_function():
             ]
         ),
     )
-    found = derivative_measures(ishigami, errors, errors.zones, SeedTree(1), 4096)
+    found = derivative_measures(Experiment.of(ishigami, errors, SeedTree(1)), 4096)
     assert (found.bound_interval[0] > [0.55758886, 0.44241114, 0.24368366]).all()
 
 
@@ -97,7 +98,7 @@ def test_the_bound_holds_for_a_vector_of_uniform_magnitude():
         lambda x: x[:, 0] ** 2 + x[:, 0] + x[:, 1] ** 2 + np.abs(x[:, 2]),
         lambda x: np.column_stack([2 * x[:, 0] + 1, 2 * x[:, 1], np.sign(x[:, 2])]),
     )
-    found = derivative_measures(squares, errors, errors.zones, SeedTree(2), 4096)
+    found = derivative_measures(Experiment.of(squares, errors, SeedTree(2)), 4096)
     # Magnitude m uniform up to 3, any phase: Var m² + E[m²]/2; and the variance of |b| with σ = 1/6.
     parts = np.array([81 * (1 / 5 - 1 / 9) + 9 / 6, (1 - 2 / np.pi) / 36])
     assert (found.bound_interval[0] > parts / parts.sum()).all()
@@ -110,7 +111,7 @@ def test_correlated_sources_have_one_measure_together():
         correlation=Correlation(pairs=(pair,)),
     )
     weights = [1.0, 2.0, -1.0, 0.5]
-    found = derivative_measures(linear(errors, weights), errors, errors.zones, SeedTree(3), 4096)
+    found = derivative_measures(Experiment.of(linear(errors, weights), errors, SeedTree(3)), 4096)
     assert found.sources == ("a + c", "b")
     # a + c/2 is normal, and a linear measure is the variance.
     np.testing.assert_allclose(found.measure[0], 1.0 + 0.25 + 2 * 0.6 * 0.5, rtol=1e-6)
@@ -122,7 +123,7 @@ def test_bounds_of_the_resamples_cover():
     inside = []
     for seed in range(200):
         low, high = derivative_measures(
-            linear(errors, [1.0, 2.0]), errors, errors.zones, SeedTree(seed), 512, resamples=200
+            Experiment.of(linear(errors, [1.0, 2.0]), errors, SeedTree(seed)), 512, resamples=200
         ).bound_interval[:, 0]
         inside.append(low <= 0.2 <= high)
     assert np.mean(inside) > 0.9 - 3 * np.sqrt(0.09 / 200)
@@ -130,7 +131,7 @@ def test_bounds_of_the_resamples_cover():
 
 def test_local_derivatives_have_sign_length_and_direction():
     errors = ErrorModel((source("a", middle=2.0), source("b", Feature.POSITION), source("c", over=0.5)))
-    found = local_derivatives(linear(errors, [-3.0, 3.0, 4.0, 1.0]), errors, errors.zones, SeedTree(4), 64)
+    found = local_derivatives(Experiment.of(linear(errors, [-3.0, 3.0, 4.0, 1.0]), errors, SeedTree(4)), 64)
     np.testing.assert_allclose(found.at_nominal, np.array([-3.0, 5.0, 2.0]) * 1e-6)
     np.testing.assert_allclose(found.direction, [np.nan, np.arctan2(4.0, 3.0), np.nan])
     np.testing.assert_allclose(found.root_mean_square, np.array([3.0, 5.0, 2.0]) * 1e-6)
@@ -141,21 +142,21 @@ def test_root_mean_square_is_over_random_units():
     """Mean of (2x)² with σ = 1 is 4; its standard error is 4·√(2/n), of which 4 are allowed."""
     errors = ErrorModel((source("a"),))
     square = Function(errors.columns, lambda x: x[:, 0] ** 2, lambda x: 2 * x)
-    found = local_derivatives(square, errors, errors.zones, SeedTree(5), 4096)
+    found = local_derivatives(Experiment.of(square, errors, SeedTree(5)), 4096)
     assert found.at_nominal[0] == 0.0
     np.testing.assert_allclose((found.root_mean_square[0] * 1e6) ** 2, 4.0, rtol=4 * np.sqrt(2 / 4096))
 
 
 def test_failed_units_are_counted_and_too_many_stop():
     errors = ErrorModel((source("a"), source("b")))
-    few = derivative_measures(linear(errors, [1.0, 1.0], fail=5), errors, errors.zones, SeedTree(6), 1000)
+    few = derivative_measures(Experiment.of(linear(errors, [1.0, 1.0], fail=5), errors, SeedTree(6)), 1000)
     assert (few.units, few.failed) == (995, 5)
     with pytest.raises(SolveError, match="no usable answer"):
-        derivative_measures(linear(errors, [1.0, 1.0], fail=50), errors, errors.zones, SeedTree(6), 1000)
+        derivative_measures(Experiment.of(linear(errors, [1.0, 1.0], fail=50), errors, SeedTree(6)), 1000)
     with pytest.raises(SolveError, match="nominal"):
-        local_derivatives(linear(errors, [1.0, 1.0], fail=1), errors, errors.zones, SeedTree(6), 1000)
+        local_derivatives(Experiment.of(linear(errors, [1.0, 1.0], fail=1), errors, SeedTree(6)), 1000)
     with pytest.raises(SolveError, match="same for all units"):
-        derivative_measures(linear(errors, [0.0, 0.0]), errors, errors.zones, SeedTree(6), 1000)
+        derivative_measures(Experiment.of(linear(errors, [0.0, 0.0]), errors, SeedTree(6)), 1000)
 
 
 def test_the_kernel_knows_its_derivatives(rv20e):
@@ -168,6 +169,6 @@ def test_the_kernel_knows_its_derivatives(rv20e):
         fixed=fixed | rv20e.reducer.modification.deviations,
     )
     assert isinstance(kernel, ResponseWithDerivatives)
-    found = derivative_measures(kernel, errors, errors.zones, SeedTree(7), 64, resamples=10)
+    found = derivative_measures(Experiment.of(kernel, errors, SeedTree(7)), 64, resamples=10)
     assert np.isfinite(found.bound).all()
     assert found.bound.sum() > 0.5

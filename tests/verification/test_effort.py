@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
@@ -40,22 +41,22 @@ class Itself:
         return Evaluation(values=x.copy(), status=np.zeros(x.shape[0], np.uint8))
 
 
-LIMIT = ResponseLimit(response=Itself(), errors=ERRORS, zones=ERRORS.zones, limit=3.5)
+LIMIT = ResponseLimit(experiment=Experiment.of(Itself(), ERRORS, SEEDS), limit=3.5)
 
 
 def drawn(units: int):
-    return monte_carlo(Itself(), ERRORS, ERRORS.zones, SEEDS, units)
+    return monte_carlo(Experiment.of(Itself(), ERRORS, SEEDS), units)
 
 
 ESTIMATORS = {
     "units": lambda units: target_sensitivity(drawn(units), ERRORS, 9.0, SEEDS, permutations=9, resamples=9),
-    "trajectories": lambda count: elementary_effects(Itself(), ERRORS, ERRORS.zones, SEEDS, count),
+    "trajectories": lambda count: elementary_effects(Experiment.of(Itself(), ERRORS, SEEDS), count),
     "moment_units": lambda units: moment_independent(drawn(units), ERRORS, SEEDS, resamples=2),
     "surrogate_units": lambda units: answers_of(Itself(), drawn(units).x, SEEDS),
     "level_units": lambda units: subset_simulation(LIMIT, SEEDS, samples=units),
-    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), SEEDS, samples=100, runs=runs, weighted=100),
+    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, weighted=100),
     "widened_units": lambda units: widened_sampling(LIMIT, FAILING, SEEDS, samples=units),
-    "permutations": lambda count: shapley_effects(Itself(), ERRORS, ERRORS.zones, SEEDS, count),
+    "permutations": lambda count: shapley_effects(Experiment.of(Itself(), ERRORS, SEEDS), count),
 }
 SMALLEST = {
     "units": 1000,
@@ -109,4 +110,4 @@ def test_the_growth_of_the_sobol_analysis_is_checked(field, effort):
 def test_the_quick_effort_is_allowed_and_more_places_than_sources_are_not_asked_for():
     assert QUICK.ranking.units == 2048
     effort = SobolEffort(start=16, limit=16, places=3)
-    assert sobol_indices(Itself(), ERRORS, ERRORS.zones, SEEDS, effort).growth.stable
+    assert sobol_indices(Experiment.of(Itself(), ERRORS, SEEDS), effort).growth.stable

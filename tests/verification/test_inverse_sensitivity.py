@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.sources import Source
@@ -69,7 +70,7 @@ def true_factor(limit: float) -> np.ndarray:
 
 def found(limit: float, seed: int = 0, response: Sum | None = None, errors: ErrorModel = ERRORS, **more):
     return inverse_sensitivity(
-        response or Sum(), errors, errors.zones, SeedTree(seed), limit=limit, target=TARGET, **more
+        Experiment.of(response or Sum(), errors, SeedTree(seed)), limit=limit, target=TARGET, **more
     )
 
 

@@ -6,11 +6,12 @@ reads both in the same way, to the last bit, has not used the output.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
@@ -58,12 +59,12 @@ class Planted:
         return Evaluation(values=values, status=status)
 
 
-def limit_state(at: tuple[int, ...], kind: str, limit: float = 5.0) -> ResponseLimit:
-    return ResponseLimit(response=Planted(at, kind), errors=ERRORS, zones=ERRORS.zones, limit=limit)
+def limit_state(at: tuple[int, ...], kind: str, *share: float) -> ResponseLimit:
+    return ResponseLimit(experiment=Experiment.of(Planted(at, kind), ERRORS, SEEDS, *share), limit=5.0)
 
 
-def random_units(at: tuple[int, ...], kind: str, **allowed: float):
-    return monte_carlo(Planted(at, kind), ERRORS, ERRORS.zones, SEEDS, 400, **allowed)
+def random_units(at: tuple[int, ...], kind: str, *share: float):
+    return monte_carlo(Experiment.of(Planted(at, kind), ERRORS, SEEDS, *share), 400)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -86,7 +87,7 @@ def test_random_units_stop_above_one_per_cent_unless_told_otherwise(kind):
     assert random_units(tuple(range(4)), kind).failed == 4
     with pytest.raises(SolveError, match="5 of 400"):
         random_units(tuple(range(5)), kind)
-    assert random_units(tuple(range(5)), kind, largest_failed_share=0.02).failed == 5
+    assert random_units(tuple(range(5)), kind, 0.02).failed == 5
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -114,7 +115,7 @@ def test_indices_stop_above_one_per_cent(kind, generator):
 def test_hand_estimate_stops_at_any(at, kind):
     """The nominal unit and 16 units for each of the three sources."""
     with pytest.raises(SolveError):
-        classical_estimate(Planted((at,), kind), ERRORS, ERRORS.zones, SEEDS)
+        classical_estimate(Experiment.of(Planted((at,), kind), ERRORS, SEEDS))
 
 
 @pytest.mark.parametrize("at", [0, 31, 99])
@@ -156,11 +157,11 @@ def test_searches_for_design_points_count_it():
     assert samples.failed == 1
 
 
-def planted_yield(at: tuple[int, ...], kind: str, units: int, **allowed: float) -> YieldAtLimit:
+def planted_yield(at: tuple[int, ...], kind: str, units: int, *share: float) -> YieldAtLimit:
     """Return the yield from random units of which some fail, which no later sample does."""
-    state = limit_state(at, kind)
-    sample = monte_carlo(state.response, ERRORS, ERRORS.zones, SEEDS, units, largest_failed_share=0.1)
-    return yield_at_limit(state, sample, SEEDS, samples=200, runs=2, **allowed)
+    state = limit_state(at, kind, *share)
+    sample = monte_carlo(replace(state.experiment, largest_failed_share=0.1), units)
+    return yield_at_limit(state, sample, samples=200, runs=2)
 
 
 @pytest.mark.parametrize("at", [0, 1999])
@@ -187,5 +188,5 @@ def test_rare_failures_stop_above_one_per_cent_unless_told_otherwise(kind):
         assert any("no usable answer" in text for text in cautions)
     with pytest.raises(SolveError, match="no usable answer"):
         planted_yield(tuple(range(6)), kind, 500)
-    found = planted_yield(tuple(range(6)), kind, 500, largest_failed_share=0.02)
+    found = planted_yield(tuple(range(6)), kind, 500, 0.02)
     assert any("no usable answer" in text for text in found.estimate.cautions)

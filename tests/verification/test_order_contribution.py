@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.sources import Source
@@ -50,7 +51,7 @@ class Waves:
 
 def analysed(response: Waves, blocks: int = 1024, seed: int = 3) -> SobolAnalysis:
     model = errors()
-    return sobol_indices(response, model, model.zones, SeedTree(seed), SobolEffort(start=blocks, limit=blocks))
+    return sobol_indices(Experiment.of(response, model, SeedTree(seed)), SobolEffort(start=blocks, limit=blocks))
 
 
 def within(found: OrderContribution, truth: np.ndarray, standard_errors: float) -> None:

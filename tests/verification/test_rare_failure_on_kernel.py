@@ -9,6 +9,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
 from tolalloc.capability.rare_failure.form import design_point
 from tolalloc.capability.rare_failure.limit_state import LimitState, LimitStateWithGradient
@@ -87,12 +88,12 @@ class Bent(Sum):
         )
 
 
-def limited(kind: type[Sum], errors: ErrorModel, limit: float) -> ResponseLimit:
-    return ResponseLimit(response=kind(errors.columns), errors=errors, zones=errors.zones, limit=limit)
+def limited(kind: type[Sum], errors: ErrorModel, limit: float, seed: int = 0) -> ResponseLimit:
+    return ResponseLimit(experiment=Experiment.of(kind(errors.columns), errors, SeedTree(seed)), limit=limit)
 
 
 def units_of(limit: ResponseLimit, seed: int, units: int) -> MonteCarlo:
-    return monte_carlo(limit.response, limit.errors, limit.zones, SeedTree(seed, ("units",)), units)
+    return monte_carlo(replace(limit.experiment, seeds=SeedTree(seed, ("units",))), units)
 
 
 MIXED = ErrorModel(
@@ -108,7 +109,7 @@ MIXED = ErrorModel(
 
 
 def test_deviations_have_the_distributions_of_the_error_model(generator):
-    limit = ResponseLimit(response=Bent(MIXED.columns), errors=MIXED, zones=MIXED.zones, limit=1.0)
+    limit = ResponseLimit(experiment=Experiment.of(Bent(MIXED.columns), MIXED, SeedTree(0)), limit=1.0)
     u = generator.standard_normal((50, limit.variables))
     expected = MIXED.deviations(MIXED.standard_values(ndtr(u)), MIXED.zones)
     np.testing.assert_array_equal(limit.deviations(u), expected)
@@ -117,7 +118,7 @@ def test_deviations_have_the_distributions_of_the_error_model(generator):
 
 
 def test_gradient_agrees_with_differences_where_columns_mix(generator):
-    limit = ResponseLimitWithGradient(response=Bent(MIXED.columns), errors=MIXED, zones=MIXED.zones, limit=1.0)
+    limit = ResponseLimitWithGradient(experiment=Experiment.of(Bent(MIXED.columns), MIXED, SeedTree(0)), limit=1.0)
     assert isinstance(limit, LimitStateWithGradient)
     assert not isinstance(limited(Sum, MIXED, 1.0), LimitStateWithGradient)
     assert isinstance(limited(Sum, MIXED, 1.0), LimitState)
@@ -134,7 +135,7 @@ def test_gradient_agrees_with_differences_where_columns_mix(generator):
 def test_share_that_is_not_rare_is_left_to_random_units():
     limit = limited(Sum, normals(4), 2.0)
     sample = units_of(limit, 0, 20_000)
-    found = yield_at_limit(limit, sample, SeedTree(0))
+    found = yield_at_limit(limit, sample)
     low, high = found.interval.low, found.interval.high
     assert low < norm.cdf(2.0) < high
     within = sample.within(2.0)
@@ -154,8 +155,8 @@ def test_share_that_is_not_rare_is_left_to_random_units():
 )
 def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
     """Φ(−4.75) and exp(−5.25²/2) are about 1e-6; each estimate within 3.5 of its standard errors, 8 in all."""
-    state = limited(kind, normals(6), limit)
-    found = yield_at_limit(state, units_of(state, seed, 5000), SeedTree(seed), samples=2000, runs=4)
+    state = limited(kind, normals(6), limit, seed)
+    found = yield_at_limit(state, units_of(state, seed, 5000), samples=2000, runs=4)
     for item in found.estimates[1:]:
         assert abs(item.probability - exact) <= 3.5 * item.standard_error
         assert item.coefficient_of_variation < 0.25
@@ -178,7 +179,7 @@ def test_widened_sampling_states_its_own_spread():
 
 def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
     limit = limited(Sum, ErrorModel((source("s", distribution=Distribution.UNIFORM),)), 3.5)
-    found = yield_at_limit(limit, units_of(limit, 0, 5000), SeedTree(0), samples=200, runs=2)
+    found = yield_at_limit(limit, units_of(limit, 0, 5000), samples=200, runs=2)
     assert "fewer than two runs" in found.verdict
     assert found.estimate.method == "Monte Carlo"
     assert found.interval.high == 1.0
@@ -193,7 +194,7 @@ def test_methods_that_contradict_each_other_are_not_relied_on(monkeypatch):
 
     monkeypatch.setattr("tolalloc.capability.yield_at_limit.widened_sampling", too_small)
     limit = limited(Radius, normals(2), 4.5)
-    found = yield_at_limit(limit, units_of(limit, 0, 2000), SeedTree(0), samples=1000, runs=4)
+    found = yield_at_limit(limit, units_of(limit, 0, 2000), samples=1000, runs=4)
     assert found.verdict.startswith("Do not rely on subset simulation")
 
 
@@ -240,7 +241,7 @@ def test_arguments_out_of_range():
     sample = units_of(limit, 0, 100)
     states = np.full((5, 2), 3.0)
     for call in (
-        lambda: yield_at_limit(limit, sample, SeedTree(0), runs=1),
+        lambda: yield_at_limit(limit, sample, runs=1),
         lambda: widened_sampling(limit, (states,), SeedTree(0)),
         lambda: widened_sampling(limit, (states, states[:0]), SeedTree(0)),
         lambda: widened_sampling(limit, (states, states), SeedTree(0), samples=10),
@@ -253,8 +254,8 @@ def test_kernel_agrees_with_random_units():
     """A share near 1 % by small subset simulations, within 3.5 standard errors of random units of another seed."""
     prepared = prepare(Study(name="kernel"))
     errors = prepared.space.errors
-    limit = ResponseLimitWithGradient(response=prepared.kernel, errors=errors, zones=errors.zones, limit=80.0)
-    units = monte_carlo(prepared.kernel, errors, errors.zones, SeedTree(1, ("units",)), 3000)
+    limit = ResponseLimitWithGradient(experiment=Experiment.of(prepared.kernel, errors, SeedTree(0)), limit=80.0)
+    units = monte_carlo(Experiment.of(prepared.kernel, errors, SeedTree(1, ("units",))), 3000)
     share = 1 - units.within(80.0).estimate
     found = subset_simulation(limit, SeedTree(0), samples=1000, runs=2)
     error = np.hypot(found.standard_error, np.sqrt(share / 3000))

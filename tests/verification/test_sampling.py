@@ -9,6 +9,7 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import kstest, qmc
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sampling import SamplingDesign, uniform_chunk, uniform_chunks
@@ -104,7 +105,7 @@ def test_monte_carlo_takes_every_design(design):
     part = {"part": "part", "feature": Feature.SIZE, "zone": 6.0, "minimum": 1.0, "maximum": 9.0, "cost": 1.0}
     errors = ErrorModel((Source(name="a", **part), Source(name="b", **part)))
     seeds = SeedTree(0)
-    sample = monte_carlo(First(), errors, errors.zones, seeds, 2 * CHUNK + 5, design)
+    sample = monte_carlo(Experiment.of(First(), errors, seeds), 2 * CHUNK + 5, design)
     uniform = np.concatenate(list(uniform_chunks(design, seeds, 2 * CHUNK + 5, 2)))
     np.testing.assert_array_equal(sample.x, errors.deviations(errors.standard_values(uniform), errors.zones))
     np.testing.assert_array_equal(sample.values, sample.x[:, 0])

@@ -10,6 +10,7 @@ from SALib.analyze import morris as salib_morris
 from SALib.sample import morris
 from scipy.stats import norm
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.drawing.correlation import Correlation, Pair
 from tolalloc.drawing.error_model import ErrorModel
@@ -66,7 +67,7 @@ class Weighted:
 
 
 def test_effects_are_those_of_salib():
-    found = elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(0), 40)
+    found = elementary_effects(Experiment.of(Products(), SIZES, SeedTree(0)), 40)
     problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0.001, 0.999]] * 3}
     uniform = morris.sample(problem, 40, num_levels=4, seed=SeedTree(0).child("sample").integer())
     answers = Products()(uniform - 0.5).values
@@ -77,14 +78,16 @@ def test_effects_are_those_of_salib():
 
 
 def test_effects_of_a_linear_output_are_its_weights_without_scatter():
-    found = elementary_effects(Weighted(SIZES.columns, (3.0, -2.0, 0.0)), SIZES, SIZES.zones, SeedTree(1), 8, trim=0.01)
+    found = elementary_effects(
+        Experiment.of(Weighted(SIZES.columns, (3.0, -2.0, 0.0)), SIZES, SeedTree(1)), 8, trim=0.01
+    )
     np.testing.assert_allclose(found.effects[0], np.tile([3.0 * 0.98, -2.0 * 0.98, 0.0], (8, 1)), atol=1e-12)
     np.testing.assert_allclose(found.sigma, 0.0, atol=1e-12)
 
 
 def test_the_columns_of_a_source_move_together_and_have_no_sign():
     errors = ErrorModel((source("a"), source("b", Feature.POSITION, Distribution.NORMAL)))
-    found = elementary_effects(Weighted(errors.columns, (1.0, 1.0, 0.0)), errors, errors.zones, SeedTree(2), 16)
+    found = elementary_effects(Experiment.of(Weighted(errors.columns, (1.0, 1.0, 0.0)), errors, SeedTree(2)), 16)
     assert found.sources == ("a", "b")
     assert np.isnan(found.sigma[0, 1])
     assert found.mu_star[0, 1] > 0.0
@@ -93,40 +96,40 @@ def test_the_columns_of_a_source_move_together_and_have_no_sign():
 def test_correlated_sources_stand_together():
     pair = Pair(one="a", other="c", correlation=0.5)
     errors = ErrorModel(SIZES.sources, correlation=Correlation(pairs=(pair,)))
-    assert elementary_effects(Products(), errors, errors.zones, SeedTree(2), 8).sources == ("a + c", "b")
+    assert elementary_effects(Experiment.of(Products(), errors, SeedTree(2)), 8).sources == ("a + c", "b")
 
 
 def test_a_failed_sample_drops_its_trajectory_alone():
-    whole = elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(3), 40)
-    found = elementary_effects(Products(fail=(9,)), SIZES, SIZES.zones, SeedTree(3), 40, largest_failed_share=0.05)
+    whole = elementary_effects(Experiment.of(Products(), SIZES, SeedTree(3)), 40)
+    found = elementary_effects(Experiment.of(Products(fail=(9,)), SIZES, SeedTree(3), 0.05), 40)
     assert (found.trajectories, found.dropped) == (39, 1)
     np.testing.assert_array_equal(found.effects, np.delete(whole.effects, 2, axis=1))
     with pytest.raises(SolveError, match="1 of 40 trajectories"):
-        elementary_effects(Products(fail=(9,)), SIZES, SIZES.zones, SeedTree(3), 40)
+        elementary_effects(Experiment.of(Products(fail=(9,)), SIZES, SeedTree(3)), 40)
 
 
 def test_the_interval_of_mu_star_covers():
     """A 90 % interval of 200 covers 0.9 less 3 standard errors, and the small sample's own shortfall of 0.03."""
-    truth = elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(4), 4000).mu_star[0, 0]
+    truth = elementary_effects(Experiment.of(Products(), SIZES, SeedTree(4)), 4000).mu_star[0, 0]
     inside = []
     for seed in range(200):
-        low, high = elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(seed), 30).mu_star_interval(0)[:, 0]
+        low, high = elementary_effects(Experiment.of(Products(), SIZES, SeedTree(seed)), 30).mu_star_interval(0)[:, 0]
         inside.append(low <= truth <= high)
     assert np.mean(inside) > 0.9 - 0.03 - 3 * np.sqrt(0.09 / 200)
 
 
 def test_levels_and_trim_are_checked():
     with pytest.raises(InputError, match="even number"):
-        elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(1), 4, levels=3)
+        elementary_effects(Experiment.of(Products(), SIZES, SeedTree(1)), 4, levels=3)
     with pytest.raises(InputError, match="trim"):
-        elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(1), 4, trim=0.0)
+        elementary_effects(Experiment.of(Products(), SIZES, SeedTree(1)), 4, trim=0.0)
 
 
 def normal_sum(share: float, seed: int, units: int) -> tuple[MonteCarlo, ErrorModel]:
     """Return a normal output to whose variance ``a`` gives a share, ``b`` the rest and ``c`` nothing."""
     errors = ErrorModel(tuple(source(name, distribution=Distribution.NORMAL) for name in "abc"))
     response = Weighted(errors.columns, (np.sqrt(share), np.sqrt(1 - share), 0.0))
-    return monte_carlo(response, errors, errors.zones, SeedTree(seed), units), errors
+    return monte_carlo(Experiment.of(response, errors, SeedTree(seed)), units), errors
 
 
 def true_delta(share: float) -> float:
@@ -178,7 +181,7 @@ def test_a_vector_without_effect_passes_the_dummies_as_rarely_as_stated():
     )
     response, passed = Weighted(errors.columns, (1.0, 0.0, 0.0)), []
     for seed in range(100):
-        sample = monte_carlo(response, errors, errors.zones, SeedTree(seed), 200)
+        sample = monte_carlo(Experiment.of(response, errors, SeedTree(seed)), 200)
         found = moment_independent(sample, errors, SeedTree(seed).child("m"), resamples=1, dummies=10)
         passed.append([found.pawn[1] > found.pawn_dummy, found.delta[1] > found.delta_dummy])
     assert (np.abs(np.mean(passed, axis=0) - 1 / 11) < 3 * np.sqrt(1 / 11 * 10 / 11 / 100)).all()
@@ -193,7 +196,7 @@ def test_an_output_that_does_not_vary_is_refused():
 
 def test_too_few_trajectories_and_units_are_refused():
     with pytest.raises(InputError, match="trajectories is 1"):
-        elementary_effects(Products(), SIZES, SIZES.zones, SeedTree(1), 1)
+        elementary_effects(Experiment.of(Products(), SIZES, SeedTree(1)), 1)
     sample, errors = normal_sum(0.6, 0, 99)
     with pytest.raises(InputError, match="100 or more"):
         moment_independent(sample, errors, SeedTree(1))
@@ -201,7 +204,7 @@ def test_too_few_trajectories_and_units_are_refused():
 
 def test_one_source_alone_has_effects():
     errors = ErrorModel((source("a"),))
-    found = elementary_effects(Weighted(errors.columns, (2.0,)), errors, errors.zones, SeedTree(1), 4)
+    found = elementary_effects(Experiment.of(Weighted(errors.columns, (2.0,)), errors, SeedTree(1)), 4)
     np.testing.assert_allclose(found.mu_star, [[2.0 * 0.998]])
 
 
@@ -217,7 +220,7 @@ def test_a_vector_is_seen_by_its_length_and_by_its_direction():
             values = 10 * (x[:, 0] ** 2 + x[:, 1] ** 2) + x[:, 3]
             return Evaluation(values=values[:, np.newaxis], status=np.zeros(x.shape[0], np.uint8))
 
-    sample = monte_carlo(Vectors(), errors, errors.zones, SeedTree(5), 1024)
+    sample = monte_carlo(Experiment.of(Vectors(), errors, SeedTree(5)), 1024)
     found = moment_independent(sample, errors, SeedTree(5).child("m"), resamples=5, dummies=5)
     assert (found.pawn[:2] > 2 * found.pawn_dummy).all()
     assert (found.delta[:2] > 2 * found.delta_dummy).all()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import allowed_rejections, monte_carlo, proportion
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
@@ -56,7 +57,7 @@ class Ishigami:
 
 def ranked(response: Ishigami, seeds: SeedTree, blocks: int) -> SobolIndices:
     errors = sizes("x1", "x2", "x3")
-    return sobol_indices(response, errors, errors.zones, seeds, SobolEffort(start=blocks, limit=blocks)).of("y [-]")
+    return sobol_indices(Experiment.of(response, errors, seeds), SobolEffort(start=blocks, limit=blocks)).of("y [-]")
 
 
 FIRST = [0.31390519, 0.44241114, 0.0]
@@ -92,7 +93,7 @@ def test_too_many_failed_samples_stop_the_analysis():
     with pytest.raises(SolveError, match="blocks hold a failed sample"):
         ranked(Ishigami(fail=tuple(range(0, 400, 5))), SeedTree(3), 128)
     with pytest.raises(SolveError, match="no usable answer"):
-        monte_carlo(Ishigami(fail=tuple(range(50))), errors, errors.zones, SeedTree(3), 1000)
+        monte_carlo(Experiment.of(Ishigami(fail=tuple(range(50))), errors, SeedTree(3)), 1000)
 
 
 def test_clopper_pearson_covers(generator):
@@ -115,9 +116,9 @@ def test_quantile_bound_and_yield_bound_are_the_same_verdict():
             return Evaluation(values=norm.ppf(x / (2 * np.pi) + 0.5), status=np.zeros(x.shape[0], np.uint8))
 
     errors = sizes("x1")
-    sample = monte_carlo(First(), errors, errors.zones, SeedTree(5), 4000)
+    sample = monte_carlo(Experiment.of(First(), errors, SeedTree(5)), 4000)
     bound = sample.quantile_bound(0.99)
     assert sample.within(bound).bound >= 0.99 > sample.within(bound - 1e-9).bound
     assert bound > norm.ppf(0.99)
     assert allowed_rejections(100, 0.9973) == -1
-    assert monte_carlo(First(), errors, errors.zones, SeedTree(5), 100).quantile_bound(0.9973) == np.inf
+    assert monte_carlo(Experiment.of(First(), errors, SeedTree(5)), 100).quantile_bound(0.9973) == np.inf

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.correlated import CorrelatedSource
 from tolalloc.drawing.correlation import Correlation, Pair
 from tolalloc.drawing.distributions import Distribution
@@ -101,14 +102,16 @@ def test_the_closed_form_of_two_correlated_inputs_is_that_of_owen_and_prieur():
     half = rho * one * other + 0.5 * rho**2 * (other**2 - one**2)
     exact = np.array([one**2 + half, other**2 + 2 * rho * one * other - half]) / variance
     np.testing.assert_allclose(exact_linear((one, other), np.array([[1, rho], [rho, 1]])), exact)
-    found = shapley_effects(Function((linear,)), model({(0, 1): rho}, 2), np.full(2, SIGMA_ZONE), SeedTree(0), 4000)
+    found = shapley_effects(
+        Experiment(Function((linear,)), model({(0, 1): rho}, 2), np.full(2, SIGMA_ZONE), SeedTree(0)), 4000
+    )
     within_standard_errors(found, 0, exact)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_linear_function_of_correlated_sources(seed):
     errors = model(PAIRS)
-    found = shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(seed), 8000)
+    found = shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(seed)), 8000)
     exact = exact_linear(WEIGHTS, errors.normal_correlation)
     within_standard_errors(found, 0, exact)
     # Sharp enough to tell correlated from independent sources: ten standard errors and more.
@@ -122,14 +125,14 @@ def test_linear_function_of_correlated_sources(seed):
 @pytest.mark.parametrize("correlation", [1.0, -1.0])
 def test_sources_that_fix_each_other_share_alike(correlation):
     errors = model({(0, 1): correlation}, 3)
-    found = shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(2), 4000)
+    found = shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(2)), 4000)
     within_standard_errors(found, 0, exact_linear(WEIGHTS[:3], errors.normal_correlation))
 
 
 def test_all_columns_of_a_source_go_together():
     errors = model(PAIRS, feature=Feature.POSITION)
     weights = np.array([1.0, 0.5, 2.0, -1.0, -1.5, 1.0, 0.5, 3.0])
-    found = shapley_effects(Function((lambda x: x @ weights,)), errors, errors.zones, SeedTree(3), 8000)
+    found = shapley_effects(Experiment.of(Function((lambda x: x @ weights,)), errors, SeedTree(3)), 8000)
     by_axis = [weights[axis::2] for axis in (0, 1)]
     share = [float(own @ errors.source_correlation @ own) for own in by_axis]
     exact = sum(part * exact_linear(own, errors.source_correlation) for part, own in zip(share, by_axis, strict=True))
@@ -145,7 +148,7 @@ def test_additive_function_of_independent_sources_has_its_first_order_indices():
     def additive(x: np.ndarray) -> np.ndarray:
         return x[:, 0] ** 2 + x[:, 1] + 0.1 * x[:, 2] + x[:, 3] + x[:, 4] - 2 * x[:, 5]
 
-    found = shapley_effects(Function((additive,)), errors, errors.zones, SeedTree(4), 8000)
+    found = shapley_effects(Experiment.of(Function((additive,)), errors, SeedTree(4)), 8000)
     variances = np.array([2.0, 1.0, 0.01, SIGMA_ZONE**2 / 12, 1 + 4 - 2.0])
     within_standard_errors(found, 0, variances / variances.sum())
     # Noise is in proportion to the source's own part: one of a thousandth is known to a tenth of that.
@@ -154,41 +157,44 @@ def test_additive_function_of_independent_sources_has_its_first_order_indices():
 
 def test_interaction_is_shared_alike():
     errors = model({}, 3)
-    found = shapley_effects(Function((lambda x: x[:, 0] * x[:, 1] + x[:, 2],)), errors, errors.zones, SeedTree(5), 8000)
+    found = shapley_effects(
+        Experiment.of(Function((lambda x: x[:, 0] * x[:, 1] + x[:, 2],)), errors, SeedTree(5)), 8000
+    )
     within_standard_errors(found, 0, np.array([0.25, 0.25, 0.5]))
 
 
 def test_every_output_has_the_bits_that_it_has_alone():
     errors = model(PAIRS)
     both = shapley_effects(
-        Function((linear, lambda x: x[:, 3] ** 2, lambda x: 0 * x[:, 0])), errors, errors.zones, SeedTree(0), 300
+        Experiment.of(Function((linear, lambda x: x[:, 3] ** 2, lambda x: 0 * x[:, 0])), errors, SeedTree(0)),
+        300,
     )
-    alone = shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(0), 300)
+    alone = shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 300)
     np.testing.assert_allclose(both.effects[0], alone.effects[0], rtol=1e-12)
     np.testing.assert_allclose(both.effects[1], [0, 0, 0, 1], atol=1e-12)
     assert np.isnan(both.effects[2]).all()
     assert both.outputs == ("y0 [-]", "y1 [-]", "y2 [-]")
-    again = shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(0), 300)
+    again = shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 300)
     np.testing.assert_array_equal(again.resamples, alone.resamples)
 
 
 def test_a_failed_sample_drops_its_permutation_and_too_many_stop_the_analysis():
     errors = model(PAIRS)
-    found = shapley_effects(Function((linear,), fail_above=3.4), errors, errors.zones, SeedTree(0), 4000)
+    found = shapley_effects(Experiment.of(Function((linear,), fail_above=3.4), errors, SeedTree(0)), 4000)
     assert 0 < found.dropped <= 40
     assert found.permutations == 4000 - found.dropped
     within_standard_errors(found, 0, exact_linear(WEIGHTS, errors.normal_correlation))
     with pytest.raises(SolveError, match=r"permutations hold a failed sample; allowed is 0\.01"):
-        shapley_effects(Function((linear,), fail_above=1.5), errors, errors.zones, SeedTree(0), 4000)
+        shapley_effects(Experiment.of(Function((linear,), fail_above=1.5), errors, SeedTree(0)), 4000)
     with pytest.raises(InputError, match="permutations is 1; allowed is 2 or more"):
-        shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(0), 1)
+        shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 1)
 
 
 def test_intervals_cover_and_ranks_agree():
     """The 90 % intervals of 100 repetitions: 82 to 97 % is four standard errors and the bootstrap's own shortfall."""
     errors = model(PAIRS)
     exact = exact_linear(WEIGHTS, errors.normal_correlation)
-    results = [shapley_effects(Function((linear,)), errors, errors.zones, SeedTree(seed), 500) for seed in range(100)]
+    results = [shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(seed)), 500) for seed in range(100)]
     inside = np.array([(found.interval(0)[0] <= exact) & (exact <= found.interval(0)[1]) for found in results])
     assert 0.82 <= inside.mean() <= 0.97
     assert inside.mean(axis=0).min() > 0.78

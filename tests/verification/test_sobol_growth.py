@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from SALib.sample import sobol as salib
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.correlation import Correlation, Pair
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
@@ -55,10 +56,12 @@ class Linear:
         return Evaluation(values=values, status=np.zeros(len(x), np.uint8))
 
 
-def analysis(weights: list[list[float]], effort: SobolEffort, seed: int = 1, **options: object) -> SobolAnalysis:
+def analysis(
+    weights: list[list[float]], effort: SobolEffort, seed: int = 1, share: float = 0.01, **options
+) -> SobolAnalysis:
     errors = sizes("abcde"[: len(weights[0])])
     response = Linear(np.array(weights), errors.columns, **options)
-    return sobol_indices(response, errors, errors.zones, SeedTree(seed), effort)
+    return sobol_indices(Experiment.of(response, errors, SeedTree(seed), share), effort)
 
 
 def fixed(blocks: int, **options: object) -> SobolEffort:
@@ -111,7 +114,7 @@ def test_blocks_are_added_until_the_order_is_stable_and_none_is_evaluated_twice(
     errors = sizes("abcd")
     response = Linear(np.array([[1.0, 1.05, 0.3, 0.1]]), errors.columns)
     effort = SobolEffort(start=16, limit=4096, places=4, probability=0.95)
-    found = sobol_indices(response, errors, errors.zones, SeedTree(2), effort)
+    found = sobol_indices(Experiment.of(response, errors, SeedTree(2)), effort)
     steps = found.growth.history
     assert found.growth.stable
     assert len(steps) > 1
@@ -175,12 +178,12 @@ class Product:
 
 def test_pairs_have_an_index_if_asked_for():
     errors = sizes("abc")
-    found = sobol_indices(Product(), errors, errors.zones, SeedTree(5), fixed(4096, second_order=True)).of("sum [-]")
+    found = sobol_indices(Experiment.of(Product(), errors, SeedTree(5)), fixed(4096, second_order=True)).of("sum [-]")
     assert found.pairs == ((0, 1), (0, 2), (1, 2))
     assert (np.abs(found.second - [0.5, 0.0, 0.0]) <= 4 * found.second_resamples.std(axis=0)).all()
     assert found.second_interval[0, 0] > 0.3
     assert found.first_is_zero.tolist() == [True, True, False]
-    without = sobol_indices(Product(), errors, errors.zones, SeedTree(5), fixed(64)).of("sum [-]")
+    without = sobol_indices(Experiment.of(Product(), errors, SeedTree(5)), fixed(64)).of("sum [-]")
     assert (without.pairs, without.second.shape, without.second_interval.shape) == ((), (0,), (2, 0))
 
 
@@ -188,7 +191,7 @@ def test_an_index_per_correlated_source_is_refused_with_the_reason():
     errors = sizes("abcd", CORRELATED)
     response = Linear(np.ones((1, 4)), errors.columns)
     with pytest.raises(InputError, match=r"a \+ c are correlated; .* share .* arbitrarily; rank blocks or ask for Sha"):
-        sobol_indices(response, errors, errors.zones, SeedTree(1), fixed(64))
+        sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64))
     assert not response.asked
 
 
@@ -201,7 +204,7 @@ def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_o
     truth = parts / parts.sum()
     effort = fixed(2048, second_order=second_order)
     found = sobol_indices(
-        Linear(weights[np.newaxis], errors.columns), errors, errors.zones, SeedTree(8), effort, Player.BLOCK
+        Experiment.of(Linear(weights[np.newaxis], errors.columns), errors, SeedTree(8)), effort, Player.BLOCK
     )
     own = found.of(0)
     assert found.sources == ("a + c", "b", "d")
@@ -224,7 +227,7 @@ def test_exchanging_a_block_exchanges_its_columns_and_no_others():
 def test_independent_sources_are_their_own_blocks():
     errors = sizes("abc")
     response = Linear(np.array([[1.0, 2.0, 3.0]]), errors.columns)
-    one, two = (sobol_indices(response, errors, errors.zones, SeedTree(1), fixed(64), player) for player in Player)
+    one, two = (sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64), player) for player in Player)
     assert one.sources == two.sources
     same_indices(one, two)
 
@@ -248,7 +251,7 @@ def test_more_than_one_block_in_a_hundred_stops_the_analysis_unless_the_caller_a
     broken, weights = (0, 40), [[1.0, 2.0, 0.5]]
     with pytest.raises(SolveError, match=r"2 of 128 blocks hold a failed sample; allowed is 0\.01"):
         analysis(weights, fixed(128), broken=broken)
-    assert analysis(weights, fixed(128, largest_failed_share=0.02), broken=broken).dropped == 2
+    assert analysis(weights, fixed(128), broken=broken, share=0.02).dropped == 2
 
 
 def test_a_second_seed_reproduces_what_the_first_promises():

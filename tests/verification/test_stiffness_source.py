@@ -8,6 +8,7 @@ from math import exp
 import numpy as np
 import pytest
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.correlated import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
@@ -90,7 +91,7 @@ def test_share_of_the_variance_against_direct_monte_carlo(response):
     """Pairs of the same unit with two draws of the stiffness give the total index without Sobol's scheme."""
     stiffness = source(0.6, -0.5)
     errors = replace(few_sources(), joint=(stiffness,))
-    found = sobol_indices(response, errors, errors.zones, SeedTree(3), SobolEffort(start=64, limit=64)).of(0)
+    found = sobol_indices(Experiment.of(response, errors, SeedTree(3)), SobolEffort(start=64, limit=64)).of(0)
     at = found.sources.index(NAME)
     x, draws = units(400, 4), np.random.default_rng(5).multivariate_normal(np.zeros(2), stiffness.covariance, (2, 400))
     first, second = (response(np.concatenate([x, draw], axis=1)).values[:, 0] for draw in draws)
@@ -121,7 +122,7 @@ def test_correlation_inside_the_group_counts(correlation, variance):
     rest = float(units(100_000, 1).sum(axis=1).var())
     errors = replace(errors, joint=(source(float(np.sqrt(rest / 2)), correlation),))
     found = sobol_indices(
-        Sum(errors.columns), errors, errors.zones, SeedTree(1), SobolEffort(start=2048, limit=2048)
+        Experiment.of(Sum(errors.columns), errors, SeedTree(1)), SobolEffort(start=2048, limit=2048)
     ).of(0)
     assert found.total[-1] == pytest.approx(variance / (variance + 2), abs=0.04)
     assert found.first[-1] == pytest.approx(variance / (variance + 2), abs=0.06)
@@ -129,7 +130,7 @@ def test_correlation_inside_the_group_counts(correlation, variance):
 
 def test_a_stiffness_without_uncertainty_has_no_share(response):
     errors = replace(few_sources(), joint=(source(0.0, 0.3),))
-    found = sobol_indices(response, errors, errors.zones, SeedTree(3), SobolEffort(start=16, limit=16)).of(0)
+    found = sobol_indices(Experiment.of(response, errors, SeedTree(3)), SobolEffort(start=16, limit=16)).of(0)
     assert found.total[-1] == 0.0
     assert found.sources == ("disc1.bore1.position", "pin.diameter", NAME)
 

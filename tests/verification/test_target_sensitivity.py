@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.drawing.correlated import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
@@ -44,7 +45,7 @@ class Sum:
 
 
 def drawn(seed: int, units: int) -> MonteCarlo:
-    return monte_carlo(Sum(), SIZES, SIZES.zones, SeedTree(seed), units)
+    return monte_carlo(Experiment.of(Sum(), SIZES, SeedTree(seed)), units)
 
 
 def true_lift(limit: float) -> np.ndarray:
@@ -89,7 +90,7 @@ MANY = ErrorModel((source("one"), source("few", each=4), source("pins", each=9))
 def test_the_excess_orders_sources_of_many_columns_as_their_shares_of_the_variance():
     """Within 4 standard errors of the closed form; the lifts, diluted by the columns, are all the same."""
     limit, deviation = 1.5 * np.sqrt(14.0), np.sqrt(14.0)
-    sample = monte_carlo(SumOfAll(MANY.columns), MANY, MANY.zones, SeedTree(0), 20_000)
+    sample = monte_carlo(Experiment.of(SumOfAll(MANY.columns), MANY, SeedTree(0)), 20_000)
     found = target_sensitivity(sample, MANY, limit, SeedTree(0).child("t"), permutations=9)
     np.testing.assert_array_equal(found.columns, [1, 4, 9])
     truth = found.columns / 14.0 * (limit / deviation) * norm.pdf(1.5) / norm.sf(1.5)
@@ -112,7 +113,7 @@ def test_a_source_of_many_columns_is_not_behind_one_of_few_whose_lift_is_higher(
         def __call__(self, x: np.ndarray) -> Evaluation:
             return super().__call__(x * weights)
 
-    sample = monte_carlo(Weighted(errors.columns), errors, errors.zones, SeedTree(1), 20_000)
+    sample = monte_carlo(Experiment.of(Weighted(errors.columns), errors, SeedTree(1)), 20_000)
     found = target_sensitivity(sample, errors, 1.5 * np.sqrt(14.0), SeedTree(1), permutations=9)
     assert found.lift[0] > found.lift[1]
     assert found.excess[1] > found.excess[0]
@@ -127,7 +128,7 @@ def test_an_output_that_does_not_vary_is_refused():
 
 
 def test_failed_units_do_not_make_a_sample_too_small():
-    sample = monte_carlo(Sum(fail=10), SIZES, SIZES.zones, SeedTree(3), 1000)
+    sample = monte_carlo(Experiment.of(Sum(fail=10), SIZES, SeedTree(3)), 1000)
     found = target_sensitivity(sample, SIZES, 5.0, SeedTree(3), permutations=9, resamples=9)
     assert (found.units, found.outside) == (990, 50)
 
@@ -184,7 +185,7 @@ def test_too_small_a_sample_is_refused():
 
 
 def test_failed_units_are_left_out_and_counted():
-    sample = monte_carlo(Sum(fail=10), SIZES, SIZES.zones, SeedTree(3), 2000)
+    sample = monte_carlo(Experiment.of(Sum(fail=10), SIZES, SeedTree(3)), 2000)
     found = target_sensitivity(sample, SIZES, 1.0, SeedTree(3), permutations=9, resamples=9)
     assert (found.units, found.failed) == (1990, 10)
     broken = MonteCarlo(x=sample.x, evaluation=Evaluation(values=sample.evaluation.values, status=np.ones(2000, "u1")))
@@ -233,7 +234,7 @@ def test_a_joint_source_is_measured_in_its_own_deviations(generator):
     errors = ErrorModel((source("a"),), joint=(joint,))
     x = errors.deviations(errors.standard_values(generator.random((4000, 3))), errors.zones)
     assert limited_measures(errors, x).shape == (4000, 2)
-    sample = monte_carlo(SumOfAll(errors.columns), errors, errors.zones, SeedTree(4), 4000)
+    sample = monte_carlo(Experiment.of(SumOfAll(errors.columns), errors, SeedTree(4)), 4000)
     found = target_sensitivity(sample, errors, 1.0, SeedTree(4), permutations=9, resamples=9)
     np.testing.assert_array_equal(found.columns, [1, 1])
     np.testing.assert_allclose((limited_measures(errors, x)[:, 1] ** 2).mean(), 0.5, rtol=1e-6)

@@ -11,7 +11,8 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits, OutputTrial
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.monte_carlo import MonteCarlo, Yield, proportion, require_few_failures
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse

@@ -11,7 +11,7 @@ from tolalloc.assembly.orientations import OrientationResponse, transmission_cur
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen, random_numbers
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.model import Observer

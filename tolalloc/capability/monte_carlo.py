@@ -8,14 +8,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import beta
 
-from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.drawing.sampling import SamplingDesign, uniform_chunks
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.model import Evaluation, Response
 
 CONFIDENCE = 0.95
-LARGEST_FAILED_SHARE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,32 +115,16 @@ def allowed_rejections(units: int, target: float) -> int:
 
 
 def monte_carlo(
-    response: Response,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
-    units: int,
-    design: SamplingDesign = SamplingDesign.MONTE_CARLO,
-    largest_failed_share: float = LARGEST_FAILED_SHARE,
+    experiment: Experiment[Response], units: int, design: SamplingDesign = SamplingDesign.MONTE_CARLO
 ) -> MonteCarlo:
-    """Return random units at the given zones.
+    """Return random units of an experiment.
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree that this sample owns.
     units
         Number of units [-].
     design
         How the units are spread; all intervals assume the first one.
-    largest_failed_share
-        Share of the units that may fail [-].
 
     Raises
     ------
@@ -154,30 +136,16 @@ def monte_carlo(
     The deviations are kept, the uniform numbers behind them only for one chunk at a time. The response takes all units
     at once and solves them in chunks of its own, so that an executor has many chunks to spread.
     """
+    errors, seeds = experiment.errors, experiment.seeds
     chunks = uniform_chunks(design, seeds, units, len(errors.columns))
-    x = np.concatenate([errors.deviations(errors.standard_values(uniform), zones) for uniform in chunks])
-    result = MonteCarlo(x=x, evaluation=response(x))
-    require_few_failures(result, ".".join(seeds.path), largest_failed_share)
+    x = np.concatenate([experiment.deviations(errors.standard_values(uniform)) for uniform in chunks])
+    result = MonteCarlo(x=x, evaluation=experiment.response(x))
+    require_few_failures(result, ".".join(seeds.path), experiment.largest_failed_share)
     return result
 
 
 def require_few_failures(result: MonteCarlo, name: str, largest_failed_share: float = LARGEST_FAILED_SHARE) -> None:
-    """Raise if more units failed than a trustworthy figure admits.
-
-    Parameters
-    ----------
-    result
-        The units.
-    name
-        Which sample they are, for the message.
-    largest_failed_share
-        Share of the units that may fail [-].
-
-    Raises
-    ------
-    SolveError
-        More units failed.
-    """
+    """Raise a `SolveError` if more units failed than a trustworthy figure admits."""
     units = result.evaluation.status.size
     if result.failed > largest_failed_share * units:
         raise SolveError(

@@ -8,10 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.zone_moves import extreme_in_zone, moved_towards
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import ResponseWithDerivatives
 
@@ -64,20 +62,19 @@ class _Units:
 class _Ascent:
     """What is climbed: the output, with the sign that makes larger worse."""
 
-    response: ResponseWithDerivatives
-    errors: ErrorModel
-    zones: Float[np.ndarray, " source"]
+    experiment: Experiment[ResponseWithDerivatives]
     sense: int
 
     def first(self, uniform: Float[np.ndarray, "start column"]) -> _Units:
         """Return units at the limits of all zones, at random phases, before they are solved."""
-        parts = zip(self.errors.active, self.errors.columns_of_source, strict=True)
+        errors = self.experiment.errors
+        parts = zip(errors.active, errors.columns_of_source, strict=True)
         units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
         return _Units(values=np.full(units.shape[0], -np.inf), units=units, gradients=np.zeros_like(units))
 
     def solved(self, at: _Units, weight: float) -> _Units:
         """Return the values of the units, minus infinity where one has none, and gradients averaged with the given."""
-        found = self.response.with_derivatives(self.errors.deviations(at.units, self.zones))
+        found = self.experiment.response.with_derivatives(self.experiment.deviations(at.units))
         good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
         newest = np.where(good[:, np.newaxis], self.sense * found.by_column, at.gradients)
         return _Units(
@@ -88,43 +85,31 @@ class _Ascent:
 
     def moved(self, at: _Units, part: float) -> _Units:
         """Return units a part of the way to the extremes of the zones along the gradients."""
-        units = np.empty_like(at.units)
-        for source, own in zip(self.errors.active, self.errors.columns_of_source, strict=True):
+        units, errors = np.empty_like(at.units), self.experiment.errors
+        for source, own in zip(errors.active, errors.columns_of_source, strict=True):
             extremes = extreme_in_zone(source, at.units[:, own], at.gradients[:, own])
             units[:, own] = moved_towards(source, at.units[:, own], extremes, part)
         return _Units(values=at.values, units=units, gradients=at.gradients)
 
 
 def worst_case(
-    response: ResponseWithDerivatives,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
+    experiment: Experiment[ResponseWithDerivatives],
     starts: int = 32,
     steps: int = 60,
     sense: Literal[1, -1] = 1,
-    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> WorstCase:
     """Return the worst unit that an ascent from many random units finds inside the zones.
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources of the tolerance table; correlations do not count, any part may be anywhere in its zone.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
+    experiment
+        Correlations of its sources do not count, any part may be anywhere in its zone.
     starts
         Random units at the limits of all zones from which to ascend [-].
     steps
         Steps of every ascent [-].
     sense
         1 where large outputs are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
-    largest_failed_share
-        Share of all units solved that may fail [-].
 
     Raises
     ------
@@ -145,13 +130,13 @@ def worst_case(
     ----------
     Frank, M. and Wolfe, P. (1956). An algorithm for quadratic programming. Naval Research Logistics 3, 95-110.
     """
+    errors, allowed = experiment.errors, experiment.largest_failed_share
     if errors.joint:
         raise InputError.at("worst case", "joint sources", errors.joint[0].name, "none, because they have no zone")
     if min(starts, steps) < 1:
         raise InputError.at("worst case", "starts and steps", (starts, steps), "1 or more")
-    ascent = _Ascent(response=response, errors=errors, zones=zones, sense=sense)
-    uniform = np.concatenate(list(seeds.uniform_chunks(starts, len(errors.columns))))
-    at = worst = ascent.first(uniform)
+    ascent = _Ascent(experiment=experiment, sense=sense)
+    at = worst = ascent.first(experiment.uniform(starts))
     failed = 0
     for step in range(steps):
         at = ascent.solved(at, max(_WEIGHT, 1.0 / (step + 1)))
@@ -162,21 +147,21 @@ def worst_case(
     corner = ascent.solved(ascent.moved(worst, 1.0), 0.0)
     failed += int(np.isinf(corner.values).sum())
     worst = worst.or_worse(corner)
-    if failed > largest_failed_share * starts * (steps + 1) or np.isinf(worst.values).all():
+    if failed > allowed * starts * (steps + 1) or np.isinf(worst.values).all():
         raise SolveError(
             f"Worst case: {failed} of {starts * (steps + 1)} units have no usable answer; allowed is a share of "
-            f"{largest_failed_share:.4g}."
+            f"{allowed:.4g}."
         )
     return _result(ascent, worst)
 
 
 def _result(ascent: _Ascent, worst: _Units) -> WorstCase:
     """Return the worst of all starts with the signs of the output."""
-    most, errors, sense = int(worst.values.argmax()), ascent.errors, ascent.sense
+    most, errors, sense = int(worst.values.argmax()), ascent.experiment.errors, ascent.sense
     by_column = sense * worst.gradients[most] * worst.units[most]
     return WorstCase(
         value=sense * float(worst.values[most]),
-        x=errors.deviations(worst.units[[most]], ascent.zones)[0],
+        x=ascent.experiment.deviations(worst.units[[most]])[0],
         by_zone=np.array([by_column[own].sum() for own in errors.columns_of_source]),
         ends=np.where(np.isinf(worst.values), np.nan, sense * worst.values),
     )

@@ -15,12 +15,11 @@ from tolalloc.capability.indices import (
     capability,
     defects_per_million_opportunities,
 )
-from tolalloc.capability.monte_carlo import CONFIDENCE, LARGEST_FAILED_SHARE, MonteCarlo, Yield, require_few_failures
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, require_few_failures
 from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.rare_failure.result import RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 METHOD = "Monte Carlo"
@@ -87,12 +86,10 @@ class YieldAtLimit:
 def yield_at_limit(
     limit_state: ResponseLimit,
     sample: MonteCarlo,
-    seeds: SeedTree,
     *,
     samples: int = 4000,
     runs: int = 5,
     weighted: int = 20_000,
-    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> YieldAtLimit:
     """Return the yield at a limit.
 
@@ -103,14 +100,10 @@ def yield_at_limit(
     sample
         Random units whose first output is the limited one; they decide alone if a thousandth of them or more exceed
         the limit, units without an answer included.
-    seeds
-        Node of the seed tree.
     samples, runs
         Samples of each level, and independent runs of the subset simulation, two or more [-].
     weighted
         Samples of the widened distribution [-].
-    largest_failed_share
-        Share of each method's samples that may fail [-].
 
     Raises
     ------
@@ -127,13 +120,13 @@ def yield_at_limit(
     """
     if runs < FEWEST_RUNS:
         raise InputError.at("yield at a limit", "runs", runs, f"{FEWEST_RUNS} or more")
-    require_few_failures(sample, "yield at a limit", largest_failed_share)
+    require_few_failures(sample, "yield at a limit", limit_state.experiment.largest_failed_share)
     limit = limit_state.limit
     within = sample.within(limit)
     plain = _random_units(sample, within)
     rare: tuple[RareFailure, ...] = ()
     if plain.probability < RARE:
-        rare = _rare_estimates(limit_state, seeds, samples, runs, weighted, largest_failed_share)
+        rare = _rare_estimates(limit_state, samples, runs, weighted)
     reached = len(rare) == 2
     return YieldAtLimit(
         limit=limit,
@@ -189,20 +182,13 @@ def _random_units(sample: MonteCarlo, within: Yield) -> RareFailure:
     )
 
 
-def _rare_estimates(
-    limit_state: ResponseLimit,
-    seeds: SeedTree,
-    samples: int,
-    runs: int,
-    weighted: int,
-    largest_failed_share: float,
-) -> tuple[RareFailure, ...]:
+def _rare_estimates(limit_state: ResponseLimit, samples: int, runs: int, weighted: int) -> tuple[RareFailure, ...]:
     """Return the estimate of subset simulation and, if two runs reached the limit, that of widened sampling."""
-    levels = subset_simulation(limit_state, seeds.child("levels"), samples, runs, largest_failed_share)
+    seeds, allowed = limit_state.experiment.seeds, limit_state.experiment.largest_failed_share
+    levels = subset_simulation(limit_state, seeds.child("levels"), samples, runs, allowed)
     if sum(states.size > 0 for states in levels.failing) < FEWEST_RUNS:
         return (levels,)
-    widened = seeds.child("widened")
-    return levels, widened_sampling(limit_state, levels.failing, widened, weighted, largest_failed_share)
+    return levels, widened_sampling(limit_state, levels.failing, seeds.child("widened"), weighted, allowed)
 
 
 def _verdict(plain: RareFailure, levels: RareFailure | None = None, widened: RareFailure | None = None) -> str:

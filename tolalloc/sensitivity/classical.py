@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import SolveError
 from tolalloc.model import Response
 
@@ -44,21 +43,8 @@ class ClassicalEstimate:
         return self.without + float(np.sqrt((self.alone**2).sum()))
 
 
-def classical_estimate(
-    response: Response, errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree
-) -> ClassicalEstimate:
+def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
     """Return worst case and root-sum-square from one error at a time.
-
-    Parameters
-    ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
 
     Raises
     ------
@@ -70,17 +56,17 @@ def classical_estimate(
     Both sums assume that single errors add up, which contact switching denies; they stand beside Monte Carlo for
     comparison with a hand calculation.
     """
-    columns = len(errors.columns)
-    middle = errors.deviations(np.zeros((1, columns)), zones)
+    errors = experiment.errors
+    middle = experiment.deviations(np.zeros((1, len(errors.columns))))
     x, start = [middle], 0
-    for source, zone in zip(errors.active, zones, strict=True):
+    for source, zone in zip(errors.active, experiment.zones, strict=True):
         own = slice(start, start + len(source.columns))
         rows = np.repeat(middle, DIRECTIONS, axis=0)
-        uniform = next(seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
+        uniform = next(experiment.seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
         rows[:, own] += zone * source.at_limit(uniform)
         x.append(rows)
         start = own.stop
-    evaluation = response(np.concatenate(x))
+    evaluation = experiment.response(np.concatenate(x))
     if not evaluation.good.all():
         raise SolveError(f"Classical estimate: {np.count_nonzero(~evaluation.good)} single-error units failed.")
     values = evaluation.values[:, 0]

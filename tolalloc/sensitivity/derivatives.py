@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.model import ResponseWithDerivatives
 from tolalloc.sensitivity.ranking import percentile_interval
@@ -85,30 +85,8 @@ class DerivativeMeasures:
         return percentile_interval(self.bound_resamples)
 
 
-def local_derivatives(
-    response: ResponseWithDerivatives,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
-    units: int = 1024,
-    largest_failed_share: float = LARGEST_FAILED_SHARE,
-) -> LocalDerivatives:
-    """Return the derivatives by each source at the nominal and over random units.
-
-    Parameters
-    ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources; joint ones are left out, because they are not lengths.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
-    units
-        Random units [-].
-    largest_failed_share
-        Share of the units that may fail [-].
+def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: int = 1024) -> LocalDerivatives:
+    """Return the derivatives by each source at the nominal and over random units; joint sources are no lengths.
 
     Raises
     ------
@@ -120,10 +98,11 @@ def local_derivatives(
     A peak-to-peak has a kink wherever two angles share its maximum or minimum, and symmetry makes the nominal such a
     place: the derivative there is one of several one-sided ones. The root mean square does not depend on it.
     """
-    middle = response.with_derivatives(errors.deviations(np.zeros((1, len(errors.columns))), zones))
+    errors = experiment.errors
+    middle = experiment.response.with_derivatives(experiment.deviations(np.zeros((1, len(errors.columns)))))
     if not middle.evaluation.good.all():
         raise SolveError("Local derivatives: the nominal has no usable answer.")
-    sample, by_column, _ = _sampled(response, errors, zones, seeds, units, largest_failed_share)
+    sample, by_column, _ = _sampled(experiment, units)
     where, length, direction, random = np.array(errors.source_of_column), [], [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
@@ -143,30 +122,9 @@ def local_derivatives(
 
 
 def derivative_measures(
-    response: ResponseWithDerivatives,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
-    units: int = 1024,
-    resamples: int = 400,
-    largest_failed_share: float = LARGEST_FAILED_SHARE,
+    experiment: Experiment[ResponseWithDerivatives], units: int = 1024, resamples: int = 400
 ) -> DerivativeMeasures:
     """Return the derivative-based measure of every source and its bound on the total index.
-
-    Parameters
-    ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
-    units, resamples
-        Random units, and bootstrap resamples of them [-].
-    largest_failed_share
-        Share of the units that may fail [-].
 
     Raises
     ------
@@ -183,11 +141,12 @@ def derivative_measures(
     ----------
     Sobol' & Kucherenko 2009; Lamboni, Iooss, Popelin & Gamboa 2013, Theorem 3.1, Poincaré constants.
     """
-    sample, by_column, uniform = _sampled(response, errors, zones, seeds.child("sample"), units, largest_failed_share)
+    errors = experiment.errors
+    sample, by_column, uniform = _sampled(experiment.child("sample"), units)
     blocks = errors.block_of_column
-    squares = _squared_gradients(by_column * _zone_per_column(errors, zones), errors, uniform, blocks)
+    squares = _squared_gradients(by_column * _zone_per_column(experiment), errors, uniform, blocks)
     centred = sample.values - sample.values.mean()
-    counts = resample_counts(centred.size, resamples, seeds.child("resamples"))
+    counts = resample_counts(centred.size, resamples, experiment.seeds.child("resamples"))
     means = counts @ np.column_stack([centred, centred**2, squares]) / centred.size
     variance = means[:, 1] - means[:, 0] ** 2
     if not variance.min() > 0.0:
@@ -205,19 +164,14 @@ def derivative_measures(
 
 
 def _sampled(
-    response: ResponseWithDerivatives,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
-    units: int,
-    largest_failed_share: float,
+    experiment: Experiment[ResponseWithDerivatives], units: int
 ) -> tuple[MonteCarlo, Float[np.ndarray, "good column"], Float[np.ndarray, "good column"]]:
     """Return random units, and of the good ones the derivatives and the uniform numbers."""
-    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
-    x = errors.deviations(errors.standard_values(uniform), zones)
-    answer = response.with_derivatives(x)
+    uniform = experiment.uniform(units)
+    x = experiment.deviations(experiment.errors.standard_values(uniform))
+    answer = experiment.response.with_derivatives(x)
     sample = MonteCarlo(x=x, evaluation=answer.evaluation)
-    require_few_failures(sample, "derivatives", largest_failed_share)
+    require_few_failures(sample, "derivatives", experiment.largest_failed_share)
     return sample, answer.by_column[answer.evaluation.good], uniform[answer.evaluation.good]
 
 
@@ -241,7 +195,7 @@ def _squared_gradients(
     return squares
 
 
-def _zone_per_column(errors: ErrorModel, zones: Float[np.ndarray, " source"]) -> Float[np.ndarray, " column"]:
+def _zone_per_column(experiment: Experiment[ResponseWithDerivatives]) -> Float[np.ndarray, " column"]:
     """Return the zone of every column's source [m]."""
-    ones = np.ones((1, len(errors.columns)))
-    return np.asarray((errors.deviations(ones, zones) - errors.deviations(0.0 * ones, zones))[0])
+    ones = np.ones((1, len(experiment.errors.columns)))
+    return np.asarray((experiment.deviations(ones) - experiment.deviations(0.0 * ones))[0])

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import quantile_interval
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Response
 
@@ -61,30 +60,20 @@ class InverseSensitivity:
 
 
 def inverse_sensitivity(
-    response: Response,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
+    experiment: Experiment[Response],
     *,
     limit: float,
     target: float,
     units: int = 2048,
     largest_factor: float = 10.0,
     tolerance: float = 1e-3,
-    largest_failed_share: float = 0.01,
 ) -> InverseSensitivity:
     """Return how far each zone may open, or must close, alone.
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model and its first output is limited.
-    errors
-        The sources; a joint one stays as it is.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
+    experiment
+        Its first output is limited; a joint source stays as it is.
     limit
         Largest output allowed [output].
     target
@@ -95,8 +84,6 @@ def inverse_sensitivity(
         Factor up to which a zone is opened [-].
     tolerance
         Distance from the limit, over the limit, at which the quantile counts as equal to it [-].
-    largest_failed_share
-        Share of the units of a trial that may fail [-].
 
     Raises
     ------
@@ -122,8 +109,8 @@ def inverse_sensitivity(
         raise InputError.at("inverse sensitivity", "units", units, f"{needed} or more for a yield of {target:.4%}")
     if largest_factor <= 1.0:
         raise InputError.at("inverse sensitivity", "largest factor", largest_factor, "a number above 1")
-    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
-    openings = _Openings(response, errors, zones, errors.standard_values(uniform), target, largest_failed_share)
+    errors = experiment.errors
+    openings = _Openings(experiment, errors.standard_values(experiment.uniform(units)), target)
     now = float(openings.quantiles(np.zeros(1, int), np.ones(1))[0, 0])
     meets, count = now <= limit, len(errors.active)
     factor = np.full(count, np.inf if meets else np.nan)
@@ -140,7 +127,7 @@ def inverse_sensitivity(
         factor=factor,
         low=low,
         high=high,
-        zone=factor * zones[:count],
+        zone=factor * experiment.zones[:count],
         units=units,
         failed=openings.failed,
         calls=openings.calls,
@@ -156,16 +143,10 @@ class _Openings:
     """The same units with one zone multiplied by a factor, for several sources in each call of the response."""
 
     def __init__(
-        self,
-        response: Response,
-        errors: ErrorModel,
-        zones: Float[np.ndarray, " source"],
-        standard: Float[np.ndarray, "unit column"],
-        target: float,
-        largest_failed_share: float,
+        self, experiment: Experiment[Response], standard: Float[np.ndarray, "unit column"], target: float
     ) -> None:
-        self.response, self.errors, self.zones, self.standard = response, errors, zones, standard
-        self.target, self.largest_failed_share = target, largest_failed_share
+        self.experiment, self.errors = experiment, experiment.errors
+        self.standard, self.target = standard, target
         self.calls = self.failed = 0
 
     def quantiles(
@@ -180,9 +161,11 @@ class _Openings:
         self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
     ) -> Float[np.ndarray, "trial 3"]:
         """Return the same from one call of the response."""
-        zones = np.repeat(self.zones[np.newaxis], sources.size, axis=0)
+        zones = np.repeat(self.experiment.zones[np.newaxis], sources.size, axis=0)
         zones[np.arange(sources.size), sources] *= factors
-        evaluation = self.response(np.concatenate([self.errors.deviations(self.standard, own) for own in zones]))
+        evaluation = self.experiment.response(
+            np.concatenate([self.errors.deviations(self.standard, own) for own in zones])
+        )
         good, values = (part.reshape(sources.size, -1) for part in (evaluation.good, evaluation.values[:, 0]))
         self.calls += 1
         self.failed += int(np.count_nonzero(~good))
@@ -201,11 +184,11 @@ class _Openings:
         """Raise if more units of a trial failed than allowed."""
         failed = np.count_nonzero(~good, axis=1)
         worst = int(failed.argmax())
-        if failed[worst] > self.largest_failed_share * good.shape[1]:
+        if failed[worst] > self.experiment.largest_failed_share * good.shape[1]:
             raise SolveError(
                 f"Inverse sensitivity: {failed[worst]} of {good.shape[1]} units have no usable answer with "
                 f"{self.errors.active[sources[worst]].name} at {factors[worst]:.4g} times its zone; allowed is "
-                f"{self.largest_failed_share:.4g} of them, because more would bias the quantile."
+                f"{self.experiment.largest_failed_share:.4g} of them, because more would bias the quantile."
             )
 
 

@@ -16,7 +16,8 @@ from SALib.analyze.delta import calc_delta
 from SALib.sample import morris
 
 from tolalloc.blas import one_blas_thread
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
+from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -106,29 +107,17 @@ class MomentIndependent:
 
 
 def elementary_effects(
-    response: Response,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
+    experiment: Experiment[Response],
     trajectories: int,
     *,
     levels: int = 4,
     trim: float = 0.001,
     resamples: int = 400,
-    largest_failed_share: float = 0.01,
 ) -> ElementaryEffects:
     """Return the elementary effects of all sources on all outputs.
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
     trajectories
         Trajectories; the response is called (sources + 1) times as often [-].
     levels
@@ -137,8 +126,6 @@ def elementary_effects(
         Share of the distribution left out at either end, where a normal number would be infinite [-].
     resamples
         Bootstrap resamples of the trajectories [-].
-    largest_failed_share
-        Share of the trajectories that may be dropped [-].
 
     Raises
     ------
@@ -157,6 +144,7 @@ def elementary_effects(
         raise InputError.at("elementary effects", "levels", levels, "an even number, 2 or more")
     if not 0.0 < trim < 0.5:
         raise InputError.at("elementary effects", "trim", trim, "a number between 0 and 0.5")
+    errors, seeds = experiment.errors, experiment.seeds
     groups = errors.block_of_column
     names = tuple(dict.fromkeys(groups))
     problem = {
@@ -166,13 +154,13 @@ def elementary_effects(
         "bounds": [[trim, 1.0 - trim]] * len(errors.columns),
     }
     uniform = morris.sample(problem, trajectories, num_levels=levels, seed=seeds.child("sample").integer())
-    evaluation = response(errors.deviations(errors.standard_values(uniform), zones))
+    evaluation = experiment.response(experiment.deviations(errors.standard_values(uniform)))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
     used = int(np.count_nonzero(whole))
-    if trajectories - used > largest_failed_share * trajectories or used < FEWEST_TRAJECTORIES:
+    if trajectories - used > experiment.largest_failed_share * trajectories or used < FEWEST_TRAJECTORIES:
         raise SolveError(
             f"Elementary effects: {trajectories - used} of {trajectories} trajectories hold a failed sample; allowed "
-            f"is {largest_failed_share:.4g} of them, and two must be left."
+            f"is {experiment.largest_failed_share:.4g} of them, and two must be left."
         )
     members = np.array(groups)[:, np.newaxis] == names
     effects = _effects(

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Evaluation, Response
 from tolalloc.sensitivity.ranking import percentile_interval, rank_interval
@@ -58,30 +57,15 @@ class ShapleyEffects:
         return rank_interval(self.resamples[output])
 
 
-def shapley_effects(
-    response: Response,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
-    permutations: int,
-    largest_failed_share: float = 0.01,
-) -> ShapleyEffects:
+def shapley_effects(experiment: Experiment[Response], permutations: int) -> ShapleyEffects:
     """Return the Shapley effects of all varying sources on all outputs, from the same samples.
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources, which may depend on each other; all columns of a source go together.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
+    experiment
+        Its sources may depend on each other; all columns of a source go together.
     permutations
         Random orders of the sources; the response is called (sources + 1) times as often [-].
-    largest_failed_share
-        Share of permutations that may hold a failed sample [-].
 
     Raises
     ------
@@ -105,16 +89,17 @@ def shapley_effects(
     """
     if permutations < 2:
         raise InputError.at("Shapley effects", "permutations", permutations, "2 or more")
-    names = tuple(dict.fromkeys(errors.source_of_column))
-    parts = [_added(response(x), position) for position, x in _samples(errors, zones, seeds, permutations)]
+    response, allowed = experiment.response, experiment.largest_failed_share
+    names = tuple(dict.fromkeys(experiment.errors.source_of_column))
+    parts = [_added(response(x), position) for position, x in _samples(experiment, permutations)]
     added = np.concatenate(parts)
     used = added.shape[0]
-    if permutations - used > largest_failed_share * permutations or used < 2:
+    if permutations - used > allowed * permutations or used < 2:
         raise SolveError(
             f"Shapley effects: {permutations - used} of {permutations} permutations hold a failed sample; allowed is "
-            f"{largest_failed_share:.4g} of them, because more would bias the effects."
+            f"{allowed:.4g} of them, because more would bias the effects."
         )
-    counts = resample_counts(used, _RESAMPLES, seeds.child("resamples"))
+    counts = resample_counts(used, _RESAMPLES, experiment.seeds.child("resamples"))
     effects = _shares(added, counts)
     return ShapleyEffects(
         sources=names,
@@ -128,9 +113,10 @@ def shapley_effects(
 
 
 def _samples(
-    errors: ErrorModel, zones: Float[np.ndarray, " source"], seeds: SeedTree, permutations: int
+    experiment: Experiment[Response], permutations: int
 ) -> Iterator[tuple[Int[np.ndarray, "order source"], Float[np.ndarray, "sample column"]]]:
     """Yield some orders as the position of each source, and their chains of samples [m], order by order."""
+    errors, seeds = experiment.errors, experiment.seeds
     sources, columns = len(errors.columns_of_source), len(errors.columns)
     of_column = np.repeat(np.arange(sources), [own.stop - own.start for own in errors.columns_of_source])
     orders = seeds.child("orders").uniform_chunks(permutations, sources)
@@ -142,7 +128,7 @@ def _samples(
             exchanged = position[:, np.newaxis] < np.arange(sources + 1)[:, np.newaxis]
             uniform = np.where(exchanged[:, :, of_column], second, first)
             mixed = errors.mixed(uniform, _conditional_factor(errors.source_correlation, position)[:, np.newaxis])
-            yield position, errors.deviations(errors.marginal_values(mixed.reshape(-1, columns)), zones)
+            yield position, experiment.deviations(errors.marginal_values(mixed.reshape(-1, columns)))
 
 
 def _conditional_factor(

@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from jaxtyping import Float
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.model import Evaluation, Response
 from tolalloc.sensitivity.growth import Resampled, grow_until_stable
@@ -52,8 +51,6 @@ class SobolEffort:
         Bootstrap resamples [-].
     second_order
         Whether pairs of sources get an index, at nearly twice the samples.
-    largest_failed_share
-        Share of blocks that may hold a failed sample [-].
     """
 
     start: int = 512
@@ -62,7 +59,6 @@ class SobolEffort:
     probability: float = 0.9
     resamples: int = 400
     second_order: bool = False
-    largest_failed_share: float = 0.01
 
     def __post_init__(self) -> None:
         if self.start < 2 or self.start & (self.start - 1):
@@ -75,9 +71,7 @@ class SobolEffort:
 class _Answers:
     """Answers of the blocks so far; only new blocks are evaluated."""
 
-    response: Response
-    errors: ErrorModel
-    zones: Float[np.ndarray, " source"]
+    experiment: Experiment[Response]
     design: SaltelliDesign
     blocks: int = 0
     parts: list[Evaluation] = field(default_factory=list)
@@ -85,8 +79,8 @@ class _Answers:
     def up_to(self, blocks: int) -> Evaluation:
         """Return the answers of the first blocks."""
         for uniform in self.design.chunks(self.blocks, blocks):
-            standard = self.errors.standard_values(np.maximum(uniform, _HALF_STEP))
-            self.parts.append(self.response(self.errors.deviations(standard, self.zones)))
+            standard = self.experiment.errors.standard_values(np.maximum(uniform, _HALF_STEP))
+            self.parts.append(self.experiment.response(self.experiment.deviations(standard)))
         self.blocks = blocks
         joined = Evaluation(
             values=np.concatenate([part.values for part in self.parts]),
@@ -97,10 +91,7 @@ class _Answers:
 
 
 def sobol_indices(
-    response: Response,
-    errors: ErrorModel,
-    zones: Float[np.ndarray, " source"],
-    seeds: SeedTree,
+    experiment: Experiment[Response],
     effort: SobolEffort,
     player: Player = Player.SOURCE,
     ranked: tuple[str, ...] = (),
@@ -109,14 +100,6 @@ def sobol_indices(
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m].
-    seeds
-        Node of the seed tree.
     effort
         Blocks, from a first number doubled up to a limit, and what stops them.
     player
@@ -141,9 +124,10 @@ def sobol_indices(
     Saltelli et al. 2010 (first order), Jansen 1999 (total), Saltelli 2002 (second order), as SALib implements them;
     groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
     """
-    players, counted = _players(errors, player), ranked or response.outputs
+    errors, seeds, outputs = experiment.errors, experiment.seeds, experiment.response.outputs
+    players, counted = _players(errors, player), ranked or outputs
     design = SaltelliDesign(players=players, seed=seeds.child("sample").integer(), second_order=effort.second_order)
-    answers, steps = _Answers(response, errors, zones, design), list[SaltelliIndices]()
+    answers, steps = _Answers(experiment, design), list[SaltelliIndices]()
 
     def resampled(blocks: int) -> Resampled:
         steps.append(
@@ -153,10 +137,10 @@ def sobol_indices(
                 seeds.child("resamples"),
                 second_order=effort.second_order,
                 resamples=effort.resamples,
-                largest_failed_share=effort.largest_failed_share,
+                largest_failed_share=experiment.largest_failed_share,
             )
         )
-        ranking = overall_ranking(design.names, response.outputs, counted, steps[-1])
+        ranking = overall_ranking(design.names, outputs, counted, steps[-1])
         return ranking.total, ranking.total_resamples
 
     growth = grow_until_stable(
@@ -168,7 +152,7 @@ def sobol_indices(
         probability=effort.probability,
     )
     return SobolAnalysis(
-        outputs=response.outputs,
+        outputs=outputs,
         ranked=counted,
         sources=design.names,
         indices=steps[-1],

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.capability.monte_carlo import LARGEST_FAILED_SHARE, MonteCarlo, require_few_failures
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree

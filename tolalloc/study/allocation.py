@@ -24,6 +24,7 @@ from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
+from tolalloc.capability.experiment import Experiment
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
@@ -187,11 +188,14 @@ class Searches:
         """Return the indices of the peak-to-peak at the zones and the modification of a design."""
         errors, blocks = space.errors, self.effort.share_blocks
         return sobol_indices(
-            self.kernel.with_modification(space.modification(design)),
-            errors,
-            space.zones(design),
-            self._seeds("shares"),
-            SobolEffort(start=blocks, limit=blocks, largest_failed_share=self.prepared.study.largest_failed_share),
+            Experiment(
+                self.kernel.with_modification(space.modification(design)),
+                errors,
+                space.zones(design),
+                self._seeds("shares"),
+                self.prepared.study.largest_failed_share,
+            ),
+            SobolEffort(start=blocks, limit=blocks),
             Player.BLOCK if errors.is_correlated else Player.SOURCE,
         ).of(PEAK_TO_PEAK)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.capability.rare_failure.response_limit import ResponseLimit
@@ -96,17 +97,16 @@ class Measures:
     def _seeds(self, name: str) -> SeedTree:
         return SeedTree(self.prepared.study.seed).child("rank", name)
 
+    def _experiment(self, name: str, response: Given) -> Experiment[Given]:
+        return Experiment.of(response, self.errors, self._seeds(name), self._failed_share)
+
     def sample(self) -> MonteCarlo:
         """Return random units with all outputs."""
-        effort, errors = self._effort, self.errors
+        effort = self._effort
         return monte_carlo(
-            self.requirements,
-            errors,
-            errors.zones,
-            self._seeds("units"),
+            self._experiment("units", self.requirements),
             effort.units,
             effort.design,
-            self._failed_share,
         )
 
     def sobol(self, name: str, orders: tuple[int, ...], blocks: int = 0) -> SobolAnalysis:
@@ -121,13 +121,10 @@ class Measures:
         blocks
             Number of blocks, without pairs; as many as the ranking needs if 0 [-].
         """
-        errors, effort = self.errors, replace(self._effort.sobol, largest_failed_share=self._failed_share)
+        errors, effort = self.errors, self._effort.sobol
         readings = (*REQUIREMENTS, orders_reading(orders)) if orders else REQUIREMENTS
         return sobol_indices(
-            replace(self.requirements, readings=readings),
-            errors,
-            errors.zones,
-            self._seeds(name),
+            self._experiment(name, replace(self.requirements, readings=readings)),
             replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
             Player.BLOCK if errors.is_correlated else Player.SOURCE,
             ranked=tuple(self.limits),
@@ -135,36 +132,25 @@ class Measures:
 
     def shapley(self) -> ShapleyEffects | None:
         """Return the shares of correlated sources; none where all are independent."""
-        errors, seeds = self.errors, self._seeds("shapley")
-        if not errors.is_correlated:
+        if not self.errors.is_correlated:
             return None
-        return shapley_effects(self.kernel, errors, errors.zones, seeds, self._effort.permutations, self._failed_share)
+        return shapley_effects(self._experiment("shapley", self.kernel), self._effort.permutations)
 
     def classical(self) -> ClassicalEstimate:
         """Return what a hand calculation says."""
-        return classical_estimate(self.kernel, self.errors, self.errors.zones, self._seeds("classical"))
+        return classical_estimate(self._experiment("classical", self.kernel))
 
     def local(self) -> LocalDerivatives:
         """Return the derivatives by every source."""
-        units = self._effort.derivative_units
-        return local_derivatives(
-            self.kernel, self.errors, self.errors.zones, self._seeds("local"), units, self._failed_share
-        )
+        return local_derivatives(self._experiment("local", self.kernel), self._effort.derivative_units)
 
     def derivatives(self) -> DerivativeMeasures:
         """Return what the derivatives bound."""
-        units = self._effort.derivative_units
-        share = self._failed_share
-        seeds = self._seeds("derivatives")
-        return derivative_measures(
-            self.kernel, self.errors, self.errors.zones, seeds, units, largest_failed_share=share
-        )
+        return derivative_measures(self._experiment("derivatives", self.kernel), self._effort.derivative_units)
 
     def effects(self) -> ElementaryEffects:
         """Return Morris' elementary effects."""
-        seeds, count = self._seeds("effects"), self._effort.trajectories
-        share = self._failed_share
-        return elementary_effects(self.kernel, self.errors, self.errors.zones, seeds, count, largest_failed_share=share)
+        return elementary_effects(self._experiment("effects", self.kernel), self._effort.trajectories)
 
     def moments(self, sample: MonteCarlo) -> MomentIndependent:
         """Return PAWN and delta of the first units of a sample."""
@@ -178,29 +164,23 @@ class Measures:
 
     def beyond(self, sample: MonteCarlo) -> YieldAtLimit:
         """Return the probability of a unit beyond the limit, from a sample and where it is rare from more units."""
-        errors, effort, limit = self.errors, self._effort, self.prepared.study.limit_arcsec
+        effort, limit = self._effort, self.prepared.study.limit_arcsec
         return yield_at_limit(
-            ResponseLimit(response=self.kernel, errors=errors, zones=errors.zones, limit=limit),
+            ResponseLimit(experiment=self._experiment("beyond", self.kernel), limit=limit),
             sample,
-            self._seeds("beyond"),
             samples=effort.level_units,
             runs=effort.level_runs,
             weighted=effort.widened_units,
-            largest_failed_share=self._failed_share,
         )
 
     def inverse(self, choice: Choice) -> InverseSensitivity:
         """Return how far each zone may open alone, on the surrogate if one has earned its place."""
-        errors, asked = self.errors, self.prepared.study
+        asked = self.prepared.study
         return inverse_sensitivity(
-            choice.chosen or self.kernel,
-            errors,
-            errors.zones,
-            self._seeds("inverse"),
+            self._experiment("inverse", choice.chosen or self.kernel),
             limit=asked.limit_arcsec,
             target=asked.yield_target,
             units=max(self._effort.inverse_units, fewest_units(asked.yield_target)),
-            largest_failed_share=self._failed_share,
         )
 
     def choice(self, sample: MonteCarlo) -> Choice:

@@ -12,6 +12,7 @@ from tolalloc.allocation.fronts import exact_front, searched_front
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import allocate, require_reachable
 from tolalloc.allocation.verification import Verifier
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
@@ -88,7 +89,8 @@ def run_stages(prepared: Prepared, record: Record, quick: bool) -> StudyResults:
         )
     with record.stage("ranking"):
         sobol, stiffness = _ranking(prepared, kernel, allocation.baseline.sample, seeds)
-        classical = classical_estimate(kernel, space.errors, space.errors.zones, seeds.child("classical"))
+        share = study.largest_failed_share
+        classical = classical_estimate(Experiment.of(kernel, space.errors, seeds.child("classical"), share))
     with record.stage("report"):
         return StudyResults(
             name=study.name,
@@ -125,17 +127,17 @@ def _ranking(
 ) -> tuple[SobolIndices, StiffnessEffect | None]:
     """Return the ranking at the zones of the tolerance table, and what not knowing the stiffness does, if it is one."""
     errors, own, blocks = prepared.space.errors, seeds.child("sobol"), prepared.study.effort.sobol_blocks
-    effort = SobolEffort(start=blocks, limit=blocks, largest_failed_share=prepared.study.largest_failed_share)
+    effort, share = SobolEffort(start=blocks, limit=blocks), prepared.study.largest_failed_share
     # Correlated sources share their variance, so their block has the index.
     player = Player.BLOCK if errors.is_correlated else Player.SOURCE
     if prepared.identified is None or prepared.stiffness is None:
-        return sobol_indices(kernel, errors, errors.zones, own, effort, player).of(PEAK_TO_PEAK), None
+        return sobol_indices(Experiment.of(kernel, errors, own, share), effort, player).of(PEAK_TO_PEAK), None
     response = StiffnessResponse(kernel=kernel, stiffnesses=tuple(prepared.identified.values))
     joint = replace(errors, joint=(prepared.stiffness,))
     units = sample.x[sample.evaluation.good][:_EFFECT_UNITS]
     directions = seeds.child("stiffness").generator().standard_normal((_DIRECTIONS, len(response.stiffnesses)))
     effect = stiffness_effect(response, prepared.stiffness, units, directions, _UNITS_PER_DIRECTION)
-    return sobol_indices(response, joint, joint.zones, own, effort, player).of(PEAK_TO_PEAK), effect
+    return sobol_indices(Experiment.of(response, joint, own, share), effort, player).of(PEAK_TO_PEAK), effect
 
 
 def _torsional_stiffness(prepared: Prepared) -> float:

@@ -8,8 +8,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.rare_failure.limit_state import LimitValues
-from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.model import Response, ResponseWithDerivatives
 
 _STEP = 1e-3
@@ -27,33 +27,27 @@ class ResponseLimit:
 
     Parameters
     ----------
-    response
-        What answers; its columns are those of the error model.
-    errors
-        The sources; every column has a standard normal variable of its own, whatever its distribution.
-    zones
-        Zones of the active sources [m].
+    experiment
+        Every column of its sources has a standard normal variable of its own, whatever its distribution.
     limit
         Largest output allowed [output].
     """
 
-    response: Response
-    errors: ErrorModel
-    zones: Float[np.ndarray, " source"]
+    experiment: Experiment[Response]
     limit: float
 
     @property
     def variables(self) -> int:
         """Number of columns."""
-        return len(self.errors.columns)
+        return len(self.experiment.errors.columns)
 
     def deviations(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
         """Return the deviations that are as probable as the standard normal numbers [m, angles rad]."""
-        return self.errors.deviations_of_normal(u, self.zones)
+        return self.experiment.errors.deviations_of_normal(u, self.experiment.zones)
 
     def __call__(self, u: Float[np.ndarray, "sample variable"]) -> LimitValues:
         """Return the distance of every sample from the limit [output]."""
-        evaluation = self.response(self.deviations(u))
+        evaluation = self.experiment.response(self.deviations(u))
         # Another output of a sample may have failed, and then the sample is lost as a whole.
         values = np.where(evaluation.good, self.limit - evaluation.values[:, 0], np.nan)
         return LimitValues(values=values, status=evaluation.status)
@@ -63,7 +57,7 @@ class ResponseLimit:
 class ResponseLimitWithGradient(ResponseLimit):
     """The same limit on a response that knows its derivatives."""
 
-    response: DifferentiableResponse
+    experiment: Experiment[DifferentiableResponse]
 
     def gradient(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
         """Return the derivatives of every distance by the standard normal numbers, NaN where a sample failed [output].
@@ -73,7 +67,7 @@ class ResponseLimitWithGradient(ResponseLimit):
         The chain rule takes all deviations by all numbers, because those of one source, or of sources that depend on
         each other, mix: central differences of the distributions, exact derivatives of the response.
         """
-        answer = self.response.with_derivatives(self.deviations(u))
+        answer = self.experiment.response.with_derivatives(self.deviations(u))
         by_column = np.where(answer.evaluation.good[:, np.newaxis], answer.by_column, np.nan)
         gradient = np.empty_like(u)
         for variable, shift in enumerate(_STEP * np.eye(self.variables)):

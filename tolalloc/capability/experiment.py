@@ -1,0 +1,66 @@
+"""What every statistical question is asked of: a response, the sources that vary, and where its random numbers hang."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.model import Response, ResponseWithDerivatives
+
+LARGEST_FAILED_SHARE = 0.01
+"""Share of the units that may fail unless a study says otherwise [-]."""
+
+Answering = TypeVar("Answering", bound=Response | ResponseWithDerivatives, covariant=True)
+Given = TypeVar("Given", bound=Response | ResponseWithDerivatives)
+
+
+@dataclass(frozen=True)
+class Experiment(Generic[Answering]):
+    """Units that may be drawn and solved.
+
+    Parameters
+    ----------
+    response
+        What answers; its columns are those of the error model. Where a question has one output, it is the first.
+    errors
+        The sources.
+    zones
+        Zones of the active sources [m], then 1 for every joint one [-].
+    seeds
+        Node of the seed tree that belongs to this experiment alone.
+    largest_failed_share
+        Share of the units, blocks or samples that may fail; more would bias every figure [-].
+    """
+
+    response: Answering
+    errors: ErrorModel
+    zones: Float[np.ndarray, " source"]
+    seeds: SeedTree
+    largest_failed_share: float = LARGEST_FAILED_SHARE
+
+    @staticmethod
+    def of(
+        response: Given,
+        errors: ErrorModel,
+        seeds: SeedTree,
+        largest_failed_share: float = LARGEST_FAILED_SHARE,
+    ) -> Experiment[Given]:
+        """Return the experiment at the zones that the drawing has."""
+        return Experiment(response, errors, errors.zones, seeds, largest_failed_share)
+
+    def child(self, *names: str) -> Experiment[Answering]:
+        """Return the same with random numbers of its own."""
+        return replace(self, seeds=self.seeds.child(*names))
+
+    def deviations(self, standard: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return the columns [m, angles rad] that the standard values give at the zones."""
+        return self.errors.deviations(standard, self.zones)
+
+    def uniform(self, units: int) -> Float[np.ndarray, "sample column"]:
+        """Return independent uniform numbers in (0, 1), one per unit and column [-]."""
+        return np.concatenate(list(self.seeds.uniform_chunks(units, len(self.errors.columns))))
