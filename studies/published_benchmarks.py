@@ -50,10 +50,10 @@ def clutch_rows() -> list[dict[str, object]]:
         problem, own = clutch(float(loss)), case["results"].get(str(loss))
         printed, broken = "", ""
         if own:
-            point, room = np.array(own["published_t"]), problem.stacks[0].room
+            point, budget = np.array(own["published_t"]), problem.stacks[0].budget
             printed = f"{problem.cost(point, np.array(own['published_processes']) - 1):.6f}"
-            over = float(problem.overload(point, np.empty(0))[0])
-            broken = f"root sum square {room + over:.6f} > {room:g} rad by {100 * over / room:.3f} %"
+            over = float(problem.violation(point, np.empty(0))[0])
+            broken = f"root sum square {budget + over:.6f} > {budget:g} rad by {100 * over / budget:.3f} %"
         rows.append(row(f"clutch, root sum square, loss {loss}", problem, printed, broken))
         rows.append(row(f"clutch, worst case, loss {loss}", clutch(float(loss), method="worst case"), "", ""))
     other = case["other_cage"]

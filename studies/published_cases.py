@@ -48,7 +48,7 @@ def clutch(loss: float, cage: float = 101.6, method: str = "root sum square") ->
         Root sum square or worst case.
     """
     case, sensitivities = CASES["clutch_choi2000"], clutch_sensitivities(cage)
-    room = case["requirement"]["half_width"]
+    budget = case["requirement"]["half_width"]
     features = tuple(
         Feature(
             name=name,
@@ -61,12 +61,12 @@ def clutch(loss: float, cage: float = 101.6, method: str = "root sum square") ->
                 )
                 for at, own in enumerate(processes, start=1)
             ),
-            loss=float(loss * (slope / 3 / room) ** 2),
+            loss=float(loss * (slope / 3 / budget) ** 2),
         )
         for (name, processes), slope in zip(case["processes"].items(), sensitivities, strict=True)
     )
     made = {"root sum square": root_sum_square, "worst case": worst_case}[method]
-    return AllocationProblem(features=features, stacks=(made("angle", sensitivities, room),))
+    return AllocationProblem(features=features, stacks=(made("angle", sensitivities, budget),))
 
 
 def gap_chain(variant: str) -> AllocationProblem:

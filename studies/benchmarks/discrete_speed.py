@@ -41,7 +41,7 @@ PATIENCE = 60.0  # s
 
 
 def random_problem(random: np.random.Generator) -> DiscreteProblem:
-    """Return a problem whose rooms are filled near the middle of the ladders."""
+    """Return a problem whose budgets are filled near the middle of the ladders."""
     ladders = random.choice([1.0, 1.5, 2.0, 2.5, 3.0, 4.0], FEATURES)[:, np.newaxis] * 1.6 ** np.arange(GRADES)
     features = []
     for number, ladder in enumerate(ladders):
@@ -59,10 +59,10 @@ def random_problem(random: np.random.Generator) -> DiscreteProblem:
     stacks = []
     for name, kinds in STACKS.items():
         weights = np.exp(random.normal(0.0, 0.7, (2, FEATURES))) * (random.random((2, FEATURES)) < 0.6)
-        adding, spreading = weights * np.array(kinds)[:, np.newaxis]
+        worst_case, root_sum_square = weights * np.array(kinds)[:, np.newaxis]
         middle = ladders[:, 3]
-        room = float(adding @ middle + np.linalg.norm(spreading * middle)) * random.uniform(0.8, 1.2)
-        stacks.append(Stack(name=name, adding=adding, spreading=spreading, room=room))
+        budget = float(worst_case @ middle + np.linalg.norm(root_sum_square * middle)) * random.uniform(0.8, 1.2)
+        stacks.append(Stack(name=name, worst_case=worst_case, root_sum_square=root_sum_square, budget=budget))
     labels = [f"grade {at}" for at in range(GRADES)]
     options = tuple(feature_options(own, ladder, labels) for own, ladder in zip(features, ladders, strict=True))
     return DiscreteProblem(problem=AllocationProblem(features=tuple(features), stacks=tuple(stacks)), options=options)
@@ -77,10 +77,10 @@ def plainly(case: DiscreteProblem) -> float:
     z, until = cp.Variable(cost.size, boolean=True), time.monotonic() + PATIENCE
     rows = [member @ z == 1]
     for stack in case.problem.stacks:
-        if not stack.adding.any():
-            rows.append(((stack.spreading @ member * zones) / stack.room) ** 2 @ z <= 1)
-        elif not stack.spreading.any():
-            rows.append((stack.adding @ member * zones) / stack.room @ z <= 1)
+        if not stack.worst_case.any():
+            rows.append(((stack.root_sum_square @ member * zones) / stack.budget) ** 2 @ z <= 1)
+        elif not stack.root_sum_square.any():
+            rows.append((stack.worst_case @ member * zones) / stack.budget @ z <= 1)
     while True:
         program = cp.Problem(cp.Minimize(cost @ z), rows)
         options = {"mip_rel_gap": 0.0, "time_limit": max(until - time.monotonic(), 0.01)}
@@ -88,13 +88,13 @@ def plainly(case: DiscreteProblem) -> float:
         if program.status != cp.OPTIMAL:
             return float("nan")
         chosen: Float[np.ndarray, " feature"] = member @ (zones * np.round(z.value))
-        broken = [stack for stack in case.problem.stacks if stack.load(chosen, np.empty(0)) > stack.room * (1 + 1e-9)]
+        broken = [stack for stack in case.problem.stacks if stack.load(chosen, np.empty(0)) > stack.budget * (1 + 1e-9)]
         if not broken:
             return float(cost @ np.round(z.value))
         for stack in broken:
-            length = np.linalg.norm(stack.spreading * chosen) or 1.0
-            slope = stack.adding + stack.spreading**2 * chosen / length
-            rows.append((slope @ member * zones) / stack.room @ z <= 1)
+            length = np.linalg.norm(stack.root_sum_square * chosen) or 1.0
+            slope = stack.worst_case + stack.root_sum_square**2 * chosen / length
+            rows.append((slope @ member * zones) / stack.budget @ z <= 1)
 
 
 def answer(instances: int, rounds: int) -> dict[str, Any]:

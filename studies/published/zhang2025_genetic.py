@@ -39,7 +39,7 @@ class GeneticAllocation:
     gap: float
 
 
-class AngularSearch(Problem):  # type: ignore[misc]
+class _Searched(Problem):  # type: ignore[misc]
     """The allocation as pymoo sees it; each feature has one process."""
 
     def __init__(self, problem: AllocationProblem) -> None:
@@ -55,7 +55,7 @@ class AngularSearch(Problem):  # type: ignore[misc]
     def _evaluate(self, x: Float[np.ndarray, "design gene"], out: dict[str, object], *_: object, **__: object) -> None:
         costs = sum(process.total(zones) for process, zones in zip(self.made, x.T, strict=True))
         out["F"] = costs + x**2 @ self.allocation.losses
-        violations = [stack.load(x, np.empty((len(x), 0))) - stack.room for stack in self.allocation.stacks]
+        violations = [stack.load(x, np.empty((len(x), 0))) - stack.budget for stack in self.allocation.stacks]
         out["G"] = np.reshape(violations, (-1, len(x))).T / self.allocation.scales
 
 
@@ -70,8 +70,10 @@ def genetic_allocation(
 
     Parameters
     ----------
-    plan, allocation
-        What is assembled, and the allocation that the run is held against.
+    plan
+        What is assembled.
+    allocation
+        The allocation that the run is held against.
     seeds
         Node of the seed tree.
     population, generations
@@ -94,7 +96,7 @@ def genetic_allocation(
     errors = allocation.gains.errors
     problem = angular_problem(plan, errors)
     found = minimize(
-        AngularSearch(problem),
+        _Searched(problem),
         GA(pop_size=population),
         ("n_gen", generations),
         seed=seeds.integer(),

@@ -33,7 +33,7 @@ def solved(problem) -> Solution:
     found = allocate(problem)
     assert isinstance(found, Solution)
     assert 0 <= found.gap + 1e-12 <= 1e-6
-    assert (problem.overload(found.zones, found.shared) / problem.scales).max() <= 1e-9
+    assert (problem.violation(found.zones, found.shared) / problem.scales).max() <= 1e-9
     return found
 
 
@@ -105,10 +105,10 @@ def test_the_published_points_of_the_clutch_break_its_requirement(published, los
     point, processes = np.array(own["published_t"]), np.array(own["published_processes"]) - 1
     cost, best = problem.cost(point, processes), solved(problem)
     assert cost == pytest.approx(own["published_point_evaluated"]["total"], rel=1e-12)
-    assert problem.overload(point, np.empty(0))[0] / 0.035 == pytest.approx(over, rel=1e-3)
+    assert problem.violation(point, np.empty(0))[0] / 0.035 == pytest.approx(over, rel=1e-3)
     assert (cost < best.bound) == (loss == "20")
     assert cost - best.cost == pytest.approx(own["gap_total"], abs=1e-7)
-    assert problem.cost(point, processes) + best.prices[0] * problem.overload(point, np.empty(0))[0] > best.cost
+    assert problem.cost(point, processes) + best.prices[0] * problem.violation(point, np.empty(0))[0] > best.cost
 
 
 def test_the_other_size_of_the_cage_has_the_optimum_of_the_file(published):
@@ -132,7 +132,7 @@ def test_the_other_size_of_the_cage_has_the_optimum_of_the_file(published):
 def test_the_gap_chain_equals_its_closed_form(published, variant):
     known, problem = published.CASES["gap_chain"]["computed"], published.gap_chain(variant)
     best = solved(problem)
-    assert problem.stacks[0].room == pytest.approx(known["sigma_max"], rel=1e-9)
+    assert problem.stacks[0].budget == pytest.approx(known["sigma_max"], rel=1e-9)
     assert best.cost == pytest.approx(known[variant]["cost"], rel=1e-9)
     np.testing.assert_allclose(best.zones, known[variant]["t"], rtol=3e-6)  # the cost is flat where it is least
     assert second_best(problem, best) is None

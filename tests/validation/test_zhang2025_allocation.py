@@ -34,12 +34,12 @@ def own_certificate(allocation, start: np.ndarray) -> float:
     squares = (errors.by_part**2).reshape(4, 3, 12)
     rows = np.concatenate([squares[:, 0] + squares[:, 1], squares[:, 2]])
     limits = np.concatenate([asked.tilt_limit, asked.rotation_limit]) / ARCSECOND
-    rooms = limits**2 - 9 * np.concatenate([noise[:, 0] + noise[:, 1], noise[:, 2]])
+    budgets = limits**2 - 9 * np.concatenate([noise[:, 0] + noise[:, 1], noise[:, 2]])
 
     def dual(prices: np.ndarray) -> float:
         each = rows.T @ prices
         s = np.clip((cost / (2 * each)) ** (2 / 3), 3.0**2, 120.0**2)
-        return float((cost / np.sqrt(s) + each * s).sum() - prices @ rooms)
+        return float((cost / np.sqrt(s) + each * s).sum() - prices @ budgets)
 
     logs, best = np.log(start), -np.inf
     for _ in range(5):

@@ -23,13 +23,13 @@ class StackProblem:
     allocation: AllocationProblem
     ladder: np.ndarray
     on_ladder: int = 0
-    room: float = np.inf
+    budget: float = np.inf
 
     objectives = (Objective(name="cost [cost units]"), Objective(name="spread [arcsec]"))
 
     @property
     def constraints(self):
-        return () if np.isinf(self.room) else ("room",)
+        return () if np.isinf(self.budget) else ("budget",)
 
     @cached_property
     def genes(self):
@@ -50,7 +50,7 @@ class StackProblem:
         zones = self.zones(designs)
         costs = [feature.processes[0].total(zones[:, at]) for at, feature in enumerate(self.allocation.features)]
         load = self.allocation.stacks[0].load(zones, np.empty((len(zones), 0)))
-        violation = np.empty((len(zones), 0)) if np.isinf(self.room) else (load / self.room - 1)[:, np.newaxis]
+        violation = np.empty((len(zones), 0)) if np.isinf(self.budget) else (load / self.budget - 1)[:, np.newaxis]
         return Objectives(
             values=np.column_stack([np.sum(costs, axis=0), load]),
             violation=violation,
@@ -63,27 +63,27 @@ class StackProblem:
 
     @cached_property
     def weights(self):
-        return self.allocation.stacks[0].spreading
+        return self.allocation.stacks[0].root_sum_square
 
     def _at_price(self, price):
         """Zones that minimise Σ b/t + price·Σ w²t²/2 between the bounds, feature by feature."""
         return np.clip((self.factors / (price * self.weights**2)) ** (1 / 3), LOWER, UPPER)
 
-    def _price(self, room):
+    def _price(self, budget):
         def excess(logarithm):
-            return np.linalg.norm(self.weights * self._at_price(np.exp(logarithm))) - room
+            return np.linalg.norm(self.weights * self._at_price(np.exp(logarithm))) - budget
 
         return np.exp(brentq(excess, -30, 30, xtol=1e-13, rtol=1e-15))
 
-    def optimum(self, room):
-        """Zones of least cost whose spread is the room."""
-        return self._at_price(self._price(room))
+    def optimum(self, budget):
+        """Zones of least cost whose spread is the budget."""
+        return self._at_price(self._price(budget))
 
-    def cost_bound(self, room):
-        """The dual function at the optimal price: no zones between the bounds that keep the room cost less."""
-        price = self._price(room)
+    def cost_bound(self, budget):
+        """The dual function at the optimal price: no zones between the bounds that keep the budget cost less."""
+        price = self._price(budget)
         zones = self._at_price(price)
-        return np.sum(self.factors / zones + price * (self.weights * zones) ** 2 / 2) - price * room**2 / 2
+        return np.sum(self.factors / zones + price * (self.weights * zones) ** 2 / 2) - price * budget**2 / 2
 
 
 def stack_problem(features=12, seed=5, **options) -> StackProblem:
@@ -95,6 +95,8 @@ def stack_problem(features=12, seed=5, **options) -> StackProblem:
         )
         for at, factor in enumerate(generator.uniform(0.5, 8, features))
     )
-    stack = Stack(name="spread", adding=np.zeros(features), spreading=generator.uniform(1, 20, features), room=np.inf)
+    stack = Stack(
+        name="spread", worst_case=np.zeros(features), root_sum_square=generator.uniform(1, 20, features), budget=np.inf
+    )
     options = {"ladder": np.array([0.5, 0.8, 1.25, 2.0]), **options}
     return StackProblem(AllocationProblem(features=made, stacks=(stack,)), **options)

@@ -151,9 +151,9 @@ def priced(tmp_path_factory):
     results = allocate_study(study, Silence())
     chosen = results.joint.chosen
     first, (side,) = chosen.checks[0], chosen.checks[1].sides
-    spreading = side.stack.spreading
-    more = float(spreading @ chosen.design[:-2])
-    stack = replace(side.stack, adding=spreading, room=side.stack.room + more)
+    root_sum_square = side.stack.root_sum_square
+    more = float(root_sum_square @ chosen.design[:-2])
+    stack = replace(side.stack, worst_case=root_sum_square, budget=side.stack.budget + more)
     checks = (first, replace(chosen.checks[1], sides=(replace(side, stack=stack),)))
     return replace(results, joint=replace(results.joint, chosen=replace(chosen, checks=checks)))
 

@@ -14,7 +14,7 @@ from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.design_space import ClearanceRange
 from tolalloc.allocation.fronts import exact_front
 from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
-from tolalloc.allocation.local_model import adding_stack, spreading_stack
+from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.search import SearchEffort, allocate
@@ -71,14 +71,14 @@ def test_clearances_and_amounts_map_one_to_one(prepared):
     assert modification.flank_clearance(prepared.reducer.cycloid_stage) == pytest.approx(1.04e-6, abs=5e-9)
 
 
-@pytest.mark.parametrize("build", [spreading_stack, adding_stack])
+@pytest.mark.parametrize("build", [root_sum_square_stack, worst_case_stack])
 def test_local_model_has_the_given_value_and_gradient(generator, build):
     design = np.append(generator.uniform(0.3, 2, 6), [1.0, 8.0])
     gradient = np.append(generator.uniform(0.5, 20, 6), [4.0, -1.0])
     stack = build("x", design, 2.5, gradient)
 
     def excess(at):
-        return stack.load(at[..., :-2], at[..., -2:]) - stack.room
+        return stack.load(at[..., :-2], at[..., -2:]) - stack.budget
 
     assert excess(design) == pytest.approx(2.5)
     step = 1e-6
@@ -87,9 +87,9 @@ def test_local_model_has_the_given_value_and_gradient(generator, build):
 
 
 def test_a_group_whose_larger_zone_relieves_a_limit_has_no_weight():
-    stack = spreading_stack("x", np.array([1.0, 1.0, 2.0, 8.0]), 0.0, np.array([3.0, -2.0, 1.0, 1.0]))
-    assert stack.spreading[0] > 0
-    assert stack.spreading[1] == 0
+    stack = root_sum_square_stack("x", np.array([1.0, 1.0, 2.0, 8.0]), 0.0, np.array([3.0, -2.0, 1.0, 1.0]))
+    assert stack.root_sum_square[0] > 0
+    assert stack.root_sum_square[1] == 0
 
 
 @pytest.mark.parametrize("limits", [Limits(upper=2.9), Limits(lower=-2.9), Limits(lower=-3.1, upper=2.95)])
@@ -112,7 +112,7 @@ def test_too_many_failed_units_never_show_a_yield():
         KnownTrial(np.arange(1500.0), failed=12)
     )
     assert not check.met
-    assert np.isfinite(check.sides[0].stack.room)
+    assert np.isfinite(check.sides[0].stack.budget)
 
 
 def test_too_few_units_for_a_yield_are_refused(prepared):
@@ -163,7 +163,7 @@ def test_a_worst_case_adds_and_a_lower_limit_turns_it():
     assert check.slack == -2.0
     for side in check.sides:
         assert side.predicted(KnownTrial(np.zeros(3)).design) == pytest.approx(side.excess)
-        np.testing.assert_allclose(side.stack.adding, [2.0, 1.5])
+        np.testing.assert_allclose(side.stack.worst_case, [2.0, 1.5])
         np.testing.assert_allclose(side.stack.slopes, [0.5, -0.25])
 
 
@@ -220,8 +220,8 @@ def test_gradient_of_the_quantile_agrees_with_common_random_numbers(prepared):
     design = space.uniform(0.6, prepared.reducer.modification)
     here = verifier.verify(design, "gradient")
     stack = here.sides[0].stack
-    gradient = np.append(stack.spreading**2 * design[:-2], stack.slopes)
-    gradient[:-2] /= np.sqrt((stack.spreading**2 * design[:-2] ** 2).sum())
+    gradient = np.append(stack.root_sum_square**2 * design[:-2], stack.slopes)
+    gradient[:-2] /= np.sqrt((stack.root_sum_square**2 * design[:-2] ** 2).sum())
     checked, differences = np.r_[0 : design.size - 2 : 3, design.size - 2, design.size - 1], []
     for at in checked:
         values = []
@@ -275,7 +275,7 @@ def test_a_step_keeps_every_local_model_and_the_region(three):
     stacks = aimed(found, [found])
     processes = verifier.space.process_positions(found.design)
     step = Programs(verifier.space, 4).step(stacks, processes, found.design, 2.5)
-    assert max(stack.load(step[:-2], step[-2:]) - stack.room for stack in stacks) < 1e-6
+    assert max(stack.load(step[:-2], step[-2:]) - stack.budget for stack in stacks) < 1e-6
     assert (step <= found.design * 2.5 * (1 + 1e-9)).all()
     assert step[-1] > found.design[-1]  # 8 µm are too few for a radial clearance above 2 µm
 
@@ -310,8 +310,8 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
     assert found.sides[1].value < found.outputs[RADIAL].min()
     for side in found.sides:
         assert side.predicted(found.design) == pytest.approx(side.excess)
-        assert (side.stack.spreading == 0).all()
-        assert (side.stack.adding > 0).any()
+        assert (side.stack.root_sum_square == 0).all()
+        assert (side.stack.worst_case > 0).any()
 
 
 def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):

@@ -117,7 +117,7 @@ def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_li
     clearances = np.array([1.0, 12.0])
     trade = modification_trade(response, allocation, clearances[:1], clearances[1:])
     chosen, stack = allocation.chosen.design, allocation.stacks[0]
-    left = stack.room - float(stack.load(chosen[:-2], chosen[-2:]))
+    left = stack.budget - float(stack.load(chosen[:-2], chosen[-2:]))
     limit = float(response(chosen[np.newaxis]).values[0, 0]) + left
     shape = allocation.chosen.design[:-2]
     factors = np.linspace(0.3, 1.2, 46)

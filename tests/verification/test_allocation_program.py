@@ -21,15 +21,15 @@ from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.exceptions import InputError
 
 KINDS = {
-    "spreading": {"stacks": 1},
-    "spreading twice": {"stacks": 2},
-    "adding too": {"stacks": 2, "adding": 0.3},
-    "shared variables": {"stacks": 2, "adding": 0.3, "shared": 2},
+    "root_sum_square": {"stacks": 1},
+    "root_sum_square twice": {"stacks": 2},
+    "worst_case too": {"stacks": 2, "worst_case": 0.3},
+    "shared variables": {"stacks": 2, "worst_case": 0.3, "shared": 2},
 }
 
 
 def overlapping_processes(generator: np.random.Generator, count: int, unit: float) -> tuple[Process, ...]:
-    """Return processes whose total costs cross, so that which is best depends on the room."""
+    """Return processes whose total costs cross, so that which is best depends on the budget."""
     low, fixed, factor, made = generator.uniform(0.01, 0.06), generator.uniform(5, 12), generator.uniform(0.02, 0.1), []
     for at in range(count):
         cost = (
@@ -51,7 +51,7 @@ def random_problem(
     features: int = 4,
     processes: int = 3,
     stacks: int = 1,
-    adding: float = 0.0,
+    worst_case: float = 0.0,
     shared: int = 0,
     unit: float = 1.0,
     tightness: float = 0.35,
@@ -71,14 +71,14 @@ def random_problem(
     for at in range(stacks):
         stack = Stack(
             name=f"stack {at}",
-            adding=adding * generator.uniform(0.1, 1, features),
-            spreading=generator.uniform(0.1, 2, features),
-            room=1.0,
+            worst_case=worst_case * generator.uniform(0.1, 1, features),
+            root_sum_square=generator.uniform(0.1, 2, features),
+            budget=1.0,
             slopes=0.01 * unit * generator.normal(size=shared),
         )
         none, low, high = np.zeros(shared), 0.0, 0.0
         low, high = float(stack.load(smallest, none)), float(stack.load(largest, none))
-        kept.append(replace(stack, room=low + tightness * (high - low)))
+        kept.append(replace(stack, budget=low + tightness * (high - low)))
     box = Shared(names=tuple(f"shared {at}" for at in range(shared)), lower=-np.ones(shared), upper=np.ones(shared))
     return AllocationProblem(features=made, stacks=tuple(kept), shared=box)
 
@@ -98,7 +98,7 @@ def least_by_scipy(problem: AllocationProblem, choice: tuple[int, ...]) -> float
         return np.concatenate([(np.array(own) + 2 * problem.losses * zones) * high, np.zeros(box.lower.size)])
 
     def left(x):
-        return -problem.overload(x[:count] * high, x[count:]) / problem.scales
+        return -problem.violation(x[:count] * high, x[count:]) / problem.scales
 
     run = minimize(
         cost,
@@ -140,7 +140,7 @@ def test_the_best_and_second_best_are_those_of_a_brute_force(kind, seed):
         assert tuple(found.processes) == choice
         assert found.bound <= cost * (1 + 1e-10)
         assert found.gap <= 1e-8
-        assert (problem.overload(found.zones, found.shared) / problem.scales).max() <= 1e-9
+        assert (problem.violation(found.zones, found.shared) / problem.scales).max() <= 1e-9
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -168,7 +168,7 @@ def test_no_random_design_is_cheaper_than_the_bound(kind, generator):
         made = [feature.processes[at] for feature, at in zip(problem.features, choice, strict=True)]
         zones = np.array([generator.uniform(process.minimum, process.maximum) for process in made])
         shared = generator.uniform(problem.shared.lower, problem.shared.upper)
-        if problem.overload(zones, shared).max() <= 0:
+        if problem.violation(zones, shared).max() <= 0:
             cheapest = min(cheapest, problem.cost(zones, choice))
     assert best.bound <= cheapest < 1.5 * best.cost
 
@@ -184,7 +184,7 @@ def test_a_bound_from_poor_prices_is_polished_to_the_cost(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_prices_are_the_derivatives_of_the_least_cost(kind):
-    """Central differences over ±0.01 % of the room and of each bound; their own error is of the order of 1e-7."""
+    """Central differences over ±0.01 % of the budget and of each bound; their own error is of the order of 1e-7."""
     problem = random_problem(11, features=6, **KINDS[kind])
     program, made = compiled(problem), [feature.processes[0] for feature in problem.features]
     least = np.array([process.minimum for process in made])
@@ -200,9 +200,11 @@ def test_prices_are_the_derivatives_of_the_least_cost(kind):
         return found.cost
 
     for at, stack in enumerate(problem.stacks):
-        step = 1e-4 * stack.room
+        step = 1e-4 * stack.budget
         ends = [
-            cost([*problem.stacks[:at], replace(stack, room=stack.room + way), *problem.stacks[at + 1 :]], low, high)
+            cost(
+                [*problem.stacks[:at], replace(stack, budget=stack.budget + way), *problem.stacks[at + 1 :]], low, high
+            )
             for way in (-step, step)
         ]
         assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(middle.prices[at], rel=1e-3, abs=1e-5 * scale[at])
@@ -231,7 +233,7 @@ def test_the_answer_is_the_same_in_millimetres_micrometres_and_metres(kind):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_least_infeasible_design_is_that_of_a_search_over_zones_and_shared_variables(seed):
-    problem = random_problem(seed, stacks=3, adding=0.3, shared=2, tightness=-0.6)
+    problem = random_problem(seed, stacks=3, worst_case=0.3, shared=2, tightness=-0.6)
     found = allocate(problem)
     assert isinstance(found, LeastInfeasible)
     low = np.array([feature.processes[0].minimum for feature in problem.features])
@@ -243,7 +245,7 @@ def test_the_least_infeasible_design_is_that_of_a_search_over_zones_and_shared_v
             bounds=[*[(1.0, 3.0)] * 4, (-1, 1), (-1, 1), (None, None)],
             constraints={
                 "type": "ineq",
-                "fun": lambda x: x[-1] - problem.overload(x[:4] * low, x[4:6]) / problem.scales,
+                "fun": lambda x: x[-1] - problem.violation(x[:4] * low, x[4:6]) / problem.scales,
             },
             method="SLSQP",
             options={"ftol": 1e-12},
@@ -252,18 +254,18 @@ def test_the_least_infeasible_design_is_that_of_a_search_over_zones_and_shared_v
     assert found.largest == pytest.approx(min(largest), rel=1e-7)
     assert found.largest > 0
     np.testing.assert_array_equal(found.zones, low)
-    worst = problem.stacks[int(np.argmax(found.overloads))].name
+    worst = problem.stacks[int(np.argmax(found.violations))].name
     assert worst in found.blocking
 
 
 def test_without_shared_variables_the_tightest_stack_blocks():
     problem = random_problem(1, stacks=2)
-    tight = replace(problem.stacks[1], room=problem.stacks[1].room / 50)
+    tight = replace(problem.stacks[1], budget=problem.stacks[1].budget / 50)
     found = allocate(replace(problem, stacks=(problem.stacks[0], tight)))
     assert isinstance(found, LeastInfeasible)
     assert found.blocking == ("stack 1",)
     load = float(tight.load(np.array([feature.processes[0].minimum for feature in problem.features]), np.empty(0)))
-    assert found.overloads[1] == pytest.approx(load / tight.room - 1, rel=1e-12)
+    assert found.violations[1] == pytest.approx(load / tight.budget - 1, rel=1e-12)
     assert compiled(problem).solve([problem.stacks[0], tight]) is None
     assert compiled(problem).least_infeasible([problem.stacks[0], tight]).blocking == ("stack 1",)
 
@@ -271,7 +273,7 @@ def test_without_shared_variables_the_tightest_stack_blocks():
 def test_a_room_that_only_the_smallest_zones_keep_has_that_one_design():
     problem = random_problem(4, processes=1)
     zones = np.array([feature.processes[0].minimum for feature in problem.features])
-    stack = replace(problem.stacks[0], room=float(problem.stacks[0].load(zones, np.empty(0))))
+    stack = replace(problem.stacks[0], budget=float(problem.stacks[0].load(zones, np.empty(0))))
     found = solved(replace(problem, stacks=(stack,)))
     np.testing.assert_allclose(found.zones, zones, rtol=1e-4)
     assert found.gap <= 1e-6
@@ -282,7 +284,7 @@ def test_the_feasible_shared_variables_of_the_linear_program_are_found():
     zones = (Process(name="only", cost=Reciprocal(factor=1.0), minimum=1.0, maximum=2.0),)
     one = np.ones(1)
     stacks = tuple(
-        Stack(name=name, adding=one, spreading=0 * one, room=1.25, slopes=np.array([slope]))
+        Stack(name=name, worst_case=one, root_sum_square=0 * one, budget=1.25, slopes=np.array([slope]))
         for name, slope in (("up", 1.0), ("down", -1.0))
     )
     shared = Shared(names=("offset",), lower=np.array([-1.0]), upper=np.array([3.0]))
@@ -291,14 +293,14 @@ def test_the_feasible_shared_variables_of_the_linear_program_are_found():
     assert found.shared[0] == pytest.approx(0.0, abs=1e-6)
     assert found.zones[0] == pytest.approx(1.25, rel=1e-9)
     np.testing.assert_allclose(found.prices.sum(), 1 / 1.25**2, rtol=1e-6)
-    tight = replace(problem, stacks=tuple(replace(stack, room=0.9) for stack in stacks))
+    tight = replace(problem, stacks=tuple(replace(stack, budget=0.9) for stack in stacks))
     known = linprog([0, 1], A_ub=[[1 / 0.9, -1], [-1 / 0.9, -1]], b_ub=[-0.1 / 0.9] * 2, bounds=[(-1, 3), (None, None)])
     assert least_infeasible(tight).largest == pytest.approx(known.fun, rel=1e-9)
     assert least_infeasible(tight).blocking == ("up", "down")
 
 
 def test_many_features_are_allocated_with_a_proof_and_no_neighbour_is_cheaper():
-    problem = random_problem(1, features=12, stacks=2, adding=0.2)
+    problem = random_problem(1, features=12, stacks=2, worst_case=0.2)
     best = solved(problem)
     second = second_best(problem, best)
     assert best.gap <= 1e-7
@@ -319,7 +321,9 @@ def test_alike_features_are_not_told_apart():
     features = tuple(replace(model, name=f"feature {at}", loss=0.0) for at in range(12))
     low = np.sqrt(12) * model.processes[0].minimum
     high = np.sqrt(12) * max(process.maximum for process in model.processes)
-    stack = Stack(name="sum", adding=np.zeros(12), spreading=np.ones(12), room=float(low + 0.2 * (high - low)))
+    stack = Stack(
+        name="sum", worst_case=np.zeros(12), root_sum_square=np.ones(12), budget=float(low + 0.2 * (high - low))
+    )
     problem = AllocationProblem(features=features, stacks=(stack,))
     best = solved(problem)
     second = second_best(problem, best)
@@ -338,7 +342,7 @@ def test_alike_features_are_not_told_apart():
 
 
 def test_a_search_that_ends_early_says_so_in_its_gap():
-    problem = random_problem(2, features=12, stacks=2, adding=0.2)
+    problem = random_problem(2, features=12, stacks=2, worst_case=0.2)
     early, whole = allocate(problem, most_nodes=1), solved(problem)
     assert isinstance(early, Solution)
     assert early.bound <= whole.cost <= early.cost
@@ -350,12 +354,12 @@ def test_the_front_falls_with_the_room_and_is_proven():
     program, stack = compiled(problem), problem.stacks[0]
     low = float(stack.load(program.lower, np.empty(0)))
     high = float(stack.load(program.upper, np.empty(0)))
-    rooms = np.linspace(0.9 * low, high, 12)
-    found = front(program, problem.stacks, 0, rooms)
-    assert [design is None for design in found] == list(rooms < low)
+    budgets = np.linspace(0.9 * low, high, 12)
+    found = front(program, problem.stacks, 0, budgets)
+    assert [design is None for design in found] == list(budgets < low)
     costs = np.array([design.cost for design in found if design is not None])
     assert (np.diff(costs) <= 1e-9 * costs[1:]).all()
-    assert (np.diff(costs, 2) >= -1e-8 * costs[0]).all()  # convex in the room
+    assert (np.diff(costs, 2) >= -1e-8 * costs[0]).all()  # convex in the budget
     assert max(design.gap for design in found if design is not None) <= 1e-8
 
 
@@ -364,7 +368,7 @@ def test_the_program_is_compiled_once(monkeypatch):
     program = compiled(problem)
     program.solve(problem.stacks)
     monkeypatch.setattr("cvxpy.problems.problem.Problem._construct_chain", None)
-    again = program.solve([replace(stack, room=1.1 * stack.room) for stack in problem.stacks])
+    again = program.solve([replace(stack, budget=1.1 * stack.budget) for stack in problem.stacks])
     assert again is not None
 
 
@@ -390,7 +394,7 @@ def test_a_cost_that_is_not_convex_is_refused_by_name():
     for refuse in (lambda: allocate(bad), lambda: compiled(bad), lambda: cost_bound(bad, np.ones(1), np.ones(4))):
         with pytest.raises(InputError, match=r"feature bore: process stepwise.*not convex"):
             refuse()
-    with pytest.raises(InputError, match="stack up: adding"):
-        Stack(name="up", adding=np.array([-1.0]), spreading=np.ones(1), room=1.0)
+    with pytest.raises(InputError, match="stack up: worst_case"):
+        Stack(name="up", worst_case=np.array([-1.0]), root_sum_square=np.ones(1), budget=1.0)
     with pytest.raises(InputError, match="loss"):
         replace(problem.features[0], loss=-1.0)

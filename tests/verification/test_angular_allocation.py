@@ -37,7 +37,7 @@ EXPONENTIAL = asking(
 
 
 def numbers(plan, allocation):
-    """Rows, room² and priced effort of an allocation over tolerances² in arcsec², from the covariance itself."""
+    """Rows, budget² and priced effort of an allocation over tolerances² in arcsec², from the covariance itself."""
     errors = allocation.gains.errors
     states = [np.array(own) for own in ([0, 1], [3, 4], [6, 7], [9, 10], [2], [5], [8], [11])]
     limits = np.concatenate([plan.requirements.tilt_limit, plan.requirements.rotation_limit]) / ARCSECOND
@@ -65,7 +65,7 @@ def test_optimum_is_proven_and_keeps_the_limits(plan, precision):
 @pytest.mark.parametrize("plan", [PLAN, PRICED, EXPONENTIAL], ids=["reciprocal", "priced", "exponential"])
 def test_sequential_quadratic_programming_finds_the_same(plan):
     found, asked = allocate_angles(plan), plan.requirements
-    rows, rooms, losses = numbers(plan, found)
+    rows, budgets, losses = numbers(plan, found)
 
     def cost(t):
         if asked.form == "reciprocal":
@@ -80,7 +80,7 @@ def test_sequential_quadratic_programming_finds_the_same(plan):
             start,
             method="SLSQP",
             bounds=[(3, 120)] * 12,
-            constraints={"type": "ineq", "fun": lambda t: 1 - rows @ t**2 / rooms},
+            constraints={"type": "ineq", "fun": lambda t: 1 - rows @ t**2 / budgets},
             options={"maxiter": 500, "ftol": 1e-13},
         )
         for start in SeedTree(3).generator().uniform(3, 30, (4, 12))
@@ -91,11 +91,11 @@ def test_sequential_quadratic_programming_finds_the_same(plan):
 
 def test_no_allowed_tolerances_are_cheaper_than_the_bound():
     found = allocate_angles(PRICED)
-    rows, rooms, losses = numbers(PRICED, found)
+    rows, budgets, losses = numbers(PRICED, found)
     t = SeedTree(1).generator().uniform(3, 120, (2000, 12))
     # The largest multiple of each draw that keeps all limits.
-    t = np.clip(t / np.sqrt((t**2 @ rows.T / rooms).max(axis=1, keepdims=True)), 3, 120)
-    t = t[(t**2 @ rows.T <= rooms).all(axis=1)]
+    t = np.clip(t / np.sqrt((t**2 @ rows.T / budgets).max(axis=1, keepdims=True)), 3, 120)
+    t = t[(t**2 @ rows.T <= budgets).all(axis=1)]
     assert len(t) > 1000
     factor = PRICED.requirements.factor.ravel() / ARCSECOND
     constant = PRICED.requirements.effort_price * found.gains.errors.noise_effort

@@ -18,7 +18,7 @@ LABELS = tuple(f"R′10 {zone:g} µm" for zone in LADDER)
 
 
 def random_problem(seed, features=5, steps=3, processes=2, shared=0, mixed=True):
-    """Stacks of all kinds whose rooms a choice in the middle of the ladders just fills or slightly misses."""
+    """Stacks of all kinds whose budgets a choice in the middle of the ladders just fills or slightly misses."""
     random = np.random.default_rng(seed)
     made = []
     for number in range(features):
@@ -41,11 +41,21 @@ def random_problem(seed, features=5, steps=3, processes=2, shared=0, mixed=True)
         weights = np.exp(random.normal(0, 0.7, (2, features))) * (random.random((2, features)) < 0.7)
         weights *= np.array([[adds], [spreads]])
         slopes = random.normal(0, 0.5, shared)
-        stack = Stack(name=f"stack {number}", adding=weights[0], spreading=weights[1], room=0.0, slopes=slopes)
+        stack = Stack(
+            name=f"stack {number}", worst_case=weights[0], root_sum_square=weights[1], budget=0.0, slopes=slopes
+        )
         zones = np.array([own[random.integers(len(own))].zone for own in options])
         point = np.array([random.choice(grid) for grid in grids])
-        room = float(stack.load(zones, point)) * random.choice([0.6, 0.9, 1.2])
-        stacks.append(Stack(name=stack.name, adding=stack.adding, spreading=stack.spreading, room=room, slopes=slopes))
+        budget = float(stack.load(zones, point)) * random.choice([0.6, 0.9, 1.2])
+        stacks.append(
+            Stack(
+                name=stack.name,
+                worst_case=stack.worst_case,
+                root_sum_square=stack.root_sum_square,
+                budget=budget,
+                slopes=slopes,
+            )
+        )
     names = tuple(f"clearance {at}" for at in range(shared))
     variables = Shared(names=names, lower=np.full(shared, -1.0), upper=np.full(shared, 1.0))
     problem = AllocationProblem(features=tuple(made), stacks=tuple(stacks), shared=variables)
@@ -53,7 +63,7 @@ def random_problem(seed, features=5, steps=3, processes=2, shared=0, mixed=True)
 
 
 def all_choices(case):
-    """Cost, largest overload over the stack's scale, and processes of every combination."""
+    """Cost, largest violation over the stack's scale, and processes of every combination."""
     counts = [*map(len, case.options), *map(len, case.grids)]
     chosen = np.indices(counts).reshape(len(counts), -1)
     features = len(case.options)
@@ -70,14 +80,14 @@ def all_choices(case):
         [np.empty((chosen.shape[1], 0)), *(g[at] for g, at in zip(case.grids, chosen[features:], strict=True))]
     )
     over = [
-        (stack.load(fields[1], points) - stack.room) / scale
+        (stack.load(fields[1], points) - stack.budget) / scale
         for stack, scale in zip(case.problem.stacks, case._scales, strict=True)
     ]
     return fields[0].sum(axis=1), np.max(over, axis=0), fields[2]
 
 
 def keeps(case, solution):
-    over = case.problem.overload(solution.zones, solution.shared)
+    over = case.problem.violation(solution.zones, solution.shared)
     return np.all(over <= 1e-12 * case._scales)
 
 
@@ -104,22 +114,25 @@ def test_both_outcomes_are_among_the_random_problems():
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_the_least_overloaded_choice_is_the_one_of_all_combinations(seed):
+def test_the_least_violating_choice_is_the_one_of_all_combinations(seed):
     case = random_problem(seed, features=4, shared=seed % 3)
     least = all_choices(case)[1].min()
-    found = case.least_overloaded()
+    found = case.least_violating()
     over = -found.slack / case._scales
     assert over.max() == pytest.approx(least, rel=1e-9)
     assert found.tightest == case.problem.stacks[int(over.argmax())].name
     assert np.isinf(found.bound) == (least > 1e-12)
 
 
-def one_stack(zones, room, spreading=0.0, adding=1.0, cost=1.0):
+def one_stack(zones, budget, root_sum_square=0.0, worst_case=1.0, cost=1.0):
     features = len(zones)
     process = Process(name="ground", cost=Reciprocal(factor=cost), minimum=1e-3, maximum=1e3)
     made = tuple(Feature(name=f"feature {at}", processes=(process,)) for at in range(features))
     stack = Stack(
-        name="sum", adding=np.full(features, adding), spreading=np.full(features, spreading), room=float(room)
+        name="sum",
+        worst_case=np.full(features, worst_case),
+        root_sum_square=np.full(features, root_sum_square),
+        budget=float(budget),
     )
     options = tuple(
         feature_options(feature, np.array(own), [f"{zone:g}" for zone in own])
@@ -128,19 +141,19 @@ def one_stack(zones, room, spreading=0.0, adding=1.0, cost=1.0):
     return DiscreteProblem(problem=AllocationProblem(features=made, stacks=(stack,)), options=options)
 
 
-@pytest.mark.parametrize(("adding", "spreading"), [(1.0, 0.0), (0.0, 1.0), (1.0, 0.5)])
+@pytest.mark.parametrize(("worst_case", "root_sum_square"), [(1.0, 0.0), (0.0, 1.0), (1.0, 0.5)])
 @pytest.mark.parametrize("missing", [1e-11, 1e-9, 1e-7])
-def test_what_breaks_its_room_by_less_than_a_solver_sees_is_not_taken(adding, spreading, missing):
+def test_what_breaks_its_budget_by_less_than_a_solver_sees_is_not_taken(worst_case, root_sum_square, missing):
     zones = [[1.0, 2.0, 3.0]] * 6
-    loose = one_stack(zones, 1.0, spreading, adding).problem.stacks[0].load(np.full(6, 2.0), np.empty(0))
-    case = one_stack(zones, loose * (1 - missing), spreading, adding)
+    loose = one_stack(zones, 1.0, root_sum_square, worst_case).problem.stacks[0].load(np.full(6, 2.0), np.empty(0))
+    case = one_stack(zones, loose * (1 - missing), root_sum_square, worst_case)
     solution = case.solve()
     costs, over, _ = all_choices(case)
     allowed = costs[over <= 1e-12]
     assert keeps(case, solution)
     assert solution.cost == pytest.approx(min(allowed), rel=1e-12)
     assert not np.array_equal(solution.zones, np.full(6, 2.0))
-    exactly = one_stack(zones, loose, spreading, adding)
+    exactly = one_stack(zones, loose, root_sum_square, worst_case)
     costs, over, _ = all_choices(exactly)
     assert exactly.solve().cost == pytest.approx(costs[over <= 1e-12].min(), rel=1e-12)
 
@@ -164,7 +177,7 @@ def test_a_locked_feature_keeps_its_only_option():
     locked = Option(process=0, zone=5.3, label="locked", cost=free.problem.features[0].loss * 5.3**2)
     case = DiscreteProblem(problem=free.problem, options=((locked,), *free.options[1:]))
     solution = case.solve()
-    assert (solution is None) == (case.least_overloaded().bound == np.inf)
+    assert (solution is None) == (case.least_violating().bound == np.inf)
     wide = DiscreteProblem(
         problem=AllocationProblem(features=free.problem.features, stacks=()),
         options=((locked,), *free.options[1:]),
@@ -201,14 +214,16 @@ def large_program(seed, features=30, steps=8):
     weights = np.exp(random.normal(0, 0.7, (4, 2, features))) * (random.random((4, 2, features)) < 0.6)
     weights *= np.array([[0, 1], [0, 1], [1, 0], [0.3, 1]])[..., np.newaxis]
     loads = [add @ zones[:, 3] + np.linalg.norm(spread * zones[:, 3]) for add, spread in weights]
-    room = np.array(loads) * random.uniform(0.8, 1.2, 4)
-    adding, spreading = np.moveaxis(weights / room[:, np.newaxis, np.newaxis], 1, 0)[..., np.newaxis] * zones
+    budget = np.array(loads) * random.uniform(0.8, 1.2, 4)
+    worst_case, root_sum_square = (
+        np.moveaxis(weights / budget[:, np.newaxis, np.newaxis], 1, 0)[..., np.newaxis] * zones
+    )
     return MultipleChoice(
         group=np.repeat(np.arange(features), steps),
         cost=cost.ravel(),
-        adding=adding.reshape(4, -1),
-        squares=spreading.reshape(4, -1) ** 2,
-        room=np.ones(4),
+        worst_case=worst_case.reshape(4, -1),
+        squares=root_sum_square.reshape(4, -1) ** 2,
+        budget=np.ones(4),
     )
 
 

@@ -141,7 +141,7 @@ def test_the_choice_is_the_best_of_all_there_are(prepared):
         clearances = np.array([equidistant - shift * stage.flank_ratio, equidistant - shift])
         if np.all((clearances >= shared.lower - 1e-9) & (clearances <= shared.upper + 1e-9)):
             loads = [
-                stack.load(scales, np.tile(clearances, (len(scales), 1))) - stack.room * (1 + 1e-9)
+                stack.load(scales, np.tile(clearances, (len(scales), 1))) - stack.budget * (1 + 1e-9)
                 for stack in kept_stacks(found.chosen, found.tried, margin=0.0)
             ]
             allowed |= np.all(np.array(loads) <= 1e-9, axis=0)
@@ -181,7 +181,7 @@ def test_a_locked_member_does_not_change_the_zones_of_its_group(prepared):
     np.testing.assert_allclose(zones / UM, [0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.2, 4, 5, 6.3])
 
 
-def test_an_unreachable_limit_ends_with_the_least_overloaded_choice(prepared):
+def test_an_unreachable_limit_ends_with_the_least_violating_choice(prepared):
     verifier = verifier_of(prepared, limit=2.0)
     found = allocate_grades(verifier, start_of(verifier, scale=0.2), 8)
     assert not found.chosen.met

@@ -30,11 +30,11 @@ def stack() -> StackProblem:
 def exact(stack):
     """Genes of 50 designs on the exact front, from end to end."""
     ends = [np.linalg.norm(stack.weights * zone) for zone in (LOWER * 1.0001, UPPER * 0.9999)]
-    return np.log([stack.optimum(room) for room in np.geomspace(*ends, 50)])
+    return np.log([stack.optimum(budget) for budget in np.geomspace(*ends, 50)])
 
 
 def cheaper_than_certified(stack, losses) -> float:
-    return max(float(stack.cost_bound(room) / cost - 1) for cost, room in losses)
+    return max(float(stack.cost_bound(budget) / cost - 1) for cost, budget in losses)
 
 
 def digest(found) -> str:
@@ -45,15 +45,15 @@ def digest(found) -> str:
 
 
 def test_the_closed_form_meets_its_dual_bound(stack, exact):
-    for cost, room in stack(exact).values:
-        assert cost == pytest.approx(stack.cost_bound(room), rel=1e-6)
+    for cost, budget in stack(exact).values:
+        assert cost == pytest.approx(stack.cost_bound(budget), rel=1e-6)
 
 
-@pytest.mark.parametrize("room", [10.0, 40.0, 150.0])
-def test_the_closed_form_is_what_the_convex_program_proves(stack, room):
+@pytest.mark.parametrize("budget", [10.0, 40.0, 150.0])
+def test_the_closed_form_is_what_the_convex_program_proves(stack, budget):
     problem = stack.allocation
-    proven = process_choice.allocate(replace(problem, stacks=(replace(problem.stacks[0], room=room),)))
-    assert proven.cost == pytest.approx(stack.cost_bound(room), rel=1e-6)
+    proven = process_choice.allocate(replace(problem, stacks=(replace(problem.stacks[0], budget=budget),)))
+    assert proven.cost == pytest.approx(stack.cost_bound(budget), rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -112,7 +112,7 @@ class Sphere:
     """Three objectives whose front is an eighth of the unit sphere; the last one is to be made large."""
 
     failing: bool = False
-    room: float = 0.0
+    budget: float = 0.0
     genes = Genes(names=tuple("abcdef"), lower=np.zeros(6), upper=np.ones(6), integer=np.zeros(6, bool))
     objectives = (Objective(name="f [-]"), Objective(name="g [-]"), Objective(name="h [-]", better="large"))
     constraints = ("always short", "kept")
@@ -123,7 +123,7 @@ class Sphere:
         values = radius[:, np.newaxis] * np.column_stack([np.cos(u) * np.cos(v), np.cos(u) * np.sin(v), -np.sin(u)])
         status = ((designs[:, 3] > 0.6) & self.failing).astype(np.uint8)
         values[status > 0] = np.nan
-        short = np.full(len(designs), self.room)
+        short = np.full(len(designs), self.budget)
         return Objectives(values=values, violation=np.column_stack([short, short - 1]), status=status)
 
 
@@ -142,9 +142,9 @@ def test_three_objectives_reach_the_sphere_and_cover_it():
 
 
 def test_searches_of_three_objectives_have_the_same_bits_while_every_design_is_violating():
-    once, again = (search(Sphere(room=0.5), np.empty((0, 6)), SeedTree(2), 24, 6) for _ in range(2))
+    once, again = (search(Sphere(budget=0.5), np.empty((0, 6)), SeedTree(2), 24, 6) for _ in range(2))
     assert digest(once) == digest(again)
-    assert digest(once) != digest(search(Sphere(room=0.5), np.empty((0, 6)), SeedTree(3), 24, 6))
+    assert digest(once) != digest(search(Sphere(budget=0.5), np.empty((0, 6)), SeedTree(3), 24, 6))
 
 
 # --- failed and violating designs ---
@@ -160,17 +160,17 @@ def test_a_failed_design_loses_against_every_good_one():
 
 def test_without_an_allowed_design_the_least_violating_one_tells_what_blocks(stack):
     least = np.linalg.norm(stack.weights * LOWER)
-    found = search(replace(stack, room=0.9 * least), np.empty((0, 12)), SeedTree(0), 40, 80)
+    found = search(replace(stack, budget=0.9 * least), np.empty((0, 12)), SeedTree(0), 40, 80)
     assert not len(found.front(40).designs)
     nearest = found.least_violating()
-    assert nearest.blocking == "room"
+    assert nearest.blocking == "budget"
     assert nearest.violation[0] >= 1 / 0.9 - 1 - 1e-12
     assert nearest.violation[0] == pytest.approx(1 / 0.9 - 1, abs=0.02)
     np.testing.assert_allclose(np.exp(nearest.design), LOWER, rtol=0.2)
 
 
 def test_the_blocking_constraint_is_the_one_violated_most():
-    found = search(Sphere(room=0.5), np.empty((0, 6)), SeedTree(0), 12, 2)
+    found = search(Sphere(budget=0.5), np.empty((0, 6)), SeedTree(0), 12, 2)
     assert found.least_violating().blocking == "always short"
     allowed = search(Sphere(), np.empty((0, 6)), SeedTree(0), 12, 2)
     assert allowed.least_violating().blocking is None

@@ -46,7 +46,7 @@ SMALL = (24, 15)
 
 def interrupt(stack, path, every=24):
     Interrupted.calls = 0
-    broken = Interrupted(**{name: getattr(stack, name) for name in ("allocation", "ladder", "on_ladder", "room")})
+    broken = Interrupted(**{name: getattr(stack, name) for name in ("allocation", "ladder", "on_ladder", "budget")})
     with pytest.raises(KeyboardInterrupt):
         search(broken, np.empty((0, 12)), SeedTree(0), *SMALL, checkpoint=Checkpoint(path=path, every=every))
 

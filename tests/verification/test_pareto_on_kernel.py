@@ -70,7 +70,11 @@ def test_other_requirements_are_violated_by_what_their_models_say(prepared, quan
     space = prepared.space
     groups, design = len(space.groups), space.uniform(1.0, prepared.reducer.modification)
     stack = Stack(
-        name="lost motion", adding=np.zeros(groups), spreading=np.ones(groups), room=2.0, slopes=np.array([0.0, 0.1])
+        name="lost motion",
+        worst_case=np.zeros(groups),
+        root_sum_square=np.ones(groups),
+        budget=2.0,
+        slopes=np.array([0.0, 0.1]),
     )
     side = Side(sign=1, limit=0.5, value=0.4, doubt=0.01, scale=0.5, stack=stack)
     problem = DesignProblem(space=space, quantile=quantile, further=(RADIAL_CLEARANCE,), sides=(side,))

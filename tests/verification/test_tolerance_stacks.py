@@ -35,7 +35,7 @@ def test_every_method_adds_up_as_its_formula_says():
         (inertial("gap", SLOPES, 1.0, capability=1.0), np.sqrt(3 + 9) * SQUARES),
     ):
         assert stack.load(ZONES, NONE) == pytest.approx(expected, rel=1e-14)
-        assert stack.room == 1.0
+        assert stack.budget == 1.0
 
 
 def capability(inertias: np.ndarray, angles: np.ndarray, half_width: float) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_the_room_of_a_yield_is_the_deviation_that_just_keeps_it(limits, mean, s
     stack = yield_root_sum_square("gap", SLOPES, limits, mean=mean, share=share, deviations=4.0)
     low = -np.inf if limits.lower is None else limits.lower
     high = np.inf if limits.upper is None else limits.upper
-    outside = norm.sf((high - mean) / stack.room) + norm.cdf((low - mean) / stack.room)
+    outside = norm.sf((high - mean) / stack.budget) + norm.cdf((low - mean) / stack.budget)
     assert outside == pytest.approx(1 - share, rel=1e-6)
     assert stack.load(ZONES, NONE) == pytest.approx(SQUARES / 4, rel=1e-14)
 

@@ -33,6 +33,6 @@ def _factor(tried: VerifiedDesign) -> float:
     factors = []
     for side in tried.sides:
         rise = float(side.stack.load(tried.design[:-2], np.zeros(2)))
-        room = -float(side.predicted(tried.design)) - side.doubt
-        factors.append(1 + room / max(rise, 0.1 * side.scale))
+        left = -float(side.predicted(tried.design)) - side.doubt
+        factors.append(1 + left / max(rise, 0.1 * side.scale))
     return float(np.clip(min(factors), 0.4, 2.5))

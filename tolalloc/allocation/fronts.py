@@ -56,21 +56,22 @@ def exact_front(
     space
         The design variables.
     stacks
-        Convex models with the room of the limits, that of the peak-to-peak first.
+        Convex models with the budget of the limits, that of the peak-to-peak first.
     limit
         Largest peak-to-peak allowed [arcsec].
     shares
         The limits over that one [-].
     """
-    rooms = stacks[0].room + (shares - 1) * limit
+    budgets = stacks[0].budget + (shares - 1) * limit
     if space.has_choices:
         chosen = [
-            process_choice.allocate(space.problem((replace(stacks[0], room=room), *stacks[1:]))) for room in rooms
+            process_choice.allocate(space.problem((replace(stacks[0], budget=budget), *stacks[1:])))
+            for budget in budgets
         ]
         solved = [found if isinstance(found, Solution) else None for found in chosen]
     else:
         program = Programs(space, len(stacks)).of(np.zeros(len(space.groups), dtype=int))
-        solved = [*front(program, stacks, 0, rooms)]
+        solved = [*front(program, stacks, 0, budgets)]
     known = [(share, found) for share, found in zip(shares.tolist(), solved, strict=True) if found]
     designs = [np.concatenate([found.zones, found.shared]) for _, found in known]
     return ConvexFront(
@@ -113,7 +114,7 @@ def searched_front(
     best
         The verified design.
     stacks
-        Its local models with at least the room that it takes; designs must keep those of the other requirements.
+        Its local models with at least the budget that it takes; designs must keep those of the other requirements.
     exact
         Exact front of its models, from which the search starts.
     seeds
@@ -127,9 +128,9 @@ def searched_front(
     checkpoint
         Where the kernel's answers are kept.
     """
-    # A load that is its own room may lie beyond it by rounding.
+    # A load that is its own budget may lie beyond it by rounding.
     others = zip(best.sides[1:], stacks[1:], strict=True)
-    sides = tuple(replace(side, stack=replace(own, room=own.room + 1e-9 * side.scale)) for side, own in others)
+    sides = tuple(replace(side, stack=replace(own, budget=own.budget + 1e-9 * side.scale)) for side, own in others)
     return pareto_front(
         replace(response, spread=best.spread),
         LocalQuantile(side=best.sides[0]),

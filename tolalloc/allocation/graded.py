@@ -140,7 +140,11 @@ class _Grid:
         shared, still = self.space.shared, np.zeros(len(self.options))
         ranges = tuple(
             Stack(
-                name=f"{name}, range", adding=still, spreading=still, room=sign * bound + _ROUNDING, slopes=sign * row
+                name=f"{name}, range",
+                worst_case=still,
+                root_sum_square=still,
+                budget=sign * bound + _ROUNDING,
+                slopes=sign * row,
             )
             for name, row, low, high in zip(shared.names, self._to_clearance, shared.lower, shared.upper, strict=True)
             for sign, bound in ((1.0, float(high)), (-1.0, float(low)))
@@ -158,11 +162,11 @@ class _Grid:
         """Return the design of a choice."""
         return np.concatenate([found.zones, self._to_clearance @ found.shared])
 
-    def least_overloaded(self, stacks: tuple[Stack, ...]) -> Float[np.ndarray, " variable"]:
-        """Return the tightest zones with the clearances, inside their range, whose largest overload is least."""
+    def least_violating(self, stacks: tuple[Stack, ...]) -> Float[np.ndarray, " variable"]:
+        """Return the tightest zones with the clearances, inside their range, whose largest violation is least."""
         tightest = np.array([min(own.zone for own in options) for options in self.options])
         problem = self.space.problem(stacks)
-        largest = [(problem.overload(tightest, pair) / problem.scales).max() for pair in self._clearances]
+        largest = [(problem.violation(tightest, pair) / problem.scales).max() for pair in self._clearances]
         return np.append(tightest, self._clearances[int(np.argmin(largest))])
 
 
@@ -190,7 +194,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     Every choice is the proven best one of the local models; fresh units judge it, and the next one is made on the
     models around it. How far inside the limits the models must aim is found by bisection, in standard errors: further
     after a choice that missed a limit, less far after one that kept them all. Where the models let no choice keep the
-    limits, the one that overloads them least is tried, and where that misses them again, it is the answer. A scale is
+    limits, the one that violates them least is tried, and where that misses them again, it is the answer. A scale is
     the same factor on the shared zone as on the zones of the members, so the start keeps its scales.
     """
     space = with_shared_zones(verifier.space)
@@ -201,7 +205,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         margin = missed + 1.0 if kept == np.inf else (missed + kept) / 2
         stacks = _inside(tried[-1], tried, margin)
         found = grid.problem(stacks).solve()
-        choice = grid.design(found) if found else grid.least_overloaded(stacks)
+        choice = grid.design(found) if found else grid.least_violating(stacks)
         judged = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
         if judged and not judged.met and found is None:
             break  # no margin makes any other choice
@@ -220,9 +224,9 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
 
 
 def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> tuple[Stack, ...]:
-    """Return the models of a design with a room that is smaller by so many standard errors."""
+    """Return the models of a design with a budget that is smaller by so many standard errors."""
     return tuple(
-        replace(stack, room=stack.room - margin * side.doubt)
+        replace(stack, budget=stack.budget - margin * side.doubt)
         for stack, side in zip(aimed(last, tried), last.sides, strict=True)
     )
 
@@ -237,9 +241,10 @@ def _labels(grid: _Grid, chosen: VerifiedDesign) -> tuple[str, ...]:
 
 def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteSolution:
     """Return the cheapest choice that keeps the limits, by the models of the chosen one."""
-    # A load that is its own room may lie beyond it by rounding.
+    # A load that is its own budget may lie beyond it by rounding.
     stacks = tuple(
-        replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept_stacks(chosen, tried, margin=0.0)
+        replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget))
+        for stack in kept_stacks(chosen, tried, margin=0.0)
     )
     found = grid.problem(stacks).solve()
     if found is None:

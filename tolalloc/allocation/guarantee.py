@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import beta, kurtosis, norm, skew
 
-from tolalloc.allocation.local_model import Side, adding_stack, spreading_stack
+from tolalloc.allocation.local_model import Side, root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
@@ -115,7 +115,7 @@ class AtYield:
             value=sign * (value if enough else np.inf),
             doubt=_order_statistic_error(turned, turned.size - left_out),
             scale=_scale(trial, limit),
-            stack=_spreading(trial, sign, limit, value),
+            stack=_root_sum_square(trial, sign, limit, value),
         )
 
 
@@ -172,7 +172,7 @@ class AtCpk:
             value=sign * value,
             doubt=3 * error * deviation,
             scale=_scale(trial, limit),
-            stack=_spreading(trial, sign, limit, value),
+            stack=_root_sum_square(trial, sign, limit, value),
         )
 
     def _needed(self, turned: Float[np.ndarray, " unit"]) -> tuple[float, float]:
@@ -198,7 +198,7 @@ class WorstCase:
 
     def _side(self, trial: Trial, sign: Literal[1, -1], limit: float) -> Side:
         value, gradient = trial.worst(sign)
-        stack = adding_stack(_name(trial, sign), trial.design, sign * (value - limit), sign * gradient)
+        stack = worst_case_stack(_name(trial, sign), trial.design, sign * (value - limit), sign * gradient)
         return Side(
             sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), scale=_scale(trial, limit), stack=stack
         )
@@ -239,10 +239,10 @@ def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> fl
     return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
 
 
-def _spreading(trial: Trial, sign: int, limit: float, value: float) -> Stack:
+def _root_sum_square(trial: Trial, sign: int, limit: float, value: float) -> Stack:
     """Return the local model of mean + spread·σ, which is the turned value; theory page, equation (24)."""
     turned, (known, derivative) = sign * trial.values, trial.derived()
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
     standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
     gradient = sign * (1.0 + spread * standard) @ derivative / known.size
-    return spreading_stack(_name(trial, sign), trial.design, value - sign * limit, gradient)
+    return root_sum_square_stack(_name(trial, sign), trial.design, value - sign * limit, gradient)

@@ -28,7 +28,7 @@ class Side:
         What makes requirements comparable: the limit, or the deviation of the units where that is larger
         [unit of the output].
     stack
-        Convex model around the design; its load less its room is the predicted `excess`.
+        Convex model around the design; its load less its budget is the predicted `excess`.
     """
 
     sign: int
@@ -50,13 +50,13 @@ class Side:
 
     def predicted(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the excess that the model predicts, negative inside the limit [unit of the output]."""
-        return np.asarray(self.stack.load(designs[..., :-2], designs[..., -2:]) - self.stack.room)
+        return np.asarray(self.stack.load(designs[..., :-2], designs[..., -2:]) - self.stack.budget)
 
 
-def spreading_stack(
+def root_sum_square_stack(
     name: str, design: Float[np.ndarray, " variable"], excess: float, gradient: Float[np.ndarray, " variable"]
 ) -> Stack:
-    """Return the model of a statistical requirement: slopes·clearances + ‖weights∘scales‖₂ ≤ room.
+    """Return the model of a statistical requirement: slopes·clearances + ‖weights∘scales‖₂ ≤ budget.
 
     Parameters
     ----------
@@ -79,22 +79,22 @@ def spreading_stack(
     spread = float(by_scale @ design[:-2])
     return Stack(
         name=name,
-        adding=np.zeros(by_scale.size),
-        spreading=np.sqrt(by_scale * spread / design[:-2]),
-        room=float(spread + gradient[-2:] @ design[-2:] - excess),
+        worst_case=np.zeros(by_scale.size),
+        root_sum_square=np.sqrt(by_scale * spread / design[:-2]),
+        budget=float(spread + gradient[-2:] @ design[-2:] - excess),
         slopes=gradient[-2:].copy(),
     )
 
 
-def adding_stack(
+def worst_case_stack(
     name: str, design: Float[np.ndarray, " variable"], excess: float, gradient: Float[np.ndarray, " variable"]
 ) -> Stack:
-    """Return the model of a worst case, weights·scales + slopes·clearances ≤ room, from the same arguments."""
+    """Return the model of a worst case, weights·scales + slopes·clearances ≤ budget, from the same arguments."""
     by_scale = np.maximum(gradient[:-2], 0.0)
     return Stack(
         name=name,
-        adding=by_scale,
-        spreading=np.zeros(by_scale.size),
-        room=float(by_scale @ design[:-2] + gradient[-2:] @ design[-2:] - excess),
+        worst_case=by_scale,
+        root_sum_square=np.zeros(by_scale.size),
+        budget=float(by_scale @ design[:-2] + gradient[-2:] @ design[-2:] - excess),
         slopes=gradient[-2:].copy(),
     )

@@ -42,7 +42,7 @@ class Programs:
         Parameters
         ----------
         stacks
-            Local models with the room that is aimed at.
+            Local models with the budget that is aimed at.
         present
             Position of the present process of every group [-].
         """
@@ -61,12 +61,12 @@ class Programs:
         around: Float[np.ndarray, " variable"],
         reach: float,
     ) -> Float[np.ndarray, " variable"]:
-        """Return the cheapest design near another one, or the one there that overloads the stacks least.
+        """Return the cheapest design near another one, or the one there that violates the stacks least.
 
         Parameters
         ----------
         stacks
-            Local models with the room that is aimed at.
+            Local models with the budget that is aimed at.
         processes
             Position of the process of every group [-].
         around

@@ -168,7 +168,7 @@ def _with_kernel(verifier: Verifier, allocation: Allocation, undisturbed: Verifi
     ]
     for side, aimed, rise in zip(judged.sides, allocation.stacks, rises, strict=True):
         loads = [float(stack.load(chosen.design[:-2], chosen.design[-2:])) for stack in (side.stack, aimed)]
-        stacks.append(replace(side.stack, room=loads[0] - (loads[1] - aimed.room) - rise))
+        stacks.append(replace(side.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
     problem = verifier.space.problem(tuple(stacks))
     found = process_choice.allocate(problem)
     cost = problem.cost(found.zones, found.processes) + allocation.locked_cost

@@ -83,17 +83,17 @@ class Allocation:
 
     @cached_property
     def stacks(self) -> tuple[Stack, ...]:
-        """The chosen design's local models with the room that the search aims at, or that the design takes of it."""
+        """The chosen design's local models with the budget that the search aims at, or that the design takes of it."""
         return kept_stacks(self.chosen, self.tried, margin=1.0)
 
     @property
     def asked_stacks(self) -> tuple[Stack, ...]:
-        """The same with the room that the limits leave, however far the chosen design lies beyond them."""
+        """The same with the budget that the limits leave, however far the chosen design lies beyond them."""
         return self.stacks if self.chosen.met else aimed(self.chosen, list(self.tried))
 
     @cached_property
     def limit_stacks(self) -> tuple[Stack, ...]:
-        """The same with the room of the limits themselves."""
+        """The same with the budget of the limits themselves."""
         return kept_stacks(self.chosen, self.tried, margin=0.0)
 
     @property
@@ -191,9 +191,9 @@ def cheapest_by_models(
     SolveError
         The program does not even find the design itself.
     """
-    # A load that is its own room may lie beyond it by rounding.
+    # A load that is its own budget may lie beyond it by rounding.
     kept = kept_stacks(chosen, tried, margin)
-    stacks = tuple(replace(stack, room=stack.room + 1e-9 * abs(stack.room)) for stack in kept)
+    stacks = tuple(replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget)) for stack in kept)
     found = process_choice.allocate(space.problem(stacks))
     if not isinstance(found, Solution):
         raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")

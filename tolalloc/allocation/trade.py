@@ -85,7 +85,7 @@ def modification_trade(
     Notes
     -----
     Far from the chosen design its models are off, so for every pair the program is solved, the kernel runs the found
-    design, and the room of the peak-to-peak is corrected by what the model missed; then again, until it misses
+    design, and the budget of the peak-to-peak is corrected by what the model missed; then again, until it misses
     little. Every pair has processes of its own. Other requirements keep their models.
     """
     search = _Search(response, allocation)
@@ -114,7 +114,7 @@ class _Search:
         first, model, missed, cost, error = self.stacks[0], self.chosen.sides[0], 0.0, np.nan, np.inf
         processes = self.space.process_positions(self.chosen.design)
         for number in range(_CORRECTIONS):
-            corrected = (replace(first, room=first.room - missed), *self.stacks[1:])
+            corrected = (replace(first, budget=first.budget - missed), *self.stacks[1:])
             if number % _CHOSEN_AGAIN == 0:
                 processes = self._processes(corrected, clearances, processes)
             program, bounds = self.programs.of(processes), {"shared_lower": clearances, "shared_upper": clearances}

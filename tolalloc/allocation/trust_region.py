@@ -18,7 +18,7 @@ _EXPLAINED = 2.0
 
 
 def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0) -> tuple[Stack, ...]:
-    """Return the local models of a design with the room to aim at.
+    """Return the local models of a design with the budget to aim at.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        stacks.append(replace(side.stack, room=side.stack.room - margin * side.doubt - float(np.mean(found))))
+        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.doubt - float(np.mean(found))))
     return tuple(stacks)
 
 
@@ -50,7 +50,7 @@ def _is_similar(first: Float[np.ndarray, " variable"], second: Float[np.ndarray,
 
 
 def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:
-    """Return the models of a design whose room is what is aimed at, or what the design itself takes of it.
+    """Return the models of a design whose budget is what is aimed at, or what the design itself takes of it.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     """
     loads = [float(side.stack.load(chosen.design[:-2], chosen.design[-2:])) for side in chosen.sides]
     stacks = aimed(chosen, list(tried), margin)
-    return tuple(replace(stack, room=max(stack.room, load)) for stack, load in zip(stacks, loads, strict=True))
+    return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:

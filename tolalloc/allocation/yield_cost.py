@@ -41,6 +41,6 @@ def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> 
         return np.nan
     spread = float(first.load(chosen.design[:-2], np.zeros(2)))
     factor = max(spread + shown - chosen.quantile_bound, 0.0) / spread
-    changed = replace(first, adding=factor * first.adding, spreading=factor * first.spreading)
+    changed = replace(first, worst_case=factor * first.worst_case, root_sum_square=factor * first.root_sum_square)
     found = process_choice.allocate(space.problem((changed, *others)))
     return found.cost + space.locked_cost if isinstance(found, Solution) else np.nan

@@ -67,8 +67,8 @@ def _zones(results: AllocationResults) -> pd.DataFrame:
         }
     )
     for side in chosen.sides:
-        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.adding
-        table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.spreading
+        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case
+        table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
     return table
 
 
@@ -83,7 +83,7 @@ def _requirements(results: AllocationResults) -> pd.DataFrame:
             f"SUMPRODUCT(zones!${adds}${first}:${adds}${last},{scales})"
             f"+SQRT(SUMPRODUCT((zones!${spreads}${first}:${spreads}${last}*{scales})^2))"
         )
-        rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.room
+        rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.budget
         upper, row = side.sign > 0, _FIRST + at
         watched.append(
             {

@@ -89,7 +89,7 @@ def _optimality(results: AllocationResults) -> Section:
         paragraphs=(
             "The bound is a Lagrange dual that takes no solver's word. It holds for the convex models around the "
             "verified design, not for designs far from it; the front below was searched with other means. One "
-            "column has the room of the limits themselves, the other one standard error less, where the search "
+            "column has the budget of the limits themselves, the other one standard error less, where the search "
             "aims; where the verified design takes more of a limit than that, what it takes counts.",
             "The last table shows the free zones. Each lies between what its process can hold and the smallest and "
             "the largest zone of the tolerance table, whichever is narrower.",

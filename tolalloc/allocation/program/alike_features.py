@@ -29,7 +29,7 @@ class AlikeFeatures:
         start = 0
         for at, feature in enumerate(problem.features):
             made = [(own.cost, own.minimum, own.maximum, own.change) for own in feature.processes]
-            loads = [(float(stack.adding[at]), float(stack.spreading[at])) for stack in problem.stacks]
+            loads = [(float(stack.worst_case[at]), float(stack.root_sum_square[at])) for stack in problem.stacks]
             groups[pickle.dumps((made, loads, feature.loss))].append(slice(start, start + len(made)))
             start += len(made)
         self._groups = [group for group in groups.values() if len(group) > 1]

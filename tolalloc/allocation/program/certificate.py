@@ -12,7 +12,7 @@ from tolalloc.allocation.program.lagrange_dual import LagrangeDual, PricedProces
 from tolalloc.allocation.program.problem import AllocationProblem
 
 _SMALLEST_SHARE = 1e-9
-"""Smallest worth of a stack's room that the ascent tries, over the range of the cost [-]."""
+"""Smallest worth of a stack's budget that the ascent tries, over the range of the cost [-]."""
 _STEPS = 60
 """Steps of the ascent; a handful are usual [-]."""
 
@@ -84,7 +84,7 @@ def cost_bound(
     problem
         The allocation.
     prices
-        Price of every stack's room to start from, 0 or above; any give a valid bound, the shadow prices a tight one
+        Price of every stack's budget to start from, 0 or above; any give a valid bound, the shadow prices a tight one
         [cost units per unit of the stack].
     zones
         Zones whose directions make the norms' planes tight; any give a valid bound [unit of the zone].

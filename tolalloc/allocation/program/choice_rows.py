@@ -4,12 +4,12 @@ Notes
 -----
 The relaxation of the zeros and ones to 0 ≤ z ≤ 1 is made of linear rows, all of which hold for every allowed choice:
 
-* where only one group adds, such as the values of the modification, the room is known once it is chosen:
-  Σ squares·z ≤ Σ (room − adding)²·z over that group. The row is exact for whole z;
+* where only one group adds, such as the values of the modification, the budget is known once it is chosen:
+  Σ squares·z ≤ Σ (budget − worst_case)²·z over that group. The row is exact for whole z;
 * where several groups add and some add in quadrature, √(Σ squares·z) lies above its chord over a section of its range.
   The range follows from the other rows and from the cost of an allowed choice; which section holds is one group more;
-* with the vector of groups v(z) = Σ √squares·z, u·v ≤ ‖v‖ for every unit vector u: rows Σ adding·z + u·v(z) ≤ room
-  at the points that the linear program wants, until it keeps all stacks;
+* with the vector of groups v(z) = Σ √squares·z, u·v ≤ ‖v‖ for every unit vector u: rows Σ worst_case·z + u·v(z) ≤
+  budget at the points that the linear program wants, until it keeps all stacks;
 * a choice that breaks a stack still breaks it where every group takes something that adds no less: one choice of this
   cover must be left out. Such rows have whole coefficients, so that no tolerance of a solver gets around them.
 """
@@ -29,7 +29,7 @@ COSTS = 1e4
 """Largest cost that a solver sees, far above its own tolerances, which are absolute."""
 
 RELAXED = 1e-9
-"""How far linear rows are moved outwards, so that a choice that just keeps its room is not lost [-]."""
+"""How far linear rows are moved outwards, so that a choice that just keeps its budget is not lost [-]."""
 
 
 class ChoiceRows:
@@ -47,7 +47,7 @@ class ChoiceRows:
         self._rows: list[Float[np.ndarray, " choice"]] = []
         self._limits: list[float] = []
         self._set_up(program)
-        self.mixed = [stack for stack in range(program.room.size) if not self._add_exact(stack)]
+        self.mixed = [stack for stack in range(program.budget.size) if not self._add_exact(stack)]
 
     def _set_up(self, program: MultipleChoice) -> None:
         """Take what follows from the program alone."""
@@ -78,16 +78,16 @@ class ChoiceRows:
     def _add_exact(self, stack: int) -> bool:
         """Add the row that is exact for whole numbers, if the stack has one."""
         program = self.program
-        adding, squares, room = program.adding[stack], program.squares[stack], program.room[stack]
-        adding_groups = np.unique(program.group[adding != 0])
+        worst_case, squares, budget = program.worst_case[stack], program.squares[stack], program.budget[stack]
+        worst_case_groups = np.unique(program.group[worst_case != 0])
         if not squares.any():
-            self._add(adding, float(room))
-        elif adding_groups.size == 0:
-            self._add(squares, float(room**2))
-        elif adding_groups.size == 1:
-            own = program.group == adding_groups[0]
-            largest = np.max((room - adding[own]) ** 2) or 1.0  # the row is of order one, like all others
-            self._add((squares - np.where(own, (room - adding) ** 2, 0.0)) / largest, 0.0)
+            self._add(worst_case, float(budget))
+        elif worst_case_groups.size == 0:
+            self._add(squares, float(budget**2))
+        elif worst_case_groups.size == 1:
+            own = program.group == worst_case_groups[0]
+            largest = np.max((budget - worst_case[own]) ** 2) or 1.0  # the row is of order one, like all others
+            self._add((squares - np.where(own, (budget - worst_case) ** 2, 0.0)) / largest, 0.0)
         else:
             return False
         return True
@@ -100,24 +100,24 @@ class ChoiceRows:
         values
             How much of every choice is taken [-].
         allowed
-            Overload up to which a stack is not broken [-].
+            Violation up to which a stack is not broken [-].
         """
         program, before = self.program, len(self._rows)
-        for adding, squares, room in zip(program.adding, program.squares, program.room, strict=True):
+        for worst_case, squares, budget in zip(program.worst_case, program.squares, program.budget, strict=True):
             roots = np.sqrt(squares)
             vector = np.add.reduceat(roots * values, program.starts)
             length = float(np.linalg.norm(vector))
-            if length and adding @ values + length > room + allowed:
-                self._add(adding + (vector / length)[program.group] * roots, float(room))
+            if length and worst_case @ values + length > budget + allowed:
+                self._add(worst_case + (vector / length)[program.group] * roots, float(budget))
         return len(self._rows) > before
 
     def add_covers(self, taken: Int[np.ndarray, " group"]) -> None:
         """Exclude a choice that is not allowed, and all that add no less to a stack that it breaks."""
         program = self.program
-        for stack in np.flatnonzero(program.overload(taken) > ROUNDING):
-            adding, squares = program.adding[stack], program.squares[stack]
+        for stack in np.flatnonzero(program.violation(taken) > ROUNDING):
+            worst_case, squares = program.worst_case[stack], program.squares[stack]
             own = taken[program.group]
-            cover = ((adding >= adding[own]) & (squares >= squares[own])).astype(float)
+            cover = ((worst_case >= worst_case[own]) & (squares >= squares[own])).astype(float)
             free = np.minimum.reduceat(cover, program.starts) > 0  # whatever such a group takes, the stack is broken
             self._add(np.where(free[program.group], 0.0, cover), float(np.count_nonzero(~free)) - 1.0)
 
@@ -141,8 +141,8 @@ class ChoiceRows:
     def _chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
         """Return the row of a stack with the chord of its root between two values."""
         slope = 1.0 / (start + end)
-        row = self.program.adding[stack] + slope * self.program.squares[stack]
-        return row, float(self.program.room[stack] - start + slope * start**2)
+        row = self.program.worst_case[stack] + slope * self.program.squares[stack]
+        return row, float(self.program.budget[stack] - start + slope * start**2)
 
     def add_sections(self, stack: int, ends: Float[np.ndarray, " end"]) -> None:
         """Add a group whose choice says between which ends a stack's root sum of squares lies, and the chords there.
@@ -156,12 +156,12 @@ class ChoiceRows:
         """
         program, sections = self.program, ends.size - 1
         chords = [self._chord(stack, *pair) for pair in pairwise(ends.tolist())]
-        none, nothing = np.zeros(sections), np.zeros((program.room.size, sections))
+        none, nothing = np.zeros(sections), np.zeros((program.budget.size, sections))
         larger = replace(
             program,
             group=np.append(program.group, np.full(sections, program.starts.size)),
             cost=np.append(program.cost, none),
-            adding=np.hstack([program.adding, nothing]),
+            worst_case=np.hstack([program.worst_case, nothing]),
             squares=np.hstack([program.squares, nothing]),
         )
         self._set_up(larger)

@@ -29,7 +29,7 @@ _SLACK = 1e-6
 """What the smallest and largest sums of squares are widened by, above the linear program's own tolerance [-]."""
 
 _SETTLED = 1e-4
-"""Overload up to which the linear program's answer keeps a stack [-]."""
+"""Violation up to which the linear program's answer keeps a stack [-]."""
 
 _CUTS = 30
 """Largest number of linear programs."""

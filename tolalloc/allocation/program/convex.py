@@ -33,14 +33,14 @@ _ENOUGH = 1e-10
 class _StackParameters(NamedTuple):
     """One stack, divided by its scale, over zones divided by their units."""
 
-    adding: cp.Parameter
-    spreading: cp.Parameter
+    worst_case: cp.Parameter
+    root_sum_square: cp.Parameter
     slopes: cp.Parameter
-    room: cp.Parameter
+    budget: cp.Parameter
 
 
 class ConvexProgram:
-    """Least cost of features that are made by given processes, with every stack within its room.
+    """Least cost of features that are made by given processes, with every stack within its budget.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ class ConvexProgram:
 
     Notes
     -----
-    Zones are counted in the geometric middle of their process's range, stacks in their room, costs in what they change
-    there, so the solver sees numbers of order one whatever the unit. The stacks and all bounds are parameters: cvxpy
-    compiles once.
+    Zones are counted in the geometric middle of their process's range, stacks in their budget, costs in what they
+    change there, so the solver sees numbers of order one whatever the unit. The stacks and all bounds are parameters:
+    cvxpy compiles once.
     """
 
     def __init__(
@@ -91,13 +91,13 @@ class ConvexProgram:
         ]
         cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
         self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
-        self._kept = [self._load(stack) <= stack.room for stack in self._stacks]
+        self._kept = [self._load(stack) <= stack.budget for stack in self._stacks]
         around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]
         self._problem = cp.Problem(cp.Minimize(cost), [*self._keeping, *self._kept, *around])
 
     def _load(self, stack: _StackParameters) -> cp.Expression:
-        spread = cp.norm2(cp.multiply(stack.spreading, self._zones))
-        return stack.adding @ self._zones + spread + stack.slopes @ self._shared
+        spread = cp.norm2(cp.multiply(stack.root_sum_square, self._zones))
+        return stack.worst_case @ self._zones + spread + stack.slopes @ self._shared
 
     def solve(
         self,
@@ -135,12 +135,12 @@ class ConvexProgram:
         for parameter, value in zip(self._bounds, (low / units, high / units, *around), strict=True):
             parameter.value = value
         for parameters, stack, scale in zip(self._stacks, stacks, scales, strict=True):
-            parameters.adding.value, parameters.spreading.value = (
-                stack.adding * units / scale,
-                stack.spreading * units / scale,
+            parameters.worst_case.value, parameters.root_sum_square.value = (
+                stack.worst_case * units / scale,
+                stack.root_sum_square * units / scale,
             )
             parameters.slopes.value = np.where(still, 0.0, stack.slopes) / scale
-            parameters.room.value = (stack.room - stack.slopes @ held) / scale
+            parameters.budget.value = (stack.budget - stack.slopes @ held) / scale
         self._run()
         return self._solution(problem, low, high)
 
@@ -152,7 +152,7 @@ class ConvexProgram:
         shared_lower: Float[np.ndarray, " shared"] | None = None,
         shared_upper: Float[np.ndarray, " shared"] | None = None,
     ) -> LeastInfeasible:
-        """Return the design with the smallest largest overload; the arguments are those of `solve`."""
+        """Return the design with the smallest largest violation; the arguments are those of `solve`."""
         found = least_infeasible(self._restricted(stacks, lower, upper, shared_lower, shared_upper))
         return replace(found, processes=self.processes)
 

@@ -94,7 +94,7 @@ class DiscreteSolution:
     bound
         Lower bound on the cost of every allowed choice, infinite where none is allowed [cost units].
     slack
-        Room that every stack has left, below zero where it is broken [unit of the stack].
+        Budget that every stack has left, below zero where it is broken [unit of the stack].
     tightest
         The stack with the least slack over its scale; where stacks are broken, the one that blocks most.
     """
@@ -173,8 +173,8 @@ class DiscreteProblem:
 
     @cached_property
     def _scales(self) -> Float[np.ndarray, " stack"]:
-        """What every stack is divided by: its room and the largest change with the shared variables."""
-        scales = [abs(stack.room) + np.abs(self._points @ stack.slopes).max() for stack in self._stacks]
+        """What every stack is divided by: its budget and the largest change with the shared variables."""
+        scales = [abs(stack.budget) + np.abs(self._points @ stack.slopes).max() for stack in self._stacks]
         return np.where(np.array(scales) > 0, scales, 1.0)
 
     @property
@@ -192,18 +192,18 @@ class DiscreteProblem:
         points = self._points.shape[0]
         zones = np.array([option.zone for option in self._flat])
         still = np.zeros(points)
-        adding, squares = [], []
+        worst_case, squares = [], []
         for stack, scale in zip(self._stacks, self._scales, strict=True):
             shift = self._points @ stack.slopes
-            adding.append(np.concatenate([np.repeat(stack.adding, counts) * zones, shift]) / scale)
-            squares.append(np.concatenate([np.repeat(stack.spreading, counts) * zones, still]) ** 2 / scale**2)
+            worst_case.append(np.concatenate([np.repeat(stack.worst_case, counts) * zones, shift]) / scale)
+            squares.append(np.concatenate([np.repeat(stack.root_sum_square, counts) * zones, still]) ** 2 / scale**2)
         size = zones.size + points
         return MultipleChoice(
             group=np.repeat(np.arange(len(counts) + 1), [*counts, points]),
             cost=np.concatenate([[option.cost for option in self._flat], still]),
-            adding=np.array(adding).reshape(-1, size),
+            worst_case=np.array(worst_case).reshape(-1, size),
             squares=np.array(squares).reshape(-1, size),
-            room=np.array([stack.room for stack in self._stacks]) / self._scales,
+            budget=np.array([stack.budget for stack in self._stacks]) / self._scales,
         )
 
     def solve(self, most_nodes: int = MOST_NODES) -> DiscreteSolution | None:
@@ -221,8 +221,8 @@ class DiscreteProblem:
         """
         return self._solution(best_choice(self._program, most_nodes))
 
-    def least_overloaded(self) -> DiscreteSolution:
-        """Return the choice whose largest overload over the stack's scale is least, which names the blocking stack.
+    def least_violating(self) -> DiscreteSolution:
+        """Return the choice whose largest violation over the stack's scale is least, which names the blocking stack.
 
         Notes
         -----
@@ -237,7 +237,7 @@ class DiscreteProblem:
         ]
         grid = range(program.starts[-1], program.cost.size)
         best = min(
-            (np.array([*taken, at]) for at in grid), key=lambda own: float(program.overload(own).max(initial=-1))
+            (np.array([*taken, at]) for at in grid), key=lambda own: float(program.violation(own).max(initial=-1))
         )
         cost = float(program.cost[best].sum())
         found = self._solution(Choice(taken=best, cost=cost, bound=cost if program.allows(best) else np.inf))
@@ -249,13 +249,13 @@ class DiscreteProblem:
             return None
         options = tuple(self._flat[at] for at in choice.taken[:-1])
         shared = self._points[choice.taken[-1] - len(self._flat)]
-        overload = self.problem.overload(np.array([option.zone for option in options]), shared)
+        violation = self.problem.violation(np.array([option.zone for option in options]), shared)
         names = [stack.name for stack in self._stacks]
         return DiscreteSolution(
             options=options,
             shared=shared,
             cost=choice.cost,
             bound=choice.bound,
-            slack=-overload,
-            tightest=names[int((overload / self._scales).argmax())] if names else "",
+            slack=-violation,
+            tightest=names[int((violation / self._scales).argmax())] if names else "",
         )

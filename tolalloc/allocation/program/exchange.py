@@ -20,7 +20,7 @@ Taken = Int[np.ndarray, " group"]
 
 
 def exchanged(program: MultipleChoice, values: Float[np.ndarray, " choice"]) -> Taken:
-    """Return choices that no exchange of two improves: less overload first, then less cost.
+    """Return choices that no exchange of two improves: less violation first, then less cost.
 
     Parameters
     ----------
@@ -40,16 +40,16 @@ def exchanged(program: MultipleChoice, values: Float[np.ndarray, " choice"]) -> 
         taken = better
 
 
-def _overloads(program: MultipleChoice, taken: Taken, pairs: Pairs) -> Iterator[Float[np.ndarray, "stack some"]]:
-    """Give the overloads after every exchange, batch by batch [-]."""
+def _violations(program: MultipleChoice, taken: Taken, pairs: Pairs) -> Iterator[Float[np.ndarray, "stack some"]]:
+    """Give the violations after every exchange, batch by batch [-]."""
     own = taken[program.group]
     tables = [
         (table[:, taken].sum(axis=1)[:, np.newaxis], table - table[:, own])
-        for table in (program.adding, program.squares)
+        for table in (program.worst_case, program.squares)
     ]
     for one, other in (pairs[:, start : start + _BATCH] for start in range(0, pairs.shape[1], _BATCH)):
-        adding, squares = (total + change[:, one] + change[:, other] for total, change in tables)
-        yield adding + np.sqrt(np.maximum(squares, 0.0)) - program.room[:, np.newaxis]
+        worst_case, squares = (total + change[:, one] + change[:, other] for total, change in tables)
+        yield worst_case + np.sqrt(np.maximum(squares, 0.0)) - program.budget[:, np.newaxis]
 
 
 def _after(program: MultipleChoice, taken: Taken, pair: Int[np.ndarray, " 2"]) -> Taken:
@@ -65,19 +65,19 @@ def _cheaper(program: MultipleChoice, taken: Taken, pairs: Pairs) -> Taken | Non
     saving = np.flatnonzero(change < -_WORTHWHILE * np.abs(program.cost).sum())
     pairs = pairs[:, saving[np.argsort(change[saving], kind="stable")]]
     first = 0
-    for overload in _overloads(program, taken, pairs):
-        allowed = np.flatnonzero(np.all(overload <= ROUNDING / 2, axis=0))  # sums of changes round otherwise
+    for violation in _violations(program, taken, pairs):
+        allowed = np.flatnonzero(np.all(violation <= ROUNDING / 2, axis=0))  # sums of changes round otherwise
         if allowed.size:
             return _after(program, taken, pairs[:, first + allowed[0]])
-        first += overload.shape[1]
+        first += violation.shape[1]
     return None
 
 
 def _repaired(program: MultipleChoice, taken: Taken, pairs: Pairs) -> Taken | None:
-    """Return the exchange that leaves the least overload, if that is less than now."""
-    left = [np.maximum(overload, 0.0).sum(axis=0) for overload in _overloads(program, taken, pairs)]
+    """Return the exchange that leaves the least violation, if that is less than now."""
+    left = [np.maximum(violation, 0.0).sum(axis=0) for violation in _violations(program, taken, pairs)]
     excess = np.concatenate(left) if left else np.array([np.inf])
     least = int(excess.argmin())
-    if excess[least] >= np.maximum(program.overload(taken), 0.0).sum() * (1 - 1e-9):
+    if excess[least] >= np.maximum(program.violation(taken), 0.0).sum() * (1 - 1e-9):
         return None
     return _after(program, taken, pairs[:, least])

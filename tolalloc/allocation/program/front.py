@@ -1,4 +1,4 @@
-"""The exact front: the least cost for every room of one stack."""
+"""The exact front: the least cost for every budget of one stack."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from tolalloc.allocation.program.problem import Solution, Stack
 
 
 def front(
-    program: ConvexProgram, stacks: Sequence[Stack], at: int, rooms: Float[np.ndarray, " point"]
+    program: ConvexProgram, stacks: Sequence[Stack], at: int, budgets: Float[np.ndarray, " point"]
 ) -> tuple[Solution | None, ...]:
-    """Return the cheapest design for every room of one stack, None for a room that no design keeps.
+    """Return the cheapest design for every budget of one stack, None for a budget that no design keeps.
 
     Parameters
     ----------
     program
         The compiled program.
     stacks
-        All stacks; the rooms of the others stay.
+        All stacks; the budgets of the others stay.
     at
         Position of the stack [-].
-    rooms
-        Its rooms [unit of the stack].
+    budgets
+        Its budgets [unit of the stack].
     """
     return tuple(
-        program.solve([*stacks[:at], replace(stacks[at], room=float(room)), *stacks[at + 1 :]]) for room in rooms
+        program.solve([*stacks[:at], replace(stacks[at], budget=float(budget)), *stacks[at + 1 :]])
+        for budget in budgets
     )

@@ -1,4 +1,4 @@
-"""The Lagrange dual of an allocation: the least cost of every process once room has a price."""
+"""The Lagrange dual of an allocation: the least cost of every process once budget has a price."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PricedProcesses:
     constant
         What no process changes [cost units].
     prices
-        Price of every stack's room [cost units per unit of the stack].
+        Price of every stack's budget [cost units per unit of the stack].
     planes
         Direction whose supporting plane stands for the norm of every stack [-].
     """
@@ -56,10 +56,11 @@ class LagrangeDual:
     Notes
     -----
     Every price λ ≥ 0 of the stacks gives a lower bound: a design that keeps a stack is not made dearer by
-    λ·(load − room) ≤ 0, and without the stacks every feature is minimised alone over its whole range, the smallest of
-    its processes counting. A norm is replaced by its supporting plane u·(spreading∘zones) with ‖u‖ = 1, which lies
-    below it for every u. A stack that only spreads is squared first, λ/(2·room)·(‖spreading∘zones‖² − room²) ≤ 0,
-    which needs no u and stays as tight as a dual can be when processes compete.
+    λ·(load − budget) ≤ 0, and without the stacks every feature is minimised alone over its whole range, the smallest of
+    its processes counting. A norm is replaced by its supporting plane u·(root_sum_square∘zones) with ‖u‖ = 1, which
+    lies below it for every u. A stack that only spreads is squared first,
+    λ/(2·budget)·(‖root_sum_square∘zones‖² − budget²) ≤ 0, which needs no u and stays as tight as a dual can be when
+    processes compete.
 
     The minimum over one zone does not hang on a converged iteration either (`least_priced_cost`), so all that may
     lift the bound is the rounding of a sum of as many terms as there are features and stacks.
@@ -73,14 +74,14 @@ class LagrangeDual:
         self._processes = tuple(process for feature in problem.features for process in feature.processes)
         for at, process in zip(self.feature, self._processes, strict=True):
             convex_cost(f"feature {problem.features[at].name}", process, cp.Variable(pos=True))
-        self._adding = np.array([stack.adding for stack in problem.stacks]).reshape(-1, len(counts))
-        self._spreading = np.array([stack.spreading for stack in problem.stacks]).reshape(-1, len(counts))
+        self._worst_case = np.array([stack.worst_case for stack in problem.stacks]).reshape(-1, len(counts))
+        self._root_sum_square = np.array([stack.root_sum_square for stack in problem.stacks]).reshape(-1, len(counts))
         self._slopes = np.array([stack.slopes for stack in problem.stacks]).reshape(
             len(problem.stacks), problem.shared.lower.size
         )
-        self._room = np.array([stack.room for stack in problem.stacks])
-        self._squared = ~self._adding.any(axis=1) & ~self._slopes.any(axis=1) & (self._room > 0)
-        self.planar = self._spreading.any(axis=1) & ~self._squared
+        self._budget = np.array([stack.budget for stack in problem.stacks])
+        self._squared = ~self._worst_case.any(axis=1) & ~self._slopes.any(axis=1) & (self._budget > 0)
+        self.planar = self._root_sum_square.any(axis=1) & ~self._squared
         ends = [
             [
                 (float(made.total(np.array(made.minimum))), float(made.total(np.array(made.maximum))))
@@ -92,7 +93,7 @@ class LagrangeDual:
 
     def planes(self, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, "stack feature"]:
         """Return the directions whose planes touch the norms at the given zones."""
-        return unit_rows(self._spreading * zones)
+        return unit_rows(self._root_sum_square * zones)
 
     def price(self, prices: Float[np.ndarray, " stack"], planes: Float[np.ndarray, "stack feature"]) -> PricedProcesses:
         """Return the least priced cost of every process.
@@ -100,15 +101,15 @@ class LagrangeDual:
         Parameters
         ----------
         prices
-            Price of every stack's room, 0 or above [cost units per unit of the stack].
+            Price of every stack's budget, 0 or above [cost units per unit of the stack].
         planes
             Unit directions for the norms [-].
         """
         half = np.where(self._squared, prices / 2, 0.0)
         plane = np.where(self._squared, 0.0, prices)
-        room = np.where(self._squared, self._room, 1.0)
-        linear = prices @ self._adding + plane @ (planes * self._spreading)
-        square = (half / room) @ self._spreading**2 + self.problem.losses
+        budget = np.where(self._squared, self._budget, 1.0)
+        linear = prices @ self._worst_case + plane @ (planes * self._root_sum_square)
+        square = (half / budget) @ self._root_sum_square**2 + self.problem.losses
         slope, box = prices @ self._slopes, self.problem.shared
         shared = np.where(slope > 0, box.lower, box.upper)
         found = [
@@ -119,7 +120,7 @@ class LagrangeDual:
             least=np.array([value for value, _ in found]),
             zones=np.array([zone for _, zone in found]),
             shared=shared,
-            constant=float(slope @ shared - (plane + half) @ self._room),
+            constant=float(slope @ shared - (plane + half) @ self._budget),
             prices=prices,
             planes=planes,
         )
@@ -134,10 +135,15 @@ class LagrangeDual:
     ) -> tuple[Float[np.ndarray, " stack"], Float[np.ndarray, "stack feature"]]:
         """Return the derivatives of the bound by the prices and by the directions, for one choice of processes."""
         zones = priced.zones[choice]
-        spread = self._spreading * zones
-        planar = self._adding @ zones + (priced.planes * spread).sum(axis=1) + self._slopes @ priced.shared - self._room
-        room = np.where(self._squared, self._room, 1.0)
-        squared = ((spread**2).sum(axis=1) - room**2) / (2 * room)
+        spread = self._root_sum_square * zones
+        planar = (
+            self._worst_case @ zones
+            + (priced.planes * spread).sum(axis=1)
+            + self._slopes @ priced.shared
+            - self._budget
+        )
+        budget = np.where(self._squared, self._budget, 1.0)
+        squared = ((spread**2).sum(axis=1) - budget**2) / (2 * budget)
         by_plane = np.where(self._squared, 0.0, priced.prices)[:, None] * spread
         return np.where(self._squared, squared, planar), by_plane
 

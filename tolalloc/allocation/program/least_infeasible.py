@@ -1,4 +1,4 @@
-"""The design that overloads its stacks least: what blocks an allocation that cannot be kept."""
+"""The design that violates its stacks least: what blocks an allocation that cannot be kept."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tolalloc.allocation.program.problem import AllocationProblem
 from tolalloc.exceptions import SolveError
 
 _KEPT = 1e-10
-"""Overload below which a stack counts as kept [-]."""
+"""Violation below which a stack counts as kept [-]."""
 _TIE = 1e-9
-"""Distance from the largest overload within which a stack blocks too [-]."""
+"""Distance from the largest violation within which a stack blocks too [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LeastInfeasible:
-    """The design whose largest overload is smallest.
+    """The design whose largest violation is smallest.
 
     Parameters
     ----------
@@ -29,22 +29,22 @@ class LeastInfeasible:
         Position of the process that holds it [-].
     shared
         Values of the shared variables [unit of the variable].
-    overloads
-        By how much every stack exceeds its room, over the stack's scale; negative where it is kept [-].
+    violations
+        By how much every stack exceeds its budget, over the stack's scale; negative where it is kept [-].
     blocking
-        Names of the stacks with the largest overload.
+        Names of the stacks with the largest violation.
     """
 
     zones: Float[np.ndarray, " feature"]
     processes: Int[np.ndarray, " feature"]
     shared: Float[np.ndarray, " shared"]
-    overloads: Float[np.ndarray, " stack"]
+    violations: Float[np.ndarray, " stack"]
     blocking: tuple[str, ...]
 
     @property
     def largest(self) -> float:
-        """Largest overload, negative where room is left in all stacks [-]."""
-        return float(self.overloads.max(initial=-np.inf))
+        """Largest violation, negative where budget is left in all stacks [-]."""
+        return float(self.violations.max(initial=-np.inf))
 
     @property
     def feasible(self) -> bool:
@@ -53,7 +53,7 @@ class LeastInfeasible:
 
 
 def least_infeasible(problem: AllocationProblem) -> LeastInfeasible:
-    """Return the design with the smallest largest overload.
+    """Return the design with the smallest largest violation.
 
     Parameters
     ----------
@@ -73,21 +73,21 @@ def least_infeasible(problem: AllocationProblem) -> LeastInfeasible:
     processes = np.array([np.argmin([made.minimum for made in feature.processes]) for feature in problem.features])
     zones = np.array([feature.processes[at].minimum for feature, at in zip(problem.features, processes, strict=True)])
     shared = _relief(problem, zones) if problem.shared.names and problem.stacks else problem.shared.lower.copy()
-    overloads = problem.overload(zones, shared) / problem.scales
-    near = np.flatnonzero(overloads >= overloads.max(initial=-np.inf) - _TIE)
+    violations = problem.violation(zones, shared) / problem.scales
+    near = np.flatnonzero(violations >= violations.max(initial=-np.inf) - _TIE)
     return LeastInfeasible(
         zones=zones,
         processes=processes,
         shared=shared,
-        overloads=overloads,
+        violations=violations,
         blocking=tuple(problem.stacks[at].name for at in near),
     )
 
 
 def _relief(problem: AllocationProblem, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " shared"]:
-    """Return the shared variables that make the largest overload of given zones smallest."""
+    """Return the shared variables that make the largest violation of given zones smallest."""
     box, scales = problem.shared, problem.scales
-    fixed = problem.overload(zones, np.zeros(box.lower.size)) / scales
+    fixed = problem.violation(zones, np.zeros(box.lower.size)) / scales
     slopes = np.stack([stack.slopes for stack in problem.stacks]) / scales[:, None]
     found = linprog(
         np.append(np.zeros(box.lower.size), 1.0),

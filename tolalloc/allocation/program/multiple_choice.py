@@ -1,4 +1,4 @@
-"""Groups of choices: one is taken out of every group, and sums and root sums of squares stay within their rooms."""
+"""Groups of choices: one is taken out of every group, and sums and root sums of squares stay within their budgets."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 ROUNDING = 5e-13
-"""What rounding may add to a stack over its room [-]."""
+"""What rounding may add to a stack over its budget [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MultipleChoice:
     """Groups of choices, and what each adds to the stacks.
 
-    With z one where a choice is taken and zero elsewhere, a stack reads Σ adding·z + √(Σ squares·z) ≤ room.
+    With z one where a choice is taken and zero elsewhere, a stack reads Σ worst_case·z + √(Σ squares·z) ≤ budget.
 
     Parameters
     ----------
@@ -24,19 +24,19 @@ class MultipleChoice:
         Group of every choice, ascending from 0 [-].
     cost
         Cost of every choice [cost units].
-    adding
+    worst_case
         What it adds to a stack, over the stack's scale [-].
     squares
         Square of what it adds in quadrature, 0 or above, over the square of that scale [-].
-    room
-        Room of every stack over its scale, which makes rooms and what is added of order one [-].
+    budget
+        Budget of every stack over its scale, which makes budgets and what is added of order one [-].
     """
 
     group: Int[np.ndarray, " choice"]
     cost: Float[np.ndarray, " choice"]
-    adding: Float[np.ndarray, "stack choice"]
+    worst_case: Float[np.ndarray, "stack choice"]
     squares: Float[np.ndarray, "stack choice"]
-    room: Float[np.ndarray, " stack"]
+    budget: Float[np.ndarray, " stack"]
 
     @cached_property
     def starts(self) -> Int[np.ndarray, " group"]:
@@ -46,7 +46,7 @@ class MultipleChoice:
     @cached_property
     def undominated(self) -> Bool[np.ndarray, " choice"]:
         """Choices beside which no other of their group costs no more and adds no more to any stack."""
-        burden = np.concatenate([self.cost[np.newaxis], self.adding, self.squares])
+        burden = np.concatenate([self.cost[np.newaxis], self.worst_case, self.squares])
         kept = np.ones(self.cost.size, dtype=bool)
         for at in range(self.cost.size):
             rivals = np.flatnonzero((self.group == self.group[at]) & kept)
@@ -60,25 +60,25 @@ class MultipleChoice:
             self,
             group=self.group[kept],
             cost=self.cost[kept],
-            adding=self.adding[:, kept],
+            worst_case=self.worst_case[:, kept],
             squares=self.squares[:, kept],
         )
 
-    def overload(self, taken: Int[np.ndarray, " group"]) -> Float[np.ndarray, " stack"]:
-        """Return by how much every stack exceeds its room, over its scale [-]."""
+    def violation(self, taken: Int[np.ndarray, " group"]) -> Float[np.ndarray, " stack"]:
+        """Return by how much every stack exceeds its budget, over its scale [-]."""
         spread = np.sqrt(self.squares[:, taken].sum(axis=1))
-        return np.asarray(self.adding[:, taken].sum(axis=1) + spread - self.room)
+        return np.asarray(self.worst_case[:, taken].sum(axis=1) + spread - self.budget)
 
     def allows(self, taken: Int[np.ndarray, " group"]) -> bool:
-        """Return whether every stack stays within its room."""
-        return bool(np.all(self.overload(taken) <= ROUNDING))
+        """Return whether every stack stays within its budget."""
+        return bool(np.all(self.violation(taken) <= ROUNDING))
 
     @cached_property
     def possible(self) -> Bool[np.ndarray, " choice"]:
         """Choices that keep every stack beside the least that all other groups may add to it."""
-        adding = np.minimum.reduceat(self.adding, self.starts, axis=1)
+        worst_case = np.minimum.reduceat(self.worst_case, self.starts, axis=1)
         squares = np.minimum.reduceat(self.squares, self.starts, axis=1)
-        least_adding = adding.sum(axis=1, keepdims=True) + self.adding - adding[:, self.group]
+        least_worst_case = worst_case.sum(axis=1, keepdims=True) + self.worst_case - worst_case[:, self.group]
         least_squares = squares.sum(axis=1, keepdims=True) + self.squares - squares[:, self.group]
-        overload = least_adding + np.sqrt(np.maximum(least_squares, 0.0)) - self.room[:, np.newaxis]
-        return np.asarray(np.all(overload <= 2 * ROUNDING, axis=0))
+        violation = least_worst_case + np.sqrt(np.maximum(least_squares, 0.0)) - self.budget[:, np.newaxis]
+        return np.asarray(np.all(violation <= 2 * ROUNDING, axis=0))

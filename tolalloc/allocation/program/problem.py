@@ -44,17 +44,17 @@ class Feature:
 
 @dataclass(frozen=True, kw_only=True)
 class Stack:
-    """A tolerance stack that must stay within its room: adding·zones + ‖spreading∘zones‖₂ + slopes·shared ≤ room.
+    """A tolerance stack: worst_case·zones + ‖root_sum_square∘zones‖₂ + slopes·shared ≤ budget.
 
     Parameters
     ----------
     name
         What the stack keeps.
-    adding
+    worst_case
         What a feature adds per zone in the worst case, 0 or above [unit of the stack per unit of the zone].
-    spreading
+    root_sum_square
         What a feature adds per zone in quadrature, 0 or above [unit of the stack per unit of the zone].
-    room
+    budget
         Largest value allowed [unit of the stack].
     slopes
         Change with the shared variables [unit of the stack per unit of the variable].
@@ -66,13 +66,13 @@ class Stack:
     """
 
     name: str
-    adding: Float[np.ndarray, " feature"]
-    spreading: Float[np.ndarray, " feature"]
-    room: float
+    worst_case: Float[np.ndarray, " feature"]
+    root_sum_square: Float[np.ndarray, " feature"]
+    budget: float
     slopes: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        for name, weights in (("adding", self.adding), ("spreading", self.spreading)):
+        for name, weights in (("worst_case", self.worst_case), ("root_sum_square", self.root_sum_square)):
             if not np.all(weights >= 0):
                 raise InputError.at(f"stack {self.name}", name, weights.tolist(), "numbers that are 0 or above")
 
@@ -80,8 +80,8 @@ class Stack:
         self, zones: Float[np.ndarray, "*designs feature"], shared: Float[np.ndarray, "*designs shared"]
     ) -> Float[np.ndarray, "*designs"]:
         """Return the value of the stack [unit of the stack]."""
-        spread = np.sqrt(((self.spreading * zones) ** 2).sum(axis=-1))
-        return np.asarray(zones @ self.adding + spread + shared @ self.slopes)
+        spread = np.sqrt(((self.root_sum_square * zones) ** 2).sum(axis=-1))
+        return np.asarray(zones @ self.worst_case + spread + shared @ self.slopes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class Shared:
 
 @dataclass(frozen=True, kw_only=True)
 class AllocationProblem:
-    """Features and stacks: least cost such that every stack stays within its room.
+    """Features and stacks: least cost such that every stack stays within its budget.
 
     Parameters
     ----------
@@ -126,11 +126,11 @@ class AllocationProblem:
 
     @cached_property
     def scales(self) -> Float[np.ndarray, " stack"]:
-        """Size of every stack: its room, or a thousandth of its largest load where that is more [unit of the stack]."""
+        """Size of every stack: its budget, or a thousandth of its largest load if that is more [unit of the stack]."""
         zones = np.array([max(made.maximum for made in feature.processes) for feature in self.features])
         reach = np.maximum(np.abs(self.shared.lower), np.abs(self.shared.upper))
         loads = [float(stack.load(zones, np.zeros(reach.size)) + np.abs(stack.slopes) @ reach) for stack in self.stacks]
-        return np.maximum(np.abs([stack.room for stack in self.stacks]), 1e-3 * np.array(loads))
+        return np.maximum(np.abs([stack.budget for stack in self.stacks]), 1e-3 * np.array(loads))
 
     def cost(self, zones: Float[np.ndarray, " feature"], processes: Int[np.ndarray, " feature"]) -> float:
         """Return the cost of zones made by the processes at the given positions [cost units]."""
@@ -140,11 +140,11 @@ class AllocationProblem:
         ]
         return sum(made) + float(self.losses @ zones**2)
 
-    def overload(
+    def violation(
         self, zones: Float[np.ndarray, " feature"], shared: Float[np.ndarray, " shared"]
     ) -> Float[np.ndarray, " stack"]:
-        """Return by how much every stack exceeds its room, negative where it is kept [unit of the stack]."""
-        return np.array([float(stack.load(zones, shared)) - stack.room for stack in self.stacks])
+        """Return by how much every stack exceeds its budget, negative where it is kept [unit of the stack]."""
+        return np.array([float(stack.load(zones, shared)) - stack.budget for stack in self.stacks])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class Solution:
     bound
         Lower bound on the cost of every allowed choice, computed without the solver [cost units].
     prices
-        Shadow price of every stack: cost saved per unit of room [cost units per unit of the stack].
+        Shadow price of every stack: cost saved per unit of budget [cost units per unit of the stack].
     bound_prices
         Shadow price of the smallest and the largest zone of every feature: cost saved by moving that bound outwards
         [cost units per unit of the zone].

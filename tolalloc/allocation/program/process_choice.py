@@ -36,7 +36,7 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
     Returns
     -------
     Solution or LeastInfeasible
-        The design that overloads the stacks least, where none keeps them all.
+        The design that violates the stacks least, where none keeps them all.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Tolerance stacks by the usual methods: how the zones of features add up to that of a requirement.
 
-Zones and rooms are counted alike: all of them are ± tolerances, or all of them full widths.
+Zones and budgets are counted alike: all of them are ± tolerances, or all of them full widths.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
 
 
-def worst_case(name: str, sensitivities: Float[np.ndarray, " feature"], room: float) -> Stack:
+def worst_case(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
     """Return the stack in which all zones are used up on the bad side at once.
 
     Parameters
@@ -24,13 +24,13 @@ def worst_case(name: str, sensitivities: Float[np.ndarray, " feature"], room: fl
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Zone of the requirement [unit of the requirement].
     """
-    return mean_shift(name, sensitivities, room, shift=1.0)
+    return mean_shift(name, sensitivities, budget, shift=1.0)
 
 
-def root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], room: float) -> Stack:
+def root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
     """Return the stack of independent, centred features whose zones hold equally many standard deviations.
 
     Parameters
@@ -39,13 +39,13 @@ def root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], roo
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Zone of the requirement [unit of the requirement].
     """
-    return mean_shift(name, sensitivities, room, shift=0.0)
+    return mean_shift(name, sensitivities, budget, shift=0.0)
 
 
-def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], room: float, factor: float) -> Stack:
+def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float, factor: float) -> Stack:
     """Return the root sum square times a factor, such as Bender's 1.5.
 
     Parameters
@@ -54,7 +54,7 @@ def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], room: floa
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Zone of the requirement [unit of the requirement].
     factor
         What the root sum square is multiplied by, 1 or above [-].
@@ -70,10 +70,10 @@ def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], room: floa
     """
     if not factor >= 1:
         raise InputError.at(f"stack {name}", "factor", factor, "1 or above")
-    return root_sum_square(name, factor * sensitivities, room)
+    return root_sum_square(name, factor * sensitivities, budget)
 
 
-def modified_root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], room: float) -> Stack:
+def modified_root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
     """Return the modified root sum of squares, which lies between the root sum square and the worst case.
 
     Parameters
@@ -82,7 +82,7 @@ def modified_root_sum_square(name: str, sensitivities: Float[np.ndarray, " featu
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Zone of the requirement [unit of the requirement].
 
     Raises
@@ -102,13 +102,13 @@ def modified_root_sum_square(name: str, sensitivities: Float[np.ndarray, " featu
     count = np.count_nonzero(sensitivities)
     if count < 3:
         raise InputError.at(f"stack {name}", "number of features that count", count, "3 or more")
-    return mean_shift(name, sensitivities, room, shift=float(0.5 / (np.sqrt(count) - 1)))
+    return mean_shift(name, sensitivities, budget, shift=float(0.5 / (np.sqrt(count) - 1)))
 
 
 def mean_shift(
     name: str,
     sensitivities: Float[np.ndarray, " feature"],
-    room: float,
+    budget: float,
     shift: float | Float[np.ndarray, " feature"],
 ) -> Stack:
     """Return the stack of features whose means may be off by a share of the zone, all on the bad side.
@@ -119,7 +119,7 @@ def mean_shift(
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Zone of the requirement [unit of the requirement].
     shift
         Largest shift of the mean over half the width of the zone, one for all features or one each: 0 is the root sum
@@ -137,10 +137,10 @@ def mean_shift(
     if not np.all((np.asarray(shift) >= 0) & (np.asarray(shift) <= 1)):
         raise InputError.at(f"stack {name}", "shift", np.asarray(shift).tolist(), "a share between 0 and 1")
     weights = np.abs(sensitivities)
-    return Stack(name=name, adding=shift * weights, spreading=(1 - shift) * weights, room=room)
+    return Stack(name=name, worst_case=shift * weights, root_sum_square=(1 - shift) * weights, budget=budget)
 
 
-def inertial(name: str, sensitivities: Float[np.ndarray, " feature"], room: float, capability: float) -> Stack:
+def inertial(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float, capability: float) -> Stack:
     """Return the stack of inertias that guarantees a Cpk of the requirement, however each is split.
 
     Parameters
@@ -149,7 +149,7 @@ def inertial(name: str, sensitivities: Float[np.ndarray, " feature"], room: floa
         What the stack keeps.
     sensitivities
         Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    room
+    budget
         Half the width between the limits of the requirement, which is centred [unit of the requirement].
     capability
         Least Cpk of the requirement, 0 or above [-].
@@ -176,7 +176,7 @@ def inertial(name: str, sensitivities: Float[np.ndarray, " feature"], room: floa
     if not capability >= 0:
         raise InputError.at(f"stack {name}", "capability", capability, "a Cpk of 0 or above")
     factor = np.sqrt(np.count_nonzero(sensitivities) + 9 * capability**2)
-    return root_sum_square(name, factor * sensitivities, room)
+    return root_sum_square(name, factor * sensitivities, budget)
 
 
 def yield_root_sum_square(
@@ -187,7 +187,7 @@ def yield_root_sum_square(
     share: float,
     deviations: float = 3.0,
 ) -> Stack:
-    """Return the stack that keeps the yield of a normal requirement; its room is the largest standard deviation.
+    """Return the stack that keeps the yield of a normal requirement; its budget is the largest standard deviation.
 
     Parameters
     ----------
@@ -219,11 +219,11 @@ def yield_root_sum_square(
         raise InputError.at(f"stack {name}", "mean", mean, "a number between the limits")
     if not 0.5 < share < 1:
         raise InputError.at(f"stack {name}", "share", share, "a share between 0.5 and 1")
-    room = brentq(
+    budget = brentq(
         lambda deviation: limits.normal_share_outside(mean, deviation) - (1 - share),
         0.999 * distance / norm.ppf((1 + share) / 2),
         1.001 * distance / norm.ppf(share),
         xtol=1e-14 * distance,
         rtol=1e-14,
     )
-    return root_sum_square(name, sensitivities / deviations, float(room))
+    return root_sum_square(name, sensitivities / deviations, float(budget))

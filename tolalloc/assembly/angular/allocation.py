@@ -80,7 +80,7 @@ def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
     found = allocate(problem)
     if not isinstance(found, Solution):
         return None
-    limits, rooms = angular_limits(plan), np.array([stack.room for stack in problem.stacks])
+    limits, budgets = angular_limits(plan), np.array([stack.budget for stack in problem.stacks])
     tolerances, price = found.zones.reshape(-1, 3) * ARCSECOND, requirements_of(plan).effort_price
     return AngularAllocation(
         gains=gains,
@@ -90,8 +90,8 @@ def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
         bound=found.bound + price * gains.errors.noise_effort,
         limits=limits,
         spread=limits.spread(gains.errors, tolerances),
-        # The room is √(limit² − noise²), so its change by the limit is the limit over it.
-        prices=found.prices * limits.values / (rooms * ARCSECOND) / ARCSECOND,
+        # The budget is √(limit² − noise²), so its change by the limit is the limit over it.
+        prices=found.prices * limits.values / (budgets * ARCSECOND) / ARCSECOND,
     )
 
 

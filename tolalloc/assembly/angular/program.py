@@ -35,11 +35,11 @@ def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProble
     -----
     With fixed gains nine times a final variance is Σ a_i·t_i² + 9ν, so it stays below T² where ‖√a∘t‖ ≤ √(T² − 9ν).
     The priced effort is affine in t² too: a quality loss and a constant, which is left out. Where the noise alone
-    exceeds a limit the room is negative, as no tolerance keeps it.
+    exceeds a limit the budget is negative, as no tolerance keeps it.
     """
     requirements, limits = requirements_of(plan), angular_limits(plan)
     left = limits.values**2 - limits.noise(errors) ** 2
-    rooms = np.sign(left) * np.sqrt(np.abs(left)) / ARCSECOND
+    budgets = np.sign(left) * np.sqrt(np.abs(left)) / ARCSECOND
     losses = requirements.effort_price * errors.effort_by_variance / 9 * ARCSECOND**2
     names = [f"{part}.{axis}" for part, axis in product(plan.chain.names, "xyz")]
     features = tuple(
@@ -47,8 +47,10 @@ def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProble
         for at, (name, loss) in enumerate(zip(names, losses, strict=True))
     )
     stacks = tuple(
-        Stack(name=name, adding=np.zeros(len(names)), spreading=spreading, room=float(room))
-        for name, spreading, room in zip(limits.names, np.sqrt(limits.by_tolerance(errors)), rooms, strict=True)
+        Stack(name=name, worst_case=np.zeros(len(names)), root_sum_square=root_sum_square, budget=float(budget))
+        for name, root_sum_square, budget in zip(
+            limits.names, np.sqrt(limits.by_tolerance(errors)), budgets, strict=True
+        )
     )
     return AllocationProblem(features=features, stacks=stacks)
 
