@@ -28,11 +28,11 @@ from tolalloc.cli.document_script import run_document
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.study.stages import Progress
 from tolalloc.units import ARCSECOND
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.plots import save_png
 from tolalloc.rv.equivalent.attribution import attribute
@@ -15,6 +14,7 @@ from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 TORQUE = -1.0

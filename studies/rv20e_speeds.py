@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.cli.document_script import run_document
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
@@ -20,6 +19,7 @@ from tolalloc.rv.dynamics.modes import modes
 from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, orders_against_speed
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCSECOND, RPM
 
 TORQUE = -167.0

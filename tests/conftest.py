@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 
 
 @pytest.fixture(scope="session")

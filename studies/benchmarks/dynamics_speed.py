@@ -30,7 +30,6 @@ from scipy.optimize import brentq
 from tests.random_units import random_units
 from tolalloc.blas import one_blas_thread
 from tolalloc.compiled import use_threads
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.rv.dynamics.damping import Damping
 from tolalloc.rv.dynamics.inertia import inertia_of
 from tolalloc.rv.dynamics.integrator import generalised_alpha
@@ -41,6 +40,7 @@ from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCSECOND
 
 STEPS, FIRST_STEPS, TORQUE, TURN = 1404, 100, -10.0, 60.0

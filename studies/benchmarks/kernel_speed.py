@@ -48,9 +48,9 @@ from numpy_cores import ANGLES, CORES, TORQUE, TRIAL_ANGLES, numpy_curves, numpy
 from threadpoolctl import threadpool_info
 
 from tests.random_units import random_units
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCSECOND
 
 SEED = 20201121

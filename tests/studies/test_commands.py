@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
+from tolalloc.drawing.table_file import DATA
 from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.unit_file import DATA
 
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
 
@@ -268,7 +268,9 @@ def test_unknown_names_offer_the_nearest(tmp_path):
     refused(tolalloc("te", "--reducer", "rv20"), "rv20", "rv20e")
     refused(tolalloc("te", "--unit", "tabel4"), "tabel4", "table4")
     path = tmp_path / "unit.toml"
-    text = (DATA / "table4.unit.toml").read_text(encoding="utf-8")
+    from tolalloc.rv.reducer.files import PRESETS
+
+    text = (PRESETS / "table4.unit.toml").read_text(encoding="utf-8")
     path.write_text(text.replace('"carrier.bore1.position"', '"carrier.bore3.position"'), encoding="utf-8")
     refused(tolalloc("te", "--unit", path), "carrier.bore3.position", "carrier.bore1.position")
 

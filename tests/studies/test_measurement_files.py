@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tolalloc.bench.measurement.files import load_measurements
-from tolalloc.drawing.unit_file import DATA
-from tolalloc.drawing.unit_table import load_units
 from tolalloc.exceptions import TolallocError
+from tolalloc.rv.reducer.files import PRESETS
+from tolalloc.rv.reducer.unit_table import load_units
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE, MICRORADIAN
 
 UNITS = """# drawn on the coordinate measuring machine
@@ -114,7 +114,7 @@ def test_noise_follows_what_cleaning_did(folder):
 
 
 def test_units_may_be_unit_files(folder):
-    (folder / "a.unit.toml").write_text((DATA / "table4.unit.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "a.unit.toml").write_text((PRESETS / "table4.unit.toml").read_text(encoding="utf-8"), encoding="utf-8")
     changed(folder, "measurement.toml", 'units = "units.csv"', 'units = ["a.unit.toml", "units.csv"]')
     data = load_measurements(folder / "measurement.toml")
     assert [unit.name for unit in data.units] == ["table4", "1", "2", "3"]

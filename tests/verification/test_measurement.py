@@ -13,9 +13,9 @@ from tolalloc.bench.measurement.folder import write_measurements
 from tolalloc.bench.measurement.readings import Readings
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
-from tolalloc.drawing.unit_file import BuiltUnit
-from tolalloc.drawing.unit_table import load_units, write_units
 from tolalloc.exceptions import InputError
+from tolalloc.rv.reducer.unit_file import BuiltUnit
+from tolalloc.rv.reducer.unit_table import load_units, write_units
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 
 TURN = 2 * np.pi

@@ -12,9 +12,9 @@ from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import CHUNK, SeedTree
 from tolalloc.drawing.sources import Source
 from tolalloc.drawing.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
-from tolalloc.drawing.unit_file import load_unit
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
+from tolalloc.rv.reducer.unit_file import load_unit
 
 SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
 CASES = [

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from tolalloc.cli.console import AsJson, announce_compilation, print_json, screen
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
-from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import SolveError
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.attribution import attribute
@@ -23,6 +22,7 @@ from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, order_spectrum
 from tolalloc.rv.equivalent.status import Status, count_statuses
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 

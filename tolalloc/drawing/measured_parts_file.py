@@ -9,12 +9,14 @@ import numpy as np
 
 from tolalloc.drawing.measured_parts import MeasuredParts
 from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
-from tolalloc.drawing.unit_table import LARGEST_LENGTH
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
 
 FEWEST_PARTS = 20
+LARGEST_DEVIATION = 2000.0
+"""Largest deviation that is believed, as large as a zone may be [µm]."""
+
 _FACTORS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
 _LAYOUTS = {Feature.SIZE: (("deviation",),), Feature.POSITION: (("x", "y"), ("radius",))}
 
@@ -73,12 +75,12 @@ def _column(table: TextTable, at: int) -> list[float]:
             value = float(cells[at]) * _FACTORS[unit]
         except ValueError:
             value = float("nan")
-        if not (isfinite(value) and abs(value) <= LARGEST_LENGTH):
+        if not (isfinite(value) and abs(value) <= LARGEST_DEVIATION):
             raise InputError.at(
                 f"{table.path}, row {row}",
                 header,
                 cells[at],
-                f"a number from {-LARGEST_LENGTH:g} to {LARGEST_LENGTH:g} µm",
+                f"a number from {-LARGEST_DEVIATION:g} to {LARGEST_DEVIATION:g} µm",
             )
         values.append(value)
     return values

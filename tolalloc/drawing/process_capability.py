@@ -9,9 +9,9 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from tolalloc.drawing.distributions import Distribution
+from tolalloc.drawing.table_file import DATA
 from tolalloc.drawing.table_rows import TableRow, read_rows
 from tolalloc.drawing.tolerance_cells import require_shape
-from tolalloc.drawing.unit_file import DATA
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path

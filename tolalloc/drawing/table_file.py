@@ -12,6 +12,9 @@ import pandas as pd
 
 from tolalloc.exceptions import InputError
 
+DATA = Path(__file__).parent / "data"
+"""Shipped tables."""
+
 
 def read_table_file(path: Path) -> pd.DataFrame:
     """Return the cells of a CSV (UTF-8) or XLSX file as text, the header as first row, blank rows left out.

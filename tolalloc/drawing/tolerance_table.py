@@ -11,10 +11,9 @@ import pandas as pd
 
 from tolalloc.drawing.process_capability import load_process_capabilities, with_process
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_file import read_table_file
+from tolalloc.drawing.table_file import DATA, read_table_file
 from tolalloc.drawing.tolerance_cells import batches_text, spectrum_text, typed_cells
 from tolalloc.drawing.tolerance_row import ToleranceRow
-from tolalloc.drawing.unit_file import DATA
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path, validated

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.pareto import Front
 from tolalloc.allocation.search import Allocation
-from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.rv.cycloid.assessment import Assessment
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.outputs import Orders
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.stiffness import StiffnessEffect
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.sobol_analysis import SobolIndices

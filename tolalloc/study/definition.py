@@ -23,7 +23,6 @@ from tolalloc.drawing.correlation_file import load_correlations
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import Source, neglected_columns
 from tolalloc.drawing.tolerance_table import load_tolerance_table, require_small_zones
-from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
@@ -31,6 +30,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.rv.response.outputs import OTHER_OUTPUTS
 from tolalloc.rv.response.stiffness import stiffness_source

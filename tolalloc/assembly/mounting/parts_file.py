@@ -11,12 +11,12 @@ from tolalloc.assembly.mounting.places import places_of
 from tolalloc.assembly.mounting.stock import count_units
 from tolalloc.drawing.sources import ANGULAR
 from tolalloc.drawing.table_file import read_text_table
-from tolalloc.drawing.unit_table import LARGEST_LENGTH
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.unit_table import LARGEST_LENGTH
 from tolalloc.units import ARCSECOND, MICROMETRE
 
 HEADERS = ("part", "kind", "error", "value", "unit")

@@ -12,8 +12,8 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 
 _ANY = ("*",)
 

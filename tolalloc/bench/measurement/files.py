@@ -22,10 +22,10 @@ from tolalloc.bench.measurement.readings import (
 )
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.drawing.table_file import read_text_table
-from tolalloc.drawing.unit_file import BuiltUnit, load_unit
-from tolalloc.drawing.unit_table import load_units, unit_names
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, validated
+from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
+from tolalloc.rv.reducer.unit_table import load_units, unit_names
 from tolalloc.units import ARCSECOND, DEGREE
 
 

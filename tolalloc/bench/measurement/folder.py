@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.bench.measurement.records import Measurements
-from tolalloc.drawing.unit_table import write_table, write_units
 from tolalloc.exceptions import InputError
 from tolalloc.files import as_toml, require_new, write_new
+from tolalloc.rv.reducer.unit_table import write_table, write_units
 from tolalloc.units import ARCSECOND, DEGREE
 
 

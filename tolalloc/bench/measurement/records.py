@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.drawing.unit_file import BuiltUnit
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,6 @@ from math import inf
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.unit_file import BuiltUnit, load_unit
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.dynamics.inertia import Inertia, inertia_of
 from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
@@ -21,6 +20,7 @@ from tolalloc.rv.multibody.part_errors import part_errors
 from tolalloc.rv.multibody.prototype import RIGID
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.units import RPM
 
 SPECTRAL_RADIUS = 0.9

@@ -16,9 +16,8 @@ from pydantic import Field
 from tolalloc.drawing.sources import neglected_columns
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.rv.reducer.files import PRESETS
 from tolalloc.units import MICROMETRE, MICRORADIAN
-
-DATA = Path(__file__).parent / "data"
 
 _HARMONIC = re.compile(r"(.*)\.(?:cos|sin)(\d+)")
 
@@ -118,7 +117,7 @@ def load_unit(name: str | Path) -> BuiltUnit:
     InputError, UnknownNameError
         The file, field and value that are not allowed.
     """
-    path = shipped_or_path(name, DATA, ".unit.toml", "unit")
+    path = shipped_or_path(name, PRESETS, ".unit.toml", "unit")
     record = validated(UnitRecord, read_toml(path), path)
     deviations = {column: value * MICROMETRE for column, value in record.lengths.items()}
     for source, (magnitude, direction) in record.vectors.items():

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from tolalloc.drawing.sources import ANGULAR
 from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
-from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.exceptions import InputError
 from tolalloc.files import write_new
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.units import MICROMETRE, MICRORADIAN
 
 LENGTH_UNITS, ANGLE_UNITS = ("µm", "um"), ("µrad", "urad")
