@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.studies.command import ROOT, command, tolalloc
+from tests.studies.command import ROOT, command, process, tolalloc
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.cli.allocate import allocate
 from tolalloc.drawing.tolerance_table import load_tolerance_table
@@ -39,12 +39,13 @@ from tolalloc.study.effort import AllocationEffort, Effort
 LOST = "'lost motion [arcmin]'"
 
 
-def run(*arguments: object, threads: int = 2) -> subprocess.CompletedProcess[str]:
-    return tolalloc("allocate", *arguments, **environment(threads))
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return tolalloc("allocate", *arguments, COLUMNS="100")
 
 
-def environment(threads: int) -> dict[str, str]:
-    return {"NUMBA_NUM_THREADS": str(threads), "COLUMNS": "100"}
+def run_with_threads(threads: int, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run it in a process of its own."""
+    return process("allocate", *arguments, NUMBA_NUM_THREADS=str(threads))
 
 
 def script_with(path: Path, fields: str = "", effort: str = SMALL) -> Path:
@@ -172,11 +173,11 @@ def test_every_header_of_the_tables_has_a_unit(allocated):
 def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path):
     script = script_with(tmp_path)
     answers, kept = [], tmp_path / "kept.npz"
-    whole = run(script, "--json", "--out", tmp_path / "whole", "--checkpoint", tmp_path / "other.npz", threads=1)
+    whole = run_with_threads(1, script, "--json", "--out", tmp_path / "whole", "--checkpoint", tmp_path / "other.npz")
     assert whole.returncode == 0, whole.stderr
     with subprocess.Popen(
         command("allocate", script, "--json", "--out", tmp_path / "cut", "--checkpoint", kept),
-        env={**os.environ, **environment(2)},
+        env={**os.environ, "NUMBA_NUM_THREADS": "2"},
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -185,8 +186,8 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
             time.sleep(0.005)
         process.kill()
     assert kept.exists()
-    again = run(script, "--json", "--out", tmp_path / "again", "--checkpoint", kept, threads=2)
-    plain = run(script, "--json", "--out", tmp_path / "plain", threads=2)
+    again = run_with_threads(2, script, "--json", "--out", tmp_path / "again", "--checkpoint", kept)
+    plain = run_with_threads(2, script, "--json", "--out", tmp_path / "plain")
     for result in (whole, again, plain):
         assert result.returncode == 0, result.stderr
         answers.append(json.loads(result.stdout))

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import subprocess
-import sys
-import traceback
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +10,7 @@ import numpy as np
 import pytest
 
 from tests.studies.bench_files import NAME, Change, copied, files, identify, lines, text, value
-from tests.studies.command import refused
-from tolalloc.cli.main import main
+from tests.studies.command import process, refused, tolalloc
 
 
 @dataclass(frozen=True)
@@ -215,22 +210,6 @@ CASES = (
 )
 
 
-def in_this_process(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run the command line as `tolalloc` does, without the two seconds that a process of its own spends on imports."""
-    command, code = ["tolalloc", *map(str, arguments)], 0
-    stdout, stderr = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(stdout), redirect_stderr(stderr):
-        patch.setattr(sys, "argv", command)
-        try:
-            main()
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        except Exception:
-            code = 1
-            stderr.write(traceback.format_exc())
-    return subprocess.CompletedProcess(command, code, stdout.getvalue(), stderr.getvalue())
-
-
 def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.CompletedProcess[str], str]:
     """Return what came of a case and its last line, files named relative to the folder, in which nothing changed."""
     copied(source, folder)
@@ -241,7 +220,7 @@ def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.Completed
         if option not in options:
             options += [option, str(folder / name)]
     before = files(folder)
-    result = in_this_process("identify", folder / "measurement.toml", *options)
+    result = tolalloc("identify", folder / "measurement.toml", *options)
     refused(result)
     assert result.stdout == ""
     assert files(folder) == before
@@ -260,7 +239,8 @@ def test_bad_input_is_refused_in_one_sentence(curves, peak_to_peaks, tmp_path, c
 
 
 def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):
-    refused(identify(curves, "--method", "annealing", "--out", tmp_path / "report"), "'annealing' is not known")
+    options = ("--parameter", NAME, "--method", "annealing", "--out", tmp_path / "report")
+    refused(process("identify", curves / "measurement.toml", *options), "'annealing' is not known")
     refused(identify(tmp_path, "--stiffness", tmp_path / "found.toml"), "measurement.toml: no such file.")
     assert list(tmp_path.iterdir()) == []
 
