@@ -110,7 +110,20 @@ def test_nothing_is_overwritten(tmp_path):
     assert file.read_text(encoding="utf-8") == "mine"
     assert not (tmp_path / "report").exists()
     refused(tolalloc("contact", "--reducer", "rv40e", "--out", tmp_path), "not empty")
-    refused(tolalloc("contact", "--reducer", "rv40e", "--profile", tmp_path / "new.csv", "--points", "7", "--out", tmp_path / "report"), "7")
+    refused(
+        tolalloc(
+            "contact",
+            "--reducer",
+            "rv40e",
+            "--profile",
+            tmp_path / "new.csv",
+            "--points",
+            "7",
+            "--out",
+            tmp_path / "report",
+        ),
+        "7",
+    )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["disc.csv"]
     refused(tolalloc("modify", "li2018", "--reducer", "rv40e", "--profile", file), "exists")
 
