@@ -11,14 +11,14 @@ import pandas as pd
 from published.zhang2025_genetic import genetic_allocation
 
 from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
-from tolalloc.assembly.angular.precision import best_precision
+from tolalloc.assembly.angular.tuning import best_precision
+from tolalloc.assembly.control import regulator
 from tolalloc.assembly.mounting.drawn_parts import drawn_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.stock import Stock
 from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms
-from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree

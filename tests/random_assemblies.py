@@ -6,7 +6,7 @@ import numpy as np
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import Step
+from tolalloc.assembly.steps import AssemblyStep
 from tolalloc.units import ARCSECOND
 
 
@@ -27,7 +27,7 @@ def random_plan(seed: int) -> AssemblyPlan:
         there, earlier = names[: at + 1], names[:at]
         between = [f"{name} - {generator.choice(earlier)}"] if earlier else []
         steps.append(
-            Step(
+            AssemblyStep(
                 mount=name,
                 adjust=tuple(one for one in there if generator.random() < 0.7),
                 effort={one: float(generator.uniform(0.5, 20)) for one in there},

@@ -12,8 +12,7 @@ from pymoo.optimize import minimize
 
 from tolalloc.allocation.program.problem import AllocationProblem
 from tolalloc.assembly.angular.allocation import AngularAllocation
-from tolalloc.assembly.angular.limits import requirements_of
-from tolalloc.assembly.angular.program import angular_problem
+from tolalloc.assembly.angular.program import angular_problem, requirements_of
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError

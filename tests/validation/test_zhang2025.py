@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.final_errors import final_errors
-from tolalloc.assembly.kalman import kalman_filter
+from tolalloc.assembly.control import kalman_filter, regulator
+from tolalloc.assembly.gains import final_errors
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
-from tolalloc.assembly.regulator import regulator
-from tolalloc.assembly.state_space import state_space
-from tolalloc.assembly.steps import Choice, Efforts, steps_in_order
+from tolalloc.assembly.steps import Choice, Efforts, state_space, steps_in_order
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.units import ARCSECOND
 
@@ -89,10 +87,11 @@ def test_expected_cost_total_and_what_noise_leaves_of_it():
     noise = plan.measurement_noise, plan.adjustment_noise
     kalman = kalman_filter(plan.space, plan.variances, *noise, "BX40E")
     found = final_errors(plan.space, regulator(plan.space, plan.final_weight()), kalman, *noise)
-    assert found.expected_cost(plan.variances, plan.final_weight()) / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
+    squares = float(np.vdot(plan.final_weight(), found.covariance(plan.variances)))
+    assert (squares + found.expected_effort(plan.variances)) / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
     sweep = precision_sweep(plan, np.array([0.0, 1.0, 5.0, 10.0]))
     assert sweep.total[-1] / ARCSECOND == pytest.approx(9.7064918, abs=5e-8)
-    assert sweep.cost[-1] / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
+    assert (10.0 * sweep.total[-1] ** 2 + sweep.effort[-1]) / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
     assert sweep.noise_floor / ARCSECOND == pytest.approx(9.3220359, abs=5e-8)
 
 

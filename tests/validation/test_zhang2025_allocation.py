@@ -13,13 +13,10 @@ from scipy.optimize import minimize
 
 from studies.published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import allocate_angles, allocated
-from tolalloc.assembly.angular.precision import best_precision
-from tolalloc.assembly.angular.retuning import retuned_allocation
-from tolalloc.assembly.chain_file import load_plan
-from tolalloc.assembly.final_errors import final_errors
-from tolalloc.assembly.gains import Gains, tuned_gains
-from tolalloc.assembly.kalman import kalman_filter
-from tolalloc.assembly.regulator import regulator
+from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
+from tolalloc.assembly.control import kalman_filter, regulator
+from tolalloc.assembly.files import load_plan
+from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 

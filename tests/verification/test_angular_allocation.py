@@ -10,11 +10,9 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 from studies.published.zhang2025_genetic import genetic_allocation
-from tolalloc.assembly.angular.allocation import allocate_angles
-from tolalloc.assembly.angular.precision import best_precision
-from tolalloc.assembly.angular.retuning import retuned_allocation
-from tolalloc.assembly.angular.verification import verify_angles
-from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.angular.allocation import allocate_angles, verify_angles
+from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
+from tolalloc.assembly.files import load_plan
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.units import ARCSECOND

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.assembly.chain_file import DATA, load_plan
-from tolalloc.assembly.errors_file import load_errors
+from tolalloc.assembly.files import DATA, load_errors, load_plan
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import Step, check_steps
+from tolalloc.assembly.steps import AssemblyStep, check_steps
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.rv.equivalent.bearings import crank_disc
 from tolalloc.rv.equivalent.kinematics import Positions
@@ -94,7 +93,7 @@ def test_the_shipped_chain_is_the_instance_that_its_assumptions_state(bx40e):
     assert (bx40e.precision, bx40e.weights.tolist()) == (10.0, [1.0] * 4)
     assert bx40e.measurement_noise == pytest.approx(2 * ARCSECOND)
     assert bx40e.adjustment_noise == pytest.approx(ARCSECOND)
-    assert bx40e.steps[2] == Step(
+    assert bx40e.steps[2] == AssemblyStep(
         mount="KC3",
         adjust=("KC1", "KC2", "KC3"),
         effort={"KC1": 10.0, "KC2": 10.0, "KC3": 1.0, "KC4": 1000.0},
@@ -161,7 +160,7 @@ def test_what_is_left_out_takes_its_default(tmp_path):
 
 def test_parts_that_are_not_there_may_be_turned_in_zhang2025s_own_way_alone(tmp_path):
     plan = load(tmp_path, ("precision = 2", 'precision = 2\nadjust = "all"\nmeasure = "mounted"'))
-    assert plan.steps[0] == Step(
+    assert plan.steps[0] == AssemblyStep(
         mount="column", adjust=("column", "head"), effort={"column": 1.0, "head": 1000.0}, measure=("column",)
     )
     assert plan.space.adjusting[0].any(axis=0).all()
@@ -172,8 +171,8 @@ def test_parts_that_are_not_there_may_be_turned_in_zhang2025s_own_way_alone(tmp_
 def test_steps_are_taken_as_they_are_listed(tmp_path):
     plan = load(tmp_path, text=SHORT + STEPS)
     assert plan.steps == (
-        Step(mount="column", adjust=("column",), effort={"column": 3.0}, measure=("column",)),
-        Step(mount="head", adjust=("column", "head"), effort={"head": 2.0}, measure=("head - column",)),
+        AssemblyStep(mount="column", adjust=("column",), effort={"column": 3.0}, measure=("column",)),
+        AssemblyStep(mount="head", adjust=("column", "head"), effort={"head": 2.0}, measure=("head - column",)),
     )
     np.testing.assert_array_equal(plan.space.observing[1], np.hstack([-np.eye(3), np.eye(3)]))
 

@@ -17,7 +17,7 @@ from tolalloc.assembly.answer.plan_record import plan_record
 from tolalloc.assembly.answer.results import AssemblyResults, TransmissionEffect
 from tolalloc.assembly.answer.sentences import answer
 from tolalloc.assembly.answer.summary import summary
-from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves
 from tolalloc.assembly.steps import Efforts, steps_in_order

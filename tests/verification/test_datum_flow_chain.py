@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.files import load_plan
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.units import ARCSECOND
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.chain_file import load_plan
+from tolalloc.assembly.control import regulator
+from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.orientations import OrientationResponse, transmission_curves
-from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError

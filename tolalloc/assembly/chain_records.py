@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.assembly.chain import Part
 from tolalloc.assembly.plan import LARGEST_PRECISION
-from tolalloc.assembly.steps import Choice, Efforts, Step
+from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive
 from tolalloc.files import Record
 from tolalloc.units import DEGREE, MILLIMETRE
 
@@ -62,7 +62,6 @@ Angle = Annotated[float, AfterValidator(_believed)]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Millimetres = Annotated[float, Field(ge=-10000, le=10000)]
 Weight = Annotated[float, Field(ge=0, le=1e9)]
-Positive = Annotated[float, Field(gt=0, le=1e9)]
 Noise = Annotated[float, AfterValidator(_noise)]
 Three = BeforeValidator(_three)
 
@@ -128,23 +127,9 @@ class StepRecord(Record):
                 raise ValueError(f"effort names {name}; allowed are parts that the step adjusts")
         return self
 
-    def step(self) -> Step:
+    def step(self) -> AssemblyStep:
         """Return the step."""
-        return Step(mount=self.mount, adjust=self.adjust, effort=self.effort, measure=self.measure)
-
-
-class EffortsRecord(Record):
-    """Table ``[effort]``."""
-
-    just_mounted: Positive = Efforts.just_mounted
-    mounted_earlier: Positive = Efforts.mounted_earlier
-    not_mounted: Positive = Efforts.not_mounted
-
-    def efforts(self) -> Efforts:
-        """Return the efforts."""
-        return Efforts(
-            just_mounted=self.just_mounted, mounted_earlier=self.mounted_earlier, not_mounted=self.not_mounted
-        )
+        return AssemblyStep(mount=self.mount, adjust=self.adjust, effort=self.effort, measure=self.measure)
 
 
 class NoiseRecord(Record):
@@ -182,7 +167,7 @@ class ChainRecord(Record):
     precision: Annotated[float, Field(ge=0, le=LARGEST_PRECISION)]
     adjust: Choice | None = None
     measure: Literal["current", "mounted"] | None = None
-    effort: EffortsRecord | None = None
+    effort: Efforts | None = None
     noise: NoiseRecord = NoiseRecord()
     part: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)]
     step: tuple[dict[str, Any], ...] = ()

@@ -1,4 +1,4 @@
-"""Gains of an adjustment, and what they leave of part errors and noise."""
+"""Gains of an adjustment, and what they leave of part errors and noise: exact, for any fixed gains."""
 
 from __future__ import annotations
 
@@ -7,12 +7,80 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.final_errors import FinalErrors, final_errors
-from tolalloc.assembly.kalman import KalmanFilter, kalman_filter
+from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, regulator
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.regulator import Regulator, regulator
+from tolalloc.assembly.steps import StateSpace
 from tolalloc.assembly.trajectory import Trajectory, drawn, random_numbers
 from tolalloc.exceptions import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinalErrors:
+    """Final state and adjustments as linear maps of everything random.
+
+    Parameters
+    ----------
+    by_part
+        Final state per part error [rad/rad].
+    by_noise
+        Final state per standard deviation of every reading, then of every adjustment of every step [rad].
+    adjustments_by_part, adjustments_by_noise
+        Adjustments of all steps in the same way [rad/rad, rad].
+    effort
+        Diagonal of R(k) [-].
+
+    Notes
+    -----
+    Part errors and noise are independent of each other, so covariance and expected effort are affine in the part
+    variances as long as the gains stay as they are.
+    """
+
+    by_part: Float[np.ndarray, "state error"]
+    by_noise: Float[np.ndarray, "state noise"]
+    adjustments_by_part: Float[np.ndarray, "step adjustment error"]
+    adjustments_by_noise: Float[np.ndarray, "step adjustment noise"]
+    effort: Float[np.ndarray, "step adjustment"]
+
+    def covariance(self, variances: Float[np.ndarray, " error"]) -> Float[np.ndarray, "state state"]:
+        """Return the covariance of the final state for variances of every part error [rad²]."""
+        return np.asarray((self.by_part * variances) @ self.by_part.T + self.noise_covariance)
+
+    @property
+    def noise_covariance(self) -> Float[np.ndarray, "state state"]:
+        """What noise alone leaves of it [rad²]."""
+        return np.asarray(self.by_noise @ self.by_noise.T)
+
+    @property
+    def effort_by_variance(self) -> Float[np.ndarray, " error"]:
+        """Expected effort, Σ uᵀRu, per variance of every part error [-]."""
+        return np.asarray(np.einsum("ka,kae->e", self.effort, self.adjustments_by_part**2))
+
+    @property
+    def noise_effort(self) -> float:
+        """Expected effort that noise alone causes [rad²]."""
+        return float(np.einsum("ka,kan->", self.effort, self.adjustments_by_noise**2))
+
+    def expected_effort(self, variances: Float[np.ndarray, " error"]) -> float:
+        """Return the expectation of Σ uᵀRu for variances of every part error [rad²]."""
+        return float(self.effort_by_variance @ variances) + self.noise_effort
+
+
+def final_errors(
+    space: StateSpace, adjusting: Regulator, kalman: KalmanFilter, measurement_noise: float, adjustment_noise: float
+) -> FinalErrors:
+    """Return how final state and adjustments follow from part errors and noise, with any gains [noise rad]."""
+    # One assembly for each random number, with that number at one and all others at zero.
+    deviations = (np.ones(space.entering.shape[2]), measurement_noise, adjustment_noise)
+    assemblies = drawn(space, adjusting, kalman, deviations, np.eye(random_numbers(space)))
+    final, adjustments = assemblies.adjusted[:, -1].T, np.moveaxis(assemblies.adjustments, 0, -1)
+    errors = space.entering.shape[2]
+    return FinalErrors(
+        by_part=final[:, :errors],
+        by_noise=final[:, errors:],
+        adjustments_by_part=adjustments[..., :errors],
+        adjustments_by_noise=adjustments[..., errors:],
+        effort=space.effort,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,16 +109,7 @@ class Gains:
 
 
 def tuned_gains(plan: AssemblyPlan, precision: float, tolerances: Float[np.ndarray, "part 3"]) -> Gains:
-    """Return the gains whose filter expects parts of given tolerances.
-
-    Parameters
-    ----------
-    plan
-        What is assembled.
-    precision
-        Q [-].
-    tolerances
-        Tolerances that the filter expects [rad].
+    """Return the gains at a precision Q whose filter expects parts of given tolerances [rad].
 
     Raises
     ------
@@ -82,10 +141,6 @@ def assembled(
 
     Parameters
     ----------
-    plan
-        What is assembled.
-    gains
-        Its gains.
     tolerances
         Tolerances of the parts [rad].
     standard
@@ -96,15 +151,7 @@ def assembled(
 
 
 def expected_angles(plan: AssemblyPlan, gains: Gains) -> Float[np.ndarray, "step 2 state"]:
-    """Return the standard deviation of every angle after each step, as mounted and as adjusted, exact [rad].
-
-    Parameters
-    ----------
-    plan
-        What is assembled.
-    gains
-        Its gains.
-    """
+    """Return the standard deviation of every angle after each step, as mounted and as adjusted, exact [rad]."""
     # One assembly for each random number: everything is linear in them, and they are independent.
     each = assembled(plan, gains, plan.tolerances, np.eye(random_numbers(plan.space)))
     return np.asarray(np.sqrt((np.stack([each.mounted, each.adjusted], axis=2) ** 2).sum(axis=0)))

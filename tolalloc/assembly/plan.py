@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.chain import DatumFlowChain
-from tolalloc.assembly.state_space import StateSpace, state_space
-from tolalloc.assembly.steps import Step
+from tolalloc.assembly.steps import AssemblyStep, StateSpace, state_space
 
 LARGEST_PRECISION = 1e6
 """Largest precision that may be asked for: far beyond, gains lose their digits [-]."""
@@ -82,7 +81,7 @@ class AssemblyPlan:
     name: str
     source: str
     chain: DatumFlowChain
-    steps: tuple[Step, ...]
+    steps: tuple[AssemblyStep, ...]
     tolerances: Float[np.ndarray, "part 3"]
     precision: float
     weights: Float[np.ndarray, " part"]
@@ -103,13 +102,7 @@ class AssemblyPlan:
         return np.asarray((self.tolerances / 3).ravel() ** 2)
 
     def final_weight(self, precision: float | None = None) -> Float[np.ndarray, "state state"]:
-        """Return the weight matrix of the final errors, Q(N) [-].
-
-        Parameters
-        ----------
-        precision
-            Q in place of the plan's own [-].
-        """
+        """Return the weight matrix of the final errors, Q(N), at a precision in place of the plan's own [-]."""
         own = self.precision if precision is None else precision
         return np.diag(own * np.repeat(self.weights, 3))
 

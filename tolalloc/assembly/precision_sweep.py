@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.final_errors import FinalErrors, final_errors
-from tolalloc.assembly.gains import tuned_gains
-from tolalloc.assembly.kalman import kalman_filter
+from tolalloc.assembly.control import kalman_filter, limiting_regulator, regulator
+from tolalloc.assembly.gains import FinalErrors, final_errors, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.regulator import limiting_regulator, regulator
 from tolalloc.assembly.trajectory import foreseen
 
 
@@ -31,8 +29,6 @@ class PrecisionSweep:
         The same of its rotation about the datum's axis [rad].
     effort
         Expected Σ uᵀRu [rad²].
-    cost
-        Expected weighted square of the final errors plus effort, what the adjustments minimise [rad²].
     next_unit
         Share of the total that another unit of Q takes off [-].
     noise_floor
@@ -44,32 +40,18 @@ class PrecisionSweep:
     tilt: Float[np.ndarray, "precision part"]
     rotation: Float[np.ndarray, "precision part"]
     effort: Float[np.ndarray, " precision"]
-    cost: Float[np.ndarray, " precision"]
     next_unit: Float[np.ndarray, " precision"]
     noise_floor: float
 
     def diminished(self, share: float = 0.01) -> float | None:
-        """Return the smallest Q from which on another unit of Q takes off less than a share, if the sweep reaches it.
-
-        Parameters
-        ----------
-        share
-            Share of the total [-].
-        """
+        """Return the smallest Q from which on another unit takes off less than a share of the total, if reached [-]."""
         worth = np.flatnonzero(self.next_unit >= share)
         first = worth[-1] + 1 if worth.size else 0
         return float(self.precisions[first]) if first < len(self.precisions) else None
 
 
 def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precision"]) -> PrecisionSweep:
-    """Return what is to be expected of an assembly over the precision weight.
-
-    Parameters
-    ----------
-    plan
-        The assembly; its own precision does not matter.
-    precisions
-        Q, ascending [-].
+    """Return what is to be expected of an assembly over the precision weight, ascending [-].
 
     Raises
     ------
@@ -94,14 +76,12 @@ def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precisio
     variances = np.array([angles(each) for each in maps])
     following = np.array([angles(at(precision + 1)) for precision in precisions])
     total, next_total = (np.sqrt(each.sum(axis=(1, 2))) for each in (variances, following))
-    weights = [plan.final_weight(float(precision)) for precision in precisions]
     return PrecisionSweep(
         precisions=precisions,
         total=total,
         tilt=np.sqrt(variances[..., 0] + variances[..., 1]),
         rotation=np.sqrt(variances[..., 2]),
         effort=np.array([each.expected_effort(plan.variances) for each in maps]),
-        cost=np.array([each.expected_cost(plan.variances, weight) for each, weight in zip(maps, weights, strict=True)]),
         next_unit=1 - next_total / np.where(total > 0, total, 1.0),
         noise_floor=float(np.sqrt(angles(limit).sum())),
     )
@@ -112,22 +92,9 @@ def norms(
 ) -> Float[np.ndarray, "precision *samples"]:
     """Return the weighted norm of the final errors of parts that are measured beforehand, over the precision weight.
 
-    Parameters
-    ----------
-    plan
-        The assembly; its own precision does not matter.
-    errors
-        Errors of the parts in their own axes [rad].
-    precisions
-        Q [-].
-
-    Returns
-    -------
-    norms
-        √(xᵀQx) of the final errors at Q = 1 times the plan's weights: the plain norm where all weights are 1 [rad].
-
     Notes
     -----
+    It is √(xᵀQx) of the final errors at Q = 1 times the plan's weights: the plain norm where all weights are 1 [rad].
     With S = √Q₁ W √Q₁ ⪰ 0 the weighted final state is (I + qS)⁻¹ times the unadjusted one: each of its coordinates
     along the eigenvectors of S falls and is convex in q, and so is the norm. A single angle need not fall.
     """

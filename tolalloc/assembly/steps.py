@@ -1,23 +1,26 @@
-"""Steps of an assembly: what is mounted, what may be turned at which effort, and what is measured."""
+"""Steps of an assembly: what is mounted, turned at which effort, and measured, and all of it as a linear system."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
+from pydantic import Field
 
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.files import Record
 
+Positive = Annotated[float, Field(gt=0, le=1e9)]
 Choice = Literal["current", "mounted", "all"]
 """The part just mounted; all parts mounted so far; also those that are not there yet, as zhang2025's R = 1000 does."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step:
+class AssemblyStep:
     """One step: mount a part, measure, adjust.
 
     Parameters
@@ -38,9 +41,8 @@ class Step:
     measure: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Efforts:
-    """Effort of turning a part by one unit of angle, over that of the precision weight.
+class Efforts(Record):
+    """Effort of turning a part by one unit of angle over that of the precision weight; table ``[effort]`` of a file.
 
     Parameters
     ----------
@@ -48,9 +50,9 @@ class Efforts:
         Of the part mounted in this step; before; afterwards [-].
     """
 
-    just_mounted: float = 1.0
-    mounted_earlier: float = 10.0
-    not_mounted: float = 1000.0
+    just_mounted: Positive = 1.0
+    mounted_earlier: Positive = 10.0
+    not_mounted: Positive = 1000.0
 
     def of(self, part: int, step: int) -> float:
         """Return the effort of turning the part at a position in the order of assembly at a step [-]."""
@@ -59,20 +61,12 @@ class Efforts:
         return self.just_mounted if part == step else self.mounted_earlier
 
 
-def steps_in_order(chain: DatumFlowChain, adjust: Choice, measure: Choice, efforts: Efforts) -> tuple[Step, ...]:
-    """Return one step per part, in the order of assembly.
-
-    Parameters
-    ----------
-    chain
-        The parts.
-    adjust, measure
-        Which parts may be turned, and which are measured against the datum, at every step.
-    efforts
-        Effort of turning.
-    """
+def steps_in_order(
+    chain: DatumFlowChain, adjust: Choice, measure: Choice, efforts: Efforts
+) -> tuple[AssemblyStep, ...]:
+    """Return one step per part in the order of assembly, which adjusts and measures the chosen ones."""
     return tuple(
-        Step(
+        AssemblyStep(
             mount=mounted,
             adjust=_chosen(chain.names, at, adjust),
             effort={name: efforts.of(place, at) for place, name in enumerate(chain.names)},
@@ -86,17 +80,17 @@ def _chosen(names: tuple[str, ...], step: int, choice: Choice) -> tuple[str, ...
     return {"current": names[step : step + 1], "mounted": names[: step + 1], "all": names}[choice]
 
 
-def adjustable(chain: DatumFlowChain, step: Step) -> Bool[np.ndarray, " part"]:
+def adjustable(chain: DatumFlowChain, step: AssemblyStep) -> Bool[np.ndarray, " part"]:
     """Return which parts may be turned at a step."""
     return np.array([name in step.adjust for name in chain.names])
 
 
-def efforts(chain: DatumFlowChain, step: Step) -> Float[np.ndarray, " part"]:
+def efforts(chain: DatumFlowChain, step: AssemblyStep) -> Float[np.ndarray, " part"]:
     """Return the effort of turning each part at a step, 1 where none is given [-]."""
     return np.array([float(step.effort.get(name, 1.0)) for name in chain.names])
 
 
-def observed(chain: DatumFlowChain, step: Step) -> Float[np.ndarray, "reading part"]:
+def observed(chain: DatumFlowChain, step: AssemblyStep) -> Float[np.ndarray, "reading part"]:
     """Return what is measured at a step as rows of 1, −1 and 0 over the parts [-]."""
     rows = np.zeros((len(step.measure), len(chain.parts)))
     for row, text in zip(rows, step.measure, strict=True):
@@ -105,17 +99,68 @@ def observed(chain: DatumFlowChain, step: Step) -> Float[np.ndarray, "reading pa
     return rows
 
 
-def check_steps(chain: DatumFlowChain, steps: Sequence[Step], place: str) -> None:
-    """Refuse steps that cannot be carried out.
+@dataclass(frozen=True, kw_only=True)
+class StateSpace:
+    """Steps mount → measure → adjust: z = x + F w, y = C z + v, x⁺ = z + B (u + n).
 
     Parameters
     ----------
-    chain
-        The parts.
-    steps
-        The steps.
-    place
-        File or caller for the sentence.
+    entering
+        F(k): state per error of every part, zero for parts that the step does not mount [rad/rad].
+    adjusting
+        B(k): state per adjustment of every part in its own axes, zero where it may not be turned [rad/rad].
+    effort
+        Diagonal of R(k) [-].
+    observing
+        C(k): readings per state [-].
+
+    Notes
+    -----
+    zhang2025's equations with A = 1, in the causal order: what a step brings in is measured before it is adjusted;
+    otherwise the last part's error could never be taken out.
+    """
+
+    entering: Float[np.ndarray, "step state error"]
+    adjusting: Float[np.ndarray, "step state adjustment"]
+    effort: Float[np.ndarray, "step adjustment"]
+    observing: tuple[Float[np.ndarray, "_reading state"], ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps [-]."""
+        return int(self.entering.shape[0])
+
+    @property
+    def states(self) -> int:
+        """Number of states [-]."""
+        return int(self.entering.shape[1])
+
+
+def state_space(
+    chain: DatumFlowChain, steps: Sequence[AssemblyStep], transform: Float[np.ndarray, "state error"] | None = None
+) -> StateSpace:
+    """Return the linear system of an assembly.
+
+    Parameters
+    ----------
+    transform
+        `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a part
+        [rad/rad].
+    """
+    whole = chain.transform if transform is None else transform
+    size = whole.shape[0] // len(chain.parts)
+    mounted = np.array([[name == step.mount for name in chain.names] for step in steps])
+    turned = np.array([adjustable(chain, step) for step in steps])
+    return StateSpace(
+        entering=whole * np.repeat(mounted, size, axis=1)[:, np.newaxis],
+        adjusting=whole * np.repeat(turned, size, axis=1)[:, np.newaxis],
+        effort=np.repeat([efforts(chain, step) for step in steps], size, axis=1),
+        observing=tuple(np.kron(observed(chain, step), np.eye(size)) for step in steps),
+    )
+
+
+def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str) -> None:
+    """Refuse steps that cannot be carried out, in a sentence about a place, such as their file.
 
     Raises
     ------
@@ -150,11 +195,11 @@ def check_steps(chain: DatumFlowChain, steps: Sequence[Step], place: str) -> Non
         raise InputError.at(place, "steps", ", ".join(mounted), "the order of the parts: " + ", ".join(chain.names))
 
 
-def _measured(step: Step) -> list[str]:
+def _measured(step: AssemblyStep) -> list[str]:
     return [name.strip() for text in step.measure for name in text.split(" - ")]
 
 
-def _check_names_and_efforts(chain: DatumFlowChain, step: Step, where: str) -> None:
+def _check_names_and_efforts(chain: DatumFlowChain, step: AssemblyStep, where: str) -> None:
     """Refuse unknown names, efforts that are not positive and measurements that are none."""
     for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
         if name not in chain.names:

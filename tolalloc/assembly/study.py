@@ -8,18 +8,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
-from tolalloc.assembly.angular.limits import angular_limits
-from tolalloc.assembly.angular.precision import best_precision
-from tolalloc.assembly.angular.retuning import retuned_allocation
-from tolalloc.assembly.angular.verification import verify_angles
+from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles, verify_angles
+from tolalloc.assembly.angular.program import angular_limits
+from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts
-from tolalloc.assembly.chain_file import load_plan
-from tolalloc.assembly.errors_file import load_errors
+from tolalloc.assembly.control import regulator
+from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.assembly.gains import expected_angles, tuned_gains
 from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
-from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.assembly.transmission import transmission_effect
 from tolalloc.drawing.seeds import SeedTree

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.kalman import KalmanFilter
-from tolalloc.assembly.regulator import Regulator
-from tolalloc.assembly.state_space import StateSpace
+from tolalloc.assembly.control import KalmanFilter, Regulator
+from tolalloc.assembly.steps import StateSpace
 
 State = Float[np.ndarray, "*samples state"]
 
@@ -35,17 +34,7 @@ class Trajectory:
 
 
 def foreseen(space: StateSpace, regulator: Regulator, errors: Float[np.ndarray, "*samples error"]) -> Trajectory:
-    """Return assemblies of parts that are all measured before the first is mounted.
-
-    Parameters
-    ----------
-    space
-        The assembly as a linear system.
-    regulator
-        The adjustments.
-    errors
-        Errors of the parts in their own axes [rad].
-    """
+    """Return assemblies of parts that are all measured before the first is mounted, errors in their own axes [rad]."""
     exact = np.zeros((*errors.shape[:-1], *space.effort.shape))
     return _march(
         space,
@@ -54,18 +43,6 @@ def foreseen(space: StateSpace, regulator: Regulator, errors: Float[np.ndarray, 
         exact,
         lambda step, mounted: mounted + errors @ space.entering[step + 1 :].sum(axis=0).T,
     )
-
-
-def as_mounted(space: StateSpace, regulator: Regulator, errors: Float[np.ndarray, "*samples error"]) -> Trajectory:
-    """Return assemblies in which an error is known, exactly, once its part is mounted.
-
-    Parameters
-    ----------
-    space, regulator, errors
-        As in `foreseen`.
-    """
-    exact = np.zeros((*errors.shape[:-1], *space.effort.shape))
-    return _march(space, regulator, errors, exact, lambda step, mounted: mounted)  # noqa: ARG005
 
 
 def simulated(
@@ -80,10 +57,6 @@ def simulated(
 
     Parameters
     ----------
-    space, regulator, errors
-        As in `foreseen`.
-    kalman
-        The estimator.
     reading_noise
         What every reading adds, the readings of all steps in a row [rad].
     adjustment_noise
@@ -120,8 +93,6 @@ def drawn(
 
     Parameters
     ----------
-    space, regulator, kalman
-        As in `simulated`.
     deviations
         Standard deviations of every part error, of a reading, and of what an adjustment misses [rad].
     standard

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.answer.results import TransmissionEffect
+from tolalloc.assembly.control import regulator
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import OrientationResponse, transmission_curves
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.regulator import regulator
 from tolalloc.assembly.trajectory import foreseen, random_numbers
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree

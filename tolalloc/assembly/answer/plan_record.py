@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
-from tolalloc.assembly.steps import Step, adjustable, efforts
+from tolalloc.assembly.steps import AssemblyStep, adjustable, efforts
 from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
 
 
@@ -73,7 +73,7 @@ def _limits_and_costs(required: AngularRequirements, at: int) -> dict[str, Any]:
     }
 
 
-def _step(plan: AssemblyPlan, number: int, step: Step) -> dict[str, Any]:
+def _step(plan: AssemblyPlan, number: int, step: AssemblyStep) -> dict[str, Any]:
     turned = zip(plan.chain.names, adjustable(plan.chain, step), plain(efforts(plan.chain, step)), strict=True)
     return {
         "step [-]": number,

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.assembly.angular.allocation import AngularAllocation
-from tolalloc.assembly.angular.precision import PrecisionCost
-from tolalloc.assembly.angular.retuning import RetunedAllocation
-from tolalloc.assembly.angular.verification import AngularVerification
+from tolalloc.assembly.angular.allocation import AngularAllocation, AngularVerification
+from tolalloc.assembly.angular.tuning import PrecisionCost, RetunedAllocation
 from tolalloc.assembly.gains import Gains
 from tolalloc.assembly.orientations import TransmissionCurves
 from tolalloc.assembly.plan import AssemblyPlan

@@ -1,4 +1,4 @@
-"""The precision at which tolerances and adjustment together cost least."""
+"""What else can be tuned: a filter that expects what is allocated with it, and the precision that costs least."""
 
 from __future__ import annotations
 
@@ -9,13 +9,71 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
-from tolalloc.assembly.angular.allocation import AngularAllocation, allocated
+from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles, allocated
 from tolalloc.assembly.gains import tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.exceptions import InputError
 
-_SETTLED = 1e-6
-"""Relative doubt about the precision with which the search ends [-]."""
+_TOLERANCES_SETTLED = 1e-8
+"""Relative change of all tolerances below which they count as settled [-]."""
+_PRECISION_SETTLED = 1e-6
+"""Step of the precision's logarithm with which the search for the best one ends [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RetunedAllocation:
+    """Allocations with filters that expect the tolerances of the one before.
+
+    Parameters
+    ----------
+    allocations
+        The allocations; the first filter expects the plan's own tolerances.
+    settled
+        Whether the last filter expects the tolerances that are allocated with it.
+    """
+
+    allocations: tuple[AngularAllocation, ...]
+    settled: bool
+
+    @property
+    def best(self) -> AngularAllocation:
+        """The cheapest; its bound holds for its own gains, not for all filters."""
+        return min(self.allocations, key=lambda each: each.total)
+
+
+def retuned_allocation(
+    plan: AssemblyPlan, precision: float | None = None, most_filters: int = 100
+) -> RetunedAllocation:
+    """Return allocations whose filters are tuned again until the tolerances settle.
+
+    Parameters
+    ----------
+    precision
+        Q in place of the plan's own [-].
+    most_filters
+        Filters after which the iteration ends, settled or not [-].
+
+    Raises
+    ------
+    InputError
+        As `allocate_angles`.
+
+    Notes
+    -----
+    Every allocation keeps the limits with its own gains, so each is one that can be built, whether or not the iteration
+    settles. Gains and tolerances together are not a convex program: neither the fixed point nor the best of the
+    allocations is claimed to be the cheapest of all filters. The iteration ends where no tolerances keep the limits.
+    """
+    found = [allocate_angles(plan, precision)]
+    while len(found) < most_filters:
+        last = found[-1]
+        following = allocated(plan, tuned_gains(plan, last.gains.precision, last.tolerances))
+        if following is None:
+            break
+        found.append(following)
+        if np.abs(following.tolerances / last.tolerances - 1).max() <= _TOLERANCES_SETTLED:
+            return RetunedAllocation(allocations=tuple(found), settled=True)
+    return RetunedAllocation(allocations=tuple(found), settled=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +114,6 @@ def best_precision(plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100
 
     Parameters
     ----------
-    plan
-        What is assembled.
     lowest, highest
         Precisions between which the best one is looked for, above 0 [-].
     points
@@ -91,7 +147,7 @@ def best_precision(plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100
     at = int(np.nanargmin(cost + effort_cost))
     around = np.log(precisions[[max(at - 1, 0), min(at + 1, points - 1)]])
     refined = minimize_scalar(
-        lambda q: _total(plan, exp(q)), bounds=around, method="bounded", options={"xatol": _SETTLED}
+        lambda q: _total(plan, exp(q)), bounds=around, method="bounded", options={"xatol": _PRECISION_SETTLED}
     )
     return PrecisionCost(
         precisions=precisions,
