@@ -6,14 +6,14 @@ python studies/li2018_modification.py [--quick] [--out FOLDER]
 from __future__ import annotations
 
 import pandas as pd
+from published.modification_comparison import compared, comparison_document
 
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document, Section
-from tolalloc.rv.modification.answer import modification_document
 from tolalloc.rv.modification.reference import reference
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
-from tolalloc.rv.modification.study import ModificationStudy, choose
+from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 
@@ -45,9 +45,9 @@ def ladder() -> pd.DataFrame:
 def build(quick: bool) -> Document:
     """Return the report."""
     reducer = load_reducer("rv40e")
-    study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE, seeds=2 if quick else 30, seed=0)
+    study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE)
     with UnitProgress("searches") as progress:
-        results = choose(study, reducer, reducer.load.rated_torque, progress)
+        found = compared(study, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
     section = Section(
         heading="Closed form",
         paragraphs=(
@@ -57,7 +57,7 @@ def build(quick: bool) -> Document:
         ),
         tables=(("closed form", ladder()),),
     )
-    return modification_document(results, section)
+    return comparison_document(found, section)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from dataclasses import replace
 from math import pi, sin
 
 import pandas as pd
+from published.modification_comparison import algorithms_table, compared, comparison_document, convergence_figure
 
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
@@ -16,13 +17,12 @@ from tolalloc.report.document import Document, Section
 from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.answer import algorithms_table, convergence_figure, modification_document
 from tolalloc.rv.modification.reference import reference
 from tolalloc.rv.modification.rotated_profile import METRICS, rotated_profile_fit
-from tolalloc.rv.modification.study import ModificationStudy, choose
+from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.teeth.contact import clearance_figure
+from tolalloc.rv.teeth.figures import clearance_figure
 from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 
 STAGE = CycloidStage(
@@ -115,20 +115,21 @@ def printed_points() -> pd.DataFrame:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    own, seeds = reducer(), 3 if quick else 30
+    own = reducer()
     with UnitProgress("searches") as progress:
         positive, negative = (
-            choose(
-                ModificationStudy(method="song2019", radial_clearance=0.0, shift_sign=sign, seeds=seeds, seed=0),
+            compared(
+                ModificationStudy(method="song2019", radial_clearance=0.0, shift_sign=sign),
                 own,
-                own.load.rated_torque,
+                -own.load.rated_torque,
+                range(3 if quick else 30),
                 progress,
             )
             for sign in (1, -1)
         )
     allowed = reference(rotated_profile_fit(STAGE, require_gap=True))
-    without = assess(replace(own, modification=allowed.modification), own.load.rated_torque)
-    clearance = positive.assessment.clearance
+    without = assess(replace(own, modification=allowed.modification), -own.load.rated_torque)
+    clearance = positive.answer.contact.assessment.clearance
     sections = (
         Section(
             heading="Negative shift",
@@ -165,7 +166,7 @@ def build(quick: bool) -> Document:
             figures=(replace(clearance_figure(without), name="clearance_without_interference"),),
         ),
     )
-    document = modification_document(positive, *sections)
+    document = comparison_document(positive, *sections)
     return replace(document, title="song2019: towards a rotated profile by differential evolution")
 
 

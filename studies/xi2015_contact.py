@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.clearance import formula_gap
 from tolalloc.rv.cycloid.law_at_every_pin import pressed
 from tolalloc.rv.cycloid.linear_method import pressed_linear
@@ -22,8 +21,7 @@ from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, defa
 from tolalloc.rv.cycloid.mesh import normals
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.teeth.contact import contact_sections
-from tolalloc.rv.teeth.contact_tables import summary
+from tolalloc.rv.teeth.answer import contact_answer
 from tolalloc.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 TORQUE = 572.0
@@ -102,7 +100,7 @@ def build(quick: bool) -> Document:
         rows.append(row(f"steel line contact, {width:g} mm, linear method", pressed_linear(own, phase)))
         rows.append(row(f"steel line contact, {width:g} mm, law at every pin", steel[width]))
     share = float(np.mean(implied.pins_in_contact == 16))
-    found = assess(reducer, TORQUE)
+    found = contact_answer(reducer, -TORQUE)
     return Document(
         title="RV-40E of xi2015: how many teeth carry 572 N·m",
         subtitle=f"{torque:g} N·m on the more loaded disc, {phase.size} phases of the pin pitch.",
@@ -121,14 +119,14 @@ def build(quick: bool) -> Document:
                 figures=(force_figure({"implied by the angles": implied, "steel line contact, 12 mm": steel[12.0]}),),
                 tables=(("readings", pd.DataFrame(rows)),),
             ),
-            *contact_sections(found),
+            *found.sections,
         ),
         assumptions=found.assumptions,
         summary={
             "implied deflection [µm]": deflection / MICROMETRE,
             "span of two supports [mm]": span,
             "readings": rows,
-            "reducer as it is": summary(found),
+            "reducer as it is": found.summary,
         },
     )
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studies.published.modification_searches import Recorder, polish
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.reference import polish, reference
+from tolalloc.rv.modification.reference import reference
 from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
 from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
@@ -54,7 +55,10 @@ def test_optimum(sign, metric, points, equidistant, shift, mean):
 
 
 def test_optimum_hardly_depends_on_more_points(optimum):
-    many = polish(rotated_profile_fit(STAGE, points=5000), optimum)
+    problem = rotated_profile_fit(STAGE, points=5000)
+    recorder = Recorder(problem)
+    recorder(optimum.amounts[np.newaxis])
+    many = polish(problem, recorder.result("optimum at 180 points", None))
     assert many.amounts[0] / MILLIMETRE == pytest.approx(0.64985, abs=5.1e-6)
 
 

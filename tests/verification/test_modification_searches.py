@@ -7,16 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.published.li2018_genetic import (
+    LI2018,
+    BinaryCode,
+    binary_search,
+    extrapolated,
+    mixed_penalty,
+    scaled_fitness,
+)
+from studies.published.modification_searches import ALGORITHMS, REACHED, Recorder, Spread, polish, search, spread
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.binary_ga import LI2018, BinaryCode, binary_search, scaled_fitness
 from tolalloc.rv.modification.history import History
-from tolalloc.rv.modification.mixed_penalty import extrapolated, mixed_penalty
-from tolalloc.rv.modification.problem import Evaluation
-from tolalloc.rv.modification.reference import polish, reference
+from tolalloc.rv.modification.problem import EvaluatedAmounts
+from tolalloc.rv.modification.reference import reference
 from tolalloc.rv.modification.residual_gap import residual_gap
-from tolalloc.rv.modification.result import REACHED, Spread, Tally
 from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
-from tolalloc.rv.modification.searches import ALGORITHMS, search, spread
 from tolalloc.rv.reducer.design import CycloidStage
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -39,9 +44,9 @@ IMPOSSIBLE = rotated_profile_fit(SONG, radial_clearance=2 * MILLIMETRE)
 
 def from_point(problem, amounts):
     """Return a search that knows one point only."""
-    tally = Tally(problem)
-    tally(np.array([amounts]))
-    return tally.result("guess", None)
+    recorder = Recorder(problem)
+    recorder(np.array([amounts]))
+    return recorder.result("guess", None)
 
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
@@ -72,7 +77,7 @@ def test_polishing_ends_at_the_reference_wherever_it_begins(problem, generator):
 
 def test_polishing_never_makes_worse():
     best = reference(FIT)
-    assert polish(FIT, best).objective <= best.objective
+    assert polish(FIT, from_point(FIT, best.amounts)).objective <= best.objective
 
 
 def test_differential_evolution_reaches_the_optimum_in_nine_seeds_of_ten():
@@ -148,7 +153,7 @@ def test_impossible_problem_gives_the_least_violating_point(algorithm):
     assert found.violation == pytest.approx(MILLIMETRE, rel=coarse)
     assert found.amounts == pytest.approx([MILLIMETRE, 0.0], abs=coarse * MILLIMETRE)
     assert found.status.startswith("no point of ") and found.status.endswith(" µm")
-    assert np.isinf(found.history.best).all()
+    assert algorithm == "reference" or np.isinf(found.history.best).all()
 
 
 def test_status_of_a_possible_problem_says_so():
@@ -161,7 +166,7 @@ def test_unknown_algorithm_is_named_with_the_nearest():
 
 
 def test_merit_sorts_met_points_by_objective_and_others_by_violation():
-    evaluation = Evaluation(
+    evaluation = EvaluatedAmounts(
         objective=np.array([3e-4, 1e-4, 0.0, 0.0]),
         constraints=np.array([[0.0, 1e-3], [1e-3, -1e-19], [1e-3, -1e-6], [-1e-6, -1e-6]]),
     )

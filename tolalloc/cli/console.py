@@ -20,6 +20,7 @@ from rich.table import Table
 from tolalloc.compiled import is_kept
 
 if TYPE_CHECKING:
+    from tolalloc.report.answer import Answer
     from tolalloc.report.document import Document
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
@@ -60,10 +61,26 @@ def _cell(value: object) -> str:
 
 def say(document: Document) -> None:
     """Print a report's answer and warnings."""
-    for sentence in document.answer:
+    _say(document.answer, document.warnings)
+
+
+def tell(answer: Answer) -> None:
+    """Print an answer's sentences and warnings."""
+    _say(answer.sentences, answer.warnings)
+
+
+def _say(sentences: tuple[str, ...], warnings: tuple[str, ...]) -> None:
+    for sentence in sentences:
         screen.print(sentence, markup=False, highlight=False, soft_wrap=True)
-    for warning in document.warnings:
+    for warning in warnings:
         screen.print(warning, style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def write_report(answer: Answer, out: Path | None) -> None:
+    """Write the report on an answer into a folder, if one was asked for."""
+    if out:
+        folder = answer.save(out)
+        messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
 
 
 class UnitProgress:

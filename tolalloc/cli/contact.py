@@ -7,22 +7,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, messages, print_json, print_table, say
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    announce_compilation,
+    messages,
+    print_json,
+    print_table,
+    tell,
+    write_report,
+)
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
-from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.cycloid.assessment import Assessment, assess
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE, MILLIMETRE
 
 if TYPE_CHECKING:
-    from tolalloc.report.document import Document
+    from tolalloc.report.answer import Answer
     from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+    from tolalloc.rv.reducer.design import Reducer
 
 ProfileFile = Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")]
 ProfilePoints = Annotated[int, typer.Option(help="Points per tooth of that file.")]
 MOST_PHASES = 3600
+PLACE = "tolalloc contact"
 
 
 def contact(
@@ -41,103 +46,71 @@ def contact(
     as_json: AsJson = False,
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
+    from tolalloc.exceptions import InputError, UnknownNameError
+    from tolalloc.rv.cycloid.solvers.contact_law import LAWS
+    from tolalloc.rv.reducer.files import load_reducer
+    from tolalloc.rv.teeth.answer import contact_answer
+
     named = named_reducer(reducer, out, profile)
     require_writable(out, profile, points)
     design = asked_reducer(load_reducer(named), width, support)
     announce_compilation("cycloid")
-    found = contact_answer(design, torque, law, exact, phases)
-    # The report's libraries take half a second to import, and only these lines need them.
-    from tolalloc.rv.teeth.contact import contact_document
-    from tolalloc.rv.teeth.contact_tables import contact_table, profile_table
-
-    document = contact_document(found)
-    write_asked(document, out, found.profile, profile, points)
+    if law not in LAWS:
+        raise UnknownNameError.among(PLACE, "contact law", law, LAWS)
+    if not 1 <= phases <= MOST_PHASES:
+        raise InputError.at(PLACE, "--phases", phases, f"1 to {MOST_PHASES}")
+    asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, PLACE)
+    answer = contact_answer(design, asked, law=law, exact=True if exact else None, phases=phases)
+    write_asked(answer, out, answer.assessment.profile, profile, points)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    print_table(profile_table(found), f"{design.name}: profile and clearance")
-    print_table(contact_table(found), f"{design.name}: {found.torque:g} N·m on the carrier")
-    say(document)
+    print_table(answer.profile_table, f"{design.name}: profile and clearance")
+    print_table(answer.contact_table, f"{design.name}: {asked:g} N·m on the carrier")
+    tell(answer)
 
 
 def asked_reducer(reducer: Reducer, width_mm: float | None, support_mm: float | None) -> Reducer:
     """Return the reducer with the face width and the support of the pins that were asked for.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    width_mm
-        Loaded face width; the reducer's own unless given [mm].
-    support_mm
-        Distance of two supports between which pins bend; the reducer's own support unless given [mm].
 
     Raises
     ------
     InputError
         Not a width or a span of a reducer.
     """
-    place = "tolalloc contact"
+    from tolalloc.exceptions import InputError
+    from tolalloc.units import MILLIMETRE
+
     if width_mm is not None:
         if not 0.5 <= width_mm <= 200:
-            raise InputError.at(place, "--width", width_mm, "0.5 to 200 mm")
+            raise InputError.at(PLACE, "--width", width_mm, "0.5 to 200 mm")
         reducer = reducer.with_face_width(width_mm * MILLIMETRE)
     if support_mm is not None:
         if not 1 <= support_mm <= 500:
-            raise InputError.at(place, "--support", support_mm, "1 to 500 mm between two supports")
+            raise InputError.at(PLACE, "--support", support_mm, "1 to 500 mm between two supports")
         reducer = reducer.with_pin_span(support_mm * MILLIMETRE)
     return reducer
-
-
-def contact_answer(reducer: Reducer, torque: float | None, law: str, exact: bool, phases: int) -> Assessment:
-    """Return the assessment that was asked for, at the rated torque unless one is given.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    torque
-        Torque on the carrier [N·m].
-    law
-        Contact law of the pins.
-    exact
-        Whether to take exact distances even where the linear formula would do.
-    phases
-        Phases of the pin pitch [-].
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        What is not allowed.
-    """
-    place = "tolalloc contact"
-    if law not in LAWS:
-        raise UnknownNameError.among(place, "contact law", law, LAWS)
-    if not 1 <= phases <= MOST_PHASES:
-        raise InputError.at(place, "--phases", phases, f"1 to {MOST_PHASES}")
-    asked = reducer.torque_on_carrier(reducer.load.rated_torque if torque is None else torque, place)
-    return assess(reducer, asked, law=law, exact=True if exact else None, phases=phases)
 
 
 def require_writable(out: Path | None, file: Path | None, points: int) -> None:
     """Refuse a report or a profile that could not be written, before anything long runs."""
     from tolalloc.report.folder import require_usable
-    from tolalloc.rv.teeth.profile_files import require_profile_file
 
     if out:
         require_usable(out)
     if file:
+        from tolalloc.rv.teeth.profile_files import require_profile_file
+
         require_profile_file(file, points)
 
 
-def write_asked(document: Document, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
+def write_asked(answer: Answer, out: Path | None, teeth: ToothProfile, file: Path | None, points: int) -> None:
     """Write the report and the profile that were asked for."""
-    from tolalloc.cli.document_script import written
-    from tolalloc.rv.teeth.profile_files import write_profile
-
-    if out:
-        written(out, lambda: document)
+    write_report(answer, out)
     if file:
+        from tolalloc.rv.teeth.profile_files import write_profile
+        from tolalloc.units import MICROMETRE
+
         made = write_profile(teeth, points, file)
         messages.print(
             f"Profile: {file}, {made.per_tooth} points per tooth, chord error at most "

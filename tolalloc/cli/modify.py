@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, print_json, print_table, tell
 from tolalloc.cli.contact import ProfileFile, ProfilePoints, require_writable, write_asked
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
     from tolalloc.rv.modification.rotated_profile import Metric
@@ -27,15 +25,15 @@ def modify(
         bool, typer.Option("--require-gap", help="song2019: no interference after closing.")
     ] = False,
     torque: RatedTorqueOption = None,
-    seeds: Annotated[int, typer.Option(help="Searches of each algorithm.")] = 8,
-    seed: Annotated[int, typer.Option(help="First seed.")] = 1,
     profile: ProfileFile = None,
     points: ProfilePoints = 200,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose equidistant and shift amount by a published method, beside a sure reference and other algorithms."""
+    """Choose equidistant and shift amount by a published objective, and say what they deliver."""
     from tolalloc.rv.modification.study import ModificationStudy, choose
+    from tolalloc.rv.reducer.files import load_reducer
+    from tolalloc.units import MICROMETRE
 
     study = ModificationStudy(
         method=method,
@@ -44,23 +42,16 @@ def modify(
         metric=cast("Metric", metric),
         shift_sign=-1 if negative else 1,
         require_gap=require_gap,
-        seeds=seeds,
-        seed=seed,
     )
     named = named_reducer(reducer, out, profile)
     require_writable(out, profile, points)
     design = load_reducer(named)
-    asked = design.torque_on_carrier(design.load.rated_torque if torque is None else torque, "tolalloc modify")
+    asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, "tolalloc modify")
     announce_compilation("cycloid")
-    with UnitProgress("searches") as progress:
-        results = choose(study, design, asked, progress)
-    from tolalloc.rv.modification.answer import algorithms_table, delivered_table, modification_document
-
-    document = modification_document(results)
-    write_asked(document, out, results.assessment.profile, profile, points)
+    answer = choose(study, design, asked)
+    write_asked(answer, out, answer.contact.assessment.profile, profile, points)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    print_table(algorithms_table(results), f"{design.name}: {method}")
-    print_table(delivered_table(results), "What the amounts deliver")
-    say(document)
+    print_table(answer.delivered, f"{design.name}, {method}: what the amounts deliver")
+    tell(answer)

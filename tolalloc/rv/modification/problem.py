@@ -19,7 +19,7 @@ _UNMET = 1.0  # merit from which on a constraint is violated; no objective comes
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluation:
+class EvaluatedAmounts:
     """Points of a problem, evaluated.
 
     Parameters
@@ -86,34 +86,16 @@ class ModificationProblem(ABC):
 
     @abstractmethod
     def objective(self, amounts: Amounts) -> Float[np.ndarray, " n"]:
-        """Return what is to be minimised [m].
-
-        Parameters
-        ----------
-        amounts
-            Pairs of amounts [m].
-        """
+        """Return what is to be minimised [m]."""
 
     def constraints(self, amounts: Amounts) -> Float[np.ndarray, "n c"]:
-        """Return what must not be negative: radial clearance beyond j and, if required, q·Δr_rp − Δr_p [m].
-
-        Parameters
-        ----------
-        amounts
-            Pairs of amounts [m].
-        """
+        """Return what must not be negative: radial clearance beyond j and, if required, q·Δr_rp − Δr_p [m]."""
         equidistant, shift = amounts.T
         rows = [equidistant - shift - self.radial_clearance]
         if self.require_gap:
             rows.append(self.stage.flank_ratio * equidistant - shift)
         return np.stack(rows, axis=-1)
 
-    def evaluate(self, amounts: Amounts) -> Evaluation:
-        """Return objective and constraints.
-
-        Parameters
-        ----------
-        amounts
-            Pairs of amounts [m].
-        """
-        return Evaluation(objective=self.objective(amounts), constraints=self.constraints(amounts))
+    def evaluate(self, amounts: Amounts) -> EvaluatedAmounts:
+        """Return objective and constraints."""
+        return EvaluatedAmounts(objective=self.objective(amounts), constraints=self.constraints(amounts))

@@ -1,32 +1,89 @@
-"""The optimum without chance, and the last steps from where a search has stopped."""
+"""The optimum without chance."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize
 
-from tolalloc.rv.modification.problem import Evaluation, ModificationProblem
-from tolalloc.rv.modification.result import SearchResult, Tally
-from tolalloc.units import MILLIMETRE
+from tolalloc.rv.modification.problem import Amounts, EvaluatedAmounts, ModificationProblem
+from tolalloc.rv.reducer.design import Modification
+from tolalloc.units import MICROMETRE
 
 _FIRST, _POINTS, _LEVELS = 33, 9, 24  # the last points are 32·4²³ times closer than the bounds, which is rounding
-_REACHES = 0.05 * (-0.25) ** np.arange(6)  # first sizes of the simplices, to either side in turn, per range [-]
 
 Values = Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]]
 """Values of points on n lines."""
 
 
-def reference(problem: ModificationProblem) -> SearchResult:
-    """Return the optimum of a problem: for each equidistant amount the best shift, and of these the best.
+@dataclass(frozen=True, kw_only=True)
+class Optimum:
+    """The best of all points that were evaluated.
 
     Parameters
     ----------
-    problem
-        What is searched.
+    amounts
+        Δr_rp and Δr_p [m].
+    objective
+        Objective there [m].
+    violation
+        By how much the constraints are missed there [m].
+    evaluations
+        Points that were evaluated [-].
+    """
+
+    amounts: Float[np.ndarray, " 2"]
+    objective: float
+    violation: float
+    evaluations: int
+
+    @property
+    def modification(self) -> Modification:
+        """The amounts as a tooth modification."""
+        return Modification(equidistant=float(self.amounts[0]), shift=float(self.amounts[1]))
+
+    @property
+    def status(self) -> str:
+        """One sentence: whether the answer can be used."""
+        if self.violation == 0:
+            return f"met every constraint; best of {self.evaluations} points"
+        missed = f"{self.violation / MICROMETRE:.4g} µm"
+        return f"no point of {self.evaluations} met the constraints; the one that misses them least, by {missed}"
+
+
+class Tally:
+    """Evaluates points of a problem, counts them and keeps the best.
+
+    Attributes
+    ----------
+    best
+        Best amounts up to now [m].
+    objective, violation
+        Objective and missed constraints there [m].
+    evaluations
+        Points that were evaluated [-].
+    """
+
+    def __init__(self, problem: ModificationProblem) -> None:
+        self.problem = problem
+        self.best, self.evaluations = np.full(2, np.nan), 0
+        self._merit = self.objective = self.violation = np.inf
+
+    def __call__(self, amounts: Amounts) -> EvaluatedAmounts:
+        """Return points evaluated."""
+        evaluated = self.problem.evaluate(amounts)
+        at = int(evaluated.merit.argmin())
+        if evaluated.merit[at] < self._merit:
+            self.best, self._merit = amounts[at].copy(), float(evaluated.merit[at])
+            self.objective, self.violation = float(evaluated.objective[at]), float(evaluated.violation[at])
+        self.evaluations += len(amounts)
+        return evaluated
+
+
+def reference(problem: ModificationProblem) -> Optimum:
+    """Return the optimum of a problem: for each equidistant amount the best shift, and of these the best.
 
     Notes
     -----
@@ -44,7 +101,9 @@ def reference(problem: ModificationProblem) -> SearchResult:
         return _smallest(merit, *bounds)[np.newaxis]
 
     _smallest(best_by_shift, problem.lower[:1], problem.upper[:1])
-    return tally.result("reference", None)
+    return Optimum(
+        amounts=tally.best, objective=tally.objective, violation=tally.violation, evaluations=tally.evaluations
+    )
 
 
 def _smallest(
@@ -59,45 +118,3 @@ def _smallest(
         at = found.argmin(axis=1)
         lower, upper = places[rows, np.maximum(at - 1, 0)], places[rows, np.minimum(at + 1, points - 1)]
     return np.asarray(found[rows, at])
-
-
-def polish(problem: ModificationProblem, result: SearchResult) -> SearchResult:
-    """Return the optimum that is reached downhill from a result.
-
-    Parameters
-    ----------
-    problem
-        What was searched.
-    result
-        Where it begins; the answer is never worse, and its history goes on.
-
-    Notes
-    -----
-    Sequential quadratic programming follows the constraints; simplices of Nelder and Mead, each begun smaller than the
-    one before, need no derivative and take what kinks have left.
-    """
-    tally, lower, upper = Tally(problem), problem.lower / MILLIMETRE, problem.upper / MILLIMETRE
-    tally(result.amounts[np.newaxis])
-
-    def evaluate(genes: Float[np.ndarray, " 2"]) -> Evaluation:
-        return tally(np.clip(genes, lower, upper)[np.newaxis] * MILLIMETRE)
-
-    minimize(
-        lambda genes: evaluate(genes).objective[0] / MILLIMETRE,
-        result.amounts / MILLIMETRE,
-        method="SLSQP",
-        bounds=np.stack([lower, upper], axis=-1),
-        constraints={"type": "ineq", "fun": lambda genes: evaluate(genes).constraints[0] / MILLIMETRE},
-        options={"ftol": 1e-15, "maxiter": 50},
-    )
-    for reach in _REACHES:
-        start = tally.best / MILLIMETRE
-        corners = np.array([[0, 0], [reach, 0], [0, reach]]) * (upper - lower)
-        minimize(
-            lambda genes: evaluate(genes).merit[0] / MILLIMETRE,
-            start,
-            method="Nelder-Mead",
-            options={"initial_simplex": start + corners, "xatol": 1e-9, "fatol": 1e-13},
-        )
-    polished = tally.result(f"{result.algorithm}, polished", result.seed)
-    return replace(polished, history=result.history.then(polished.history))

@@ -1,17 +1,18 @@
-"""What a modification does to clearance and contact: figures and report of one assessment."""
+"""Figures of what a modification does to clearance and contact."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.cycloid.assessment import Assessment
 from tolalloc.rv.cycloid.clearance import FLANK, linear_clearance
 from tolalloc.rv.cycloid.mesh import normals
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.teeth.contact_tables import answer, contact_table, pin_table, profile_table, summary
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+
+METHODS = ("linear method", "law at every pin")
+"""Both ways in which one disc is loaded, as legends call them."""
 
 
 def profile_figure(profile: ToothProfile) -> Figure:
@@ -66,7 +67,7 @@ def clearance_figure(found: Assessment) -> Figure:
                     x=angle,
                     y=list(lever * contact.deflection.mean() / MICROMETRE),
                 )
-                for name, contact in (("linear method", found.linear), ("law at every pin", found.single))
+                for name, contact in zip(METHODS, (found.linear, found.single), strict=True)
             ),
         ),
         vertical=((low, f"carrying from {low:.1f}°"), (high, f"to {high:.1f}°")),
@@ -75,16 +76,16 @@ def clearance_figure(found: Assessment) -> Figure:
 
 def force_figure(found: Assessment) -> Figure:
     """Draw the force of each pin."""
-    frame = pin_table(found)
-    at = list(frame["pin at [deg]"])
+    angle = found.single.pin_angle[0, 0]
+    order = [at for at in np.argsort(angle) if angle[at] > 0]
     return Figure(
         name="forces",
         title="Force of each pin, one of them in the crank direction",
         x_label="angle of the pin from the crank direction [°]",
         y_label="force [N]",
-        series=(
-            Series(label="linear method", kind="points", x=at, y=list(frame["force, linear method [N]"])),
-            Series(label="law at every pin", kind="points", x=at, y=list(frame["force, law at every pin [N]"])),
+        series=tuple(
+            Series(label=name, kind="points", x=list(angle[order] / DEGREE), y=list(contact.force[0, 0, order]))
+            for name, contact in zip(METHODS, (found.linear, found.single), strict=True)
         ),
     )
 
@@ -99,41 +100,6 @@ def phase_figure(found: Assessment) -> Figure:
         y_label="pins in contact [-]",
         series=tuple(
             Series(label=name, kind="points", x=phase, y=[int(count) for count in contact.pins_in_contact[:, 0]])
-            for name, contact in (("linear method", found.linear), ("law at every pin", found.single))
+            for name, contact in zip(METHODS, (found.linear, found.single), strict=True)
         ),
-    )
-
-
-def contact_sections(found: Assessment) -> tuple[Section, ...]:
-    """Return the sections of a report that show what a modification does."""
-    return (
-        Section(
-            heading="Profile and clearance",
-            figures=(profile_figure(found.profile), clearance_figure(found)),
-            tables=(("profile", profile_table(found)),),
-        ),
-        Section(
-            heading="Under load",
-            paragraphs=(
-                "Linear method: Li Lixing's, forces in proportion to the compressions, the largest deflection "
-                "iterated. Law at every pin: the force law of the contact solved tooth by tooth.",
-            ),
-            figures=(force_figure(found), phase_figure(found)),
-            tables=(("loaded contact", contact_table(found)), ("pins", pin_table(found))),
-        ),
-    )
-
-
-def contact_document(found: Assessment) -> Document:
-    """Return the report of one assessment."""
-    width = found.reducer.cycloid_stage.face_width / MILLIMETRE
-    return Document(
-        title=f"{found.reducer.name}: what the tooth modification does",
-        subtitle=f"{found.torque:g} N·m on the carrier, {found.share * found.torque:.4g} N·m on the more loaded disc, "
-        f"face width {width:g} mm, {found.single.phase.size} phases of the pin pitch.",
-        answer=answer(found),
-        warnings=found.warnings,
-        sections=contact_sections(found),
-        assumptions=found.assumptions,
-        summary=summary(found),
     )

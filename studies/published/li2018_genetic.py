@@ -1,6 +1,9 @@
 """li2018's genetic algorithm: bits, scaled fitness, roulette, one-point crossover, mixed penalty with extrapolation.
 
-The source prints N, p_m and the generations, and names the rest; how each name is read is assumed.
+The source prints N, p_m and the generations, and names the rest; how each name is read is assumed. The formulas of its
+"two-point exterior-difference mixed penalty" are lost; it is read as sequential unconstrained minimisation: constraints
+become penalties with a factor r that falls from search to search, and the optima of two searches give away that at
+r → 0.
 """
 
 from __future__ import annotations
@@ -20,10 +23,10 @@ from pymoo.operators.mutation.bitflip import BitflipMutation
 from pymoo.optimize import minimize
 
 from tolalloc.drawing.seeds import SeedTree
-from tolalloc.rv.modification.mixed_penalty import extrapolated, mixed_penalty
 from tolalloc.rv.modification.problem import Amounts, ModificationProblem
-from tolalloc.rv.modification.result import SearchResult, Tally
 from tolalloc.units import MILLIMETRE
+
+from .modification_searches import Recorder, SearchResult
 
 Bits = Bool[np.ndarray, "n bit"]
 
@@ -99,13 +102,6 @@ def scaled_fitness(value: Float[np.ndarray, " n"], favour: float) -> Float[np.nd
     """Return f′ = a·f + b of the fitness f = largest value − value [mm].
 
     a and b keep the mean and make the largest f′ ``favour`` times the mean; what becomes negative counts as 0.
-
-    Parameters
-    ----------
-    value
-        What is minimised [mm].
-    favour
-        Largest f′ over its mean [-].
     """
     fitness = value.max() - value
     mean, largest = fitness.mean(), fitness.max()
@@ -115,13 +111,37 @@ def scaled_fitness(value: Float[np.ndarray, " n"], favour: float) -> Float[np.nd
     return np.asarray(np.maximum(slope * (fitness - mean) + mean, 0.0))
 
 
+def mixed_penalty(margin: Float[np.ndarray, "n c"], factor: float) -> Float[np.ndarray, " n"]:
+    """Return Σ r/g over the constraints g that are met, plus Σ g²/√r over the violated ones [mm].
+
+    Parameters
+    ----------
+    margin
+        Constraints g, not negative where met [mm].
+    factor
+        Penalty factor r [mm²].
+    """
+    inside = factor / np.where(margin > 0, margin, np.inf)
+    outside = np.minimum(margin, 0.0) ** 2 / np.sqrt(factor)
+    return np.asarray((inside + outside).sum(axis=-1))
+
+
+def extrapolated(last: Amounts, now: Amounts, fall: float) -> Amounts:
+    """Return the optimum at r → 0 from those at two penalty factors of ratio c, one after the other [m].
+
+    Both parts of the penalty keep its optimum away from the constrained one in proportion to √r.
+    """
+    root = np.sqrt(fall)
+    return np.asarray((now - root * last) / (1 - root))
+
+
 class _Penalized(Problem):  # type: ignore[misc]
-    def __init__(self, tally: Tally, code: BinaryCode, factor: float) -> None:
-        self.tally, self.code, self.factor = tally, code, factor
+    def __init__(self, recorder: Recorder, code: BinaryCode, factor: float) -> None:
+        self.recorder, self.code, self.factor = recorder, code, factor
         super().__init__(n_var=2 * code.bits, n_obj=1, xl=False, xu=True, vtype=bool)
 
     def _evaluate(self, x: Bits, out: dict[str, object], *_: object, **__: object) -> None:
-        evaluation = self.tally(self.code.amounts(x))
+        evaluation = self.recorder(self.code.amounts(x))
         penalty = mixed_penalty(evaluation.constraints / MILLIMETRE, self.factor)
         out["F"] = evaluation.objective / MILLIMETRE + penalty
 
@@ -163,28 +183,19 @@ def _algorithm(settings: BinarySettings, first: Bits) -> Algorithm:
 def binary_search(problem: ModificationProblem, seed: int, settings: BinarySettings = LI2018) -> SearchResult:
     """Return the best point that li2018's algorithm comes across.
 
-    Parameters
-    ----------
-    problem
-        What is searched.
-    seed
-        Seed [-].
-    settings
-        How the algorithm is run.
-
     Notes
     -----
     The "two-point exterior-difference mixed penalty" is read as a sequence of unconstrained searches with a falling
     penalty factor, each begun from the last one's population with the two-point extrapolation of the optimum in place
     of its worst individual.
     """
-    tally, seeds = Tally(problem), SeedTree(seed).child("modification", "binary")
+    recorder, seeds = Recorder(problem), SeedTree(seed).child("modification", "binary")
     code = BinaryCode(lower=problem.lower, upper=problem.upper, bits=settings.bits)
     first = seeds.generator().random((settings.population, 2 * settings.bits)) < 0.5
     optima: list[Amounts] = []
     for number in range(settings.rounds):
         last = minimize(
-            _Penalized(tally, code, settings.penalty * settings.fall**number),
+            _Penalized(recorder, code, settings.penalty * settings.fall**number),
             _algorithm(settings, first),
             ("n_gen", settings.generations // settings.rounds),
             seed=seeds.child(str(number)).integer(),
@@ -193,4 +204,4 @@ def binary_search(problem: ModificationProblem, seed: int, settings: BinarySetti
         optima.append(code.amounts(first[[value.argmin()]]))
         if number > 0:
             first[value.argmax()] = code.code(extrapolated(optima[-2], optima[-1], settings.fall))[0]
-    return tally.result("binary genetic algorithm", seed)
+    return recorder.result("binary genetic algorithm", seed)
