@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import neglected_columns
 from tolalloc.drawing.tolerance_table import require_small_zones
-from tolalloc.drawing.unit_file import BuiltUnit
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import MICROMETRE
 
