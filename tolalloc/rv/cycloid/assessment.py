@@ -84,13 +84,7 @@ class Assessment:
 
 
 def disc_share(discs: int) -> float:
-    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, in proportion for others [-].
-
-    Parameters
-    ----------
-    discs
-        Number of discs [-].
-    """
+    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-]."""
     return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
 
 

@@ -50,17 +50,7 @@ def linear_model_warnings(stage: CycloidStage, modification: Modification) -> tu
 def linear_clearance(
     stage: CycloidStage, modification: Modification, pin_angle: Angles
 ) -> Float[np.ndarray, "*angles"]:
-    """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    modification
-        Tooth modification.
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
-    """
+    """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m]."""
     into = normals(stage.shortening, pin_angle)
     turned = modification.rotation * stage.disc_pitch_radius * np.abs(into.lever)
     return np.asarray(modification.equidistant - modification.shift * into.along_radius + turned)
@@ -72,15 +62,6 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
     Notes
     -----
     Right only if Δr_rp·q ≥ Δr_p; otherwise another pin touches first and the formula goes negative.
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    modification
-        Tooth modification; its rotation closes without a trace.
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
 
     References
     ----------
@@ -94,17 +75,7 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
 def exact_clearance(
     profiles: Sequence[ToothProfile], pin_angle: Float[np.ndarray, " pin"], rotation: Rotation = 0.0
 ) -> Float[np.ndarray, "profile pin"]:
-    """Return the exact distances of pins from the curves of the teeth, negative where they overlap [m].
-
-    Parameters
-    ----------
-    profiles
-        Ground profiles.
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
-    rotation
-        Counter-clockwise rotation of the discs about their centres, one for all or one for each pin [rad].
-    """
+    """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m]."""
     designs, clearance = np.empty((len(profiles), FIELDS)), np.empty((len(profiles), pin_angle.size))
     for row, profile in zip(designs, profiles, strict=True):
         stage, ground = profile.stage, profile.ground
@@ -197,14 +168,9 @@ def _narrowest(gap: Gap, rotation: float, angles: Angles = FLANK) -> tuple[float
 
 
 def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
-    """Return the clearance of a profile and where the first pin truly touches.
+    """Return the clearance of a sound profile and where the first pin truly touches.
 
-    Parameters
-    ----------
-    profile
-        Sound profile, `tolalloc.rv.cycloid.tooth_profile.require_sound`.
-    exact
-        Whether to take exact distances; by default only where the modification is too large for the linear formula.
+    Distances are exact by default only where the modification is too large for the linear formula.
 
     Raises
     ------

@@ -34,17 +34,7 @@ class ContactStiffness:
 
 
 def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> ContactStiffness:
-    """Return the stiffness of pins against the teeth that they meet.
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    stiffness
-        Contact law, its scale and the bending of the pins.
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
-    """
+    """Return the stiffness of pins against the teeth that they meet."""
     contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
     if law == "table2":
         contact = pin_contact_table2(stage, stiffness.pin_contact, pin_angle)
@@ -66,15 +56,6 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
     singular or negative on the convex part for pin radii above about 2.5 mm on an RV-20E, so only the concave part
     follows the print.
 
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    convex_stiffness
-        C of `tolalloc.rv.reducer.stiffness.line_contact` [N/m].
-    pin_angle
-        Angle φ of the pin from the crank direction [rad].
-
     References
     ----------
     liu2020, Table 2 (K_djk).
@@ -91,13 +72,6 @@ def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarra
     flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
     alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length
     is an assumption.
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    pin_angle
-        Angle φ of the pin from the crank direction [rad].
     """
     bend = np.abs(path_curvature(stage, pin_angle))
     return np.asarray(exp(APPROACH) / np.maximum(bend, 1 / stage.pin_circle_radius))

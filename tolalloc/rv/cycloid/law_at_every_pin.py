@@ -65,13 +65,6 @@ class _Press:
 def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
     """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
 
-    Parameters
-    ----------
-    discs
-        What is pressed.
-    phase
-        Angles from the crank direction of disc 1 to the next pin [rad].
-
     Raises
     ------
     InputError

@@ -26,15 +26,8 @@ def pressed_linear(
 ) -> LoadedContact:
     """Return the contact by Li Lixing's method: forces in proportion to the compressions.
 
-    Parameters
-    ----------
-    discs
-        What is pressed.
-    phase
-        Angles from the crank direction of disc 1 to the next pin [rad].
-    deflection
-        δ_max where it is known [m]; otherwise it is iterated until it is the approach under the largest force, by the
-        reducer's law with the curvature at φ0.
+    Without a deflection δ_max [m] it is iterated until it is the approach under the largest force, by the reducer's
+    law with the curvature at φ0.
 
     Raises
     ------

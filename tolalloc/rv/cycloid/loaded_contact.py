@@ -116,13 +116,7 @@ class PressedDiscs:
         return clearance_of(self.profile, self.exact)
 
     def pin_angles(self, phase: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
-        """Return φ of every pin from its disc's crank direction [rad].
-
-        Parameters
-        ----------
-        phase
-            Angles from the crank direction of disc 1 to the next pin [rad].
-        """
+        """Return φ of every pin from its disc's crank direction [rad]."""
         stage = self.reducer.cycloid_stage
         turned = 2 * pi * np.arange(self.discs) / self.discs
         return np.stack([pin_angles(stage, phase - direction) for direction in turned], axis=1)

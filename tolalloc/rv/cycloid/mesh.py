@@ -11,6 +11,7 @@ from jaxtyping import Float
 from tolalloc.rv.reducer.design import CycloidStage
 
 Angles = Float[np.ndarray, "*angles"]
+"""Angles φ of pins from the crank direction [rad], and what has their shape."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +37,7 @@ class Normals:
 
 
 def normals(shortening: float, pin_angle: Angles) -> Normals:
-    """Return the normals at pins, theory page equations (13) and (14).
-
-    Parameters
-    ----------
-    shortening
-        K1 [-].
-    pin_angle
-        Angle φ of the pin from the crank direction [rad].
-    """
+    """Return the normals at pins, theory page equations (13) and (14)."""
     cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
     root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
     return Normals(
@@ -57,15 +50,7 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
 
 
 def path_curvature(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
-    """Return the curvature of the pin centre's path on the disc, theory page equation (33); concave is positive [1/m].
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    pin_angle
-        Angle φ of the pin from the crank direction [rad].
-    """
+    """Return the curvature of the pin centre's path on the disc, concave positive, theory page equation (33) [1/m]."""
     shortening, pins, cosine = stage.shortening, stage.pin_count, np.cos(pin_angle)
     bend = shortening * (1 + pins) * cosine - (1 + pins * shortening**2)
     length = stage.pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
@@ -78,14 +63,6 @@ def flank_angle(stage: CycloidStage) -> float:
 
 
 def pin_angles(stage: CycloidStage, phase: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase pin"]:
-    """Return φ of every pin, from −π up to π, for phases of the crank [rad].
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    phase
-        Angle of the pin that was in the crank direction; one pin pitch repeats the picture [rad].
-    """
+    """Return φ of every pin, from −π up to π, for phases: angles of the pin that was in the crank direction [rad]."""
     pins = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count
     return np.asarray(np.remainder(pins + phase[:, np.newaxis] + np.pi, 2 * np.pi) - np.pi)

@@ -71,14 +71,7 @@ def require_points(per_tooth: int) -> None:
 
 
 def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
-    """Return the points of a whole disc.
-
-    Parameters
-    ----------
-    profile
-        Sound profile.
-    per_tooth
-        Points of one tooth, an even number [-].
+    """Return the points of a whole disc with a sound profile, an even number of them per tooth.
 
     Raises
     ------

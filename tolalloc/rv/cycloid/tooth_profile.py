@@ -79,13 +79,7 @@ class ToothProfile:
         return brentq(beyond, -pi / 2, pi / 2, args=(0.0,)), brentq(beyond, pi / 2, 3 * pi / 2, args=(half_tooth,))
 
     def points(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
-        """Return x and y of the flank of 0 ≤ φ ≤ π [m]; the other flank is its mirror image about y = 0.
-
-        Parameters
-        ----------
-        angle
-            φ [rad].
-        """
+        """Return x and y of the flank of 0 ≤ φ ≤ π [m]; the other flank is its mirror image about y = 0."""
         ground, direction = self.ground, normals(self.ground.shortening, angle)
         pin = ground.pin_circle_radius * np.exp(-1j * angle / ground.disc_teeth)
         into = direction.towards_crank + 1j * direction.towards_tangent
@@ -99,39 +93,20 @@ class ToothProfile:
         return self.stage.pin_count / self.stage.disc_teeth
 
     def normals(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
-        """Return the unit normals into the disc [-].
-
-        Parameters
-        ----------
-        angle
-            φ [rad].
-        """
+        """Return the unit normals into the disc [-]."""
         direction = normals(self.ground.shortening, angle)
         turned = angle * self._turns + self.modification.rotation
         into = (direction.towards_crank + 1j * direction.towards_tangent) * np.exp(-1j * turned)
         return np.stack([into.real, into.imag], axis=-1)
 
     def curvature(self, angle: Angles) -> Float[np.ndarray, "*angles"]:
-        """Return the curvature of the profile, convex positive [1/m].
-
-        Parameters
-        ----------
-        angle
-            φ [rad].
-        """
+        """Return the curvature of the profile, convex positive [1/m]."""
         path = path_curvature(self.ground, angle)
         return np.asarray(-path / (1 + self.ground.pin_radius * path))
 
 
 def require_sound(profile: ToothProfile, place: str) -> None:
     """Raise unless the profile can be ground and mounted.
-
-    Parameters
-    ----------
-    profile
-        Profile with its modification.
-    place
-        What the sentence begins with.
 
     Raises
     ------

@@ -34,13 +34,7 @@ class Integrator:
     gamma: float
 
     def rates(self, step: float) -> tuple[float, float, float]:
-        """Return what a displacement beyond the predicted one adds to a, q̇ and q̈ [1/s², 1/s, 1/s²].
-
-        Parameters
-        ----------
-        step
-            Time step h [s].
-        """
+        """Return what a displacement beyond the predicted one adds to a, q̇ and q̈ [1/s², 1/s, 1/s²]."""
         algorithmic = 1 / (self.beta * step**2)
         return algorithmic, self.gamma * step * algorithmic, (1 - self.alpha_m) / (1 - self.alpha_f) * algorithmic
 
@@ -51,12 +45,7 @@ def newmark() -> Integrator:
 
 
 def generalised_alpha(spectral_radius: float) -> Integrator:
-    """Return the generalised-α method.
-
-    Parameters
-    ----------
-    spectral_radius
-        What a step leaves of an oscillation far too fast for it; 1 keeps it, 0 removes it at once [-].
+    """Return the generalised-α method; a step leaves the spectral radius of an oscillation far too fast for it [-].
 
     Raises
     ------

@@ -91,19 +91,6 @@ def modes(
 ) -> Modes:
     """Return the natural frequencies and modes of one unit, linearised about its static equilibrium.
 
-    Parameters
-    ----------
-    model
-        The equivalent model.
-    errors
-        Deviations of one unit in the order of the model's columns [m, angles rad].
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    inertia
-        Of the parts.
-    carrier_angle
-        Carrier angles [rad].
-
     Raises
     ------
     InputError

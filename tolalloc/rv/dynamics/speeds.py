@@ -60,16 +60,7 @@ class Campbell:
 
 
 def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]) -> Campbell:
-    """Return the frequency bands and the output speeds at which orders meet them.
-
-    Parameters
-    ----------
-    modes
-        Modes at carrier angles over a turn.
-    orders
-        Waves per output turn that excite [-].
-    output_speeds
-        Slowest and fastest output speed of interest [rad/s].
+    """Return the frequency bands and where orders meet them between a slowest and a fastest output speed [rad/s].
 
     Raises
     ------

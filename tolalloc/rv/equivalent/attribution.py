@@ -42,16 +42,7 @@ class Attribution:
 
 
 def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> Attribution:
-    """Return what every source of one unit adds to its transmission error and to each order.
-
-    Parameters
-    ----------
-    model
-        The reducer.
-    errors
-        The unit, in the order of the model's columns [m, angles rad].
-    torque
-        Torque on the carrier [N·m].
+    """Return what every source of one unit [m, angles rad] adds to its transmission error and to each order.
 
     Notes
     -----

@@ -109,17 +109,7 @@ class Columns:
 
 
 def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[int, ...]) -> Columns:
-    """Return the columns that the spring rows and the pin contact of a reducer declare.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    groups
-        Its spring groups at any angles, pin contact left out.
-    orders
-        Orders of the harmonic deviations [-].
-    """
+    """Return the columns that the spring rows and the pin contact of a reducer declare."""
     names: dict[str, int] = {name: at for at, name in enumerate(name for group in groups for name in group.columns)}
     entries = [(at, at, 1.0) for at in names.values()]
     played = [group for group in groups if group.contact == "play"]

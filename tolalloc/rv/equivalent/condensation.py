@@ -90,17 +90,7 @@ def bilateral_groups(at: Positions) -> list[SpringGroup]:
 def spring_groups(
     reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"], orders: tuple[int, ...] = HARMONICS
 ) -> list[SpringGroup]:
-    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    carrier_angle
-        Carrier angles [rad].
-    orders
-        Orders of the harmonic deviations [-].
-    """
+    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs."""
     at = Positions(reducer, carrier_angle, orders)
     return [*bilateral_groups(at), dense_rows(at)]
 
@@ -219,15 +209,6 @@ def _condense_some(at: Positions) -> CondensedAngles:
 
 def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
     """Return the condensed model of a reducer at the carrier angles.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design and stiffness.
-    orders
-        Orders of the harmonic deviations [-].
-    angle
-        Carrier angles [rad].
 
     Notes
     -----

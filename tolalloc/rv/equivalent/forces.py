@@ -37,13 +37,7 @@ class Forces:
     rows_of_stiffness: dict[str, slice]
 
     def of(self, interface: str) -> Float[np.ndarray, "sample angle element"]:
-        """Return the magnitude of the force in each element of an interface [N].
-
-        Parameters
-        ----------
-        interface
-            Field of `tolalloc.rv.reducer.stiffness.Stiffness` other than the pins'.
-        """
+        """Return the magnitude of the force in each element of an interface, named as in `Stiffness` [N]."""
         own, bilateral = self.rows_of_stiffness[interface], self.rows.shape[2]
         if own.start >= bilateral:
             played = self.elements[:, :, own.start - bilateral : own.stop - bilateral]
@@ -56,11 +50,6 @@ class Forces:
 
 def forces(equilibria: Equilibria) -> Forces:
     """Return the forces in all interfaces.
-
-    Parameters
-    ----------
-    equilibria
-        Equilibria of samples over angles.
 
     Notes
     -----

@@ -41,13 +41,7 @@ class HysteresisLoop:
         return self.twist[:, int(np.argmin(np.abs(self.torque - torque)))]
 
     def width(self, share: float) -> Float[np.ndarray, "sample angle"]:
-        """Return the twist between both directions of a share of the rated torque, angle by angle [rad].
-
-        Parameters
-        ----------
-        share
-            `LOST_MOTION`, `BACKLASH` or 1 [-].
-        """
+        """Return the twist between both directions of `LOST_MOTION`, `BACKLASH` or 1 times the rated torque [rad]."""
         torque = share * self.torque[-1]
         return np.asarray(self._at(torque) - self._at(-torque))
 
@@ -72,17 +66,7 @@ class HysteresisLoop:
 def hysteresis_loop(
     model: EquivalentModel, errors: Float[np.ndarray, "sample column"], carrier_angle: Float[np.ndarray, " angle"]
 ) -> HysteresisLoop:
-    """Return torque against twist between minus and plus the rated torque.
-
-    Parameters
-    ----------
-    model
-        The reducer.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-    carrier_angle
-        Angles of the turn at which the loop is read [rad].
-    """
+    """Return torque against twist between minus and plus the rated torque at the carrier angles [rad]."""
     shares = np.array([BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0])
     torque = model.reducer.load.rated_torque * np.concatenate([-shares[::-1], shares])
     twist = [model.equilibria(errors, float(level), carrier_angle).transmission_error for level in torque]
@@ -114,19 +98,7 @@ def both_directions(
     torque: float,
     carrier_angle: Float[np.ndarray, " angle"] | None = None,
 ) -> Directions:
-    """Return the transmission error of both directions of rotation.
-
-    Parameters
-    ----------
-    model
-        The reducer.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-    torque
-        Magnitude of the resisting torque on the carrier [N·m].
-    carrier_angle
-        Angles of the turn; the coarse angles of the model's search unless given [rad].
-    """
+    """Return the transmission error of both directions of rotation under the magnitude of a resisting torque [N·m]."""
     forward, backward = (
         model.equilibria(errors, resisting, carrier_angle).transmission_error
         for resisting in (-abs(torque), abs(torque))

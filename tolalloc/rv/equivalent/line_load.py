@@ -57,13 +57,7 @@ class LineContact:
         return np.asarray(self.peak * self.face_width / self.stiffness)
 
     def line_load(self, position: Float[np.ndarray, " position"]) -> Float[np.ndarray, "*contacts position"]:
-        """Return the line load along the width [N/m].
-
-        Parameters
-        ----------
-        position
-            Places along the width, 0 in the middle of the tooth, −b/2 to b/2 [m].
-        """
+        """Return the line load along the width at places from −b/2 to b/2, 0 in the middle of the tooth [m], [N/m]."""
         slope = self.slope[..., np.newaxis]
         below_the_end = 0.5 * self.face_width * np.abs(slope) - slope * position
         rise = self.stiffness[..., np.newaxis] / self.face_width
@@ -72,13 +66,6 @@ class LineContact:
 
 def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     """Return the contacts of all pins and discs, [sample, angle, disc, pin].
-
-    Parameters
-    ----------
-    equilibria
-        Equilibria of samples over angles.
-    forces
-        Forces in them.
 
     Notes
     -----
@@ -99,26 +86,12 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
 
 
 def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
-    """Return the largest line load of every pin and disc [N/m].
-
-    Parameters
-    ----------
-    equilibria
-        Equilibria of samples over angles.
-    forces
-        Forces in them.
-    """
+    """Return the largest line load of every pin and disc [N/m]."""
     return line_contact(equilibria, forces).peak
 
 
 def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
-    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa].
-
-    Parameters
-    ----------
-    equilibria
-        Equilibria over angles.
-    """
+    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa]."""
     reducer, at = equilibria.reducer, Positions(equilibria.reducer, equilibria.carrier_angle)
     discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(reducer.disc_count)]
     pin_angle, stage = np.stack(discs, axis=1), reducer.cycloid_stage

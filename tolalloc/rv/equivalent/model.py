@@ -48,6 +48,9 @@ class EquivalentModel:
     Notes
     -----
     The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
+
+    Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
+    rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
     """
 
     reducer: Reducer
@@ -110,17 +113,7 @@ class EquivalentModel:
         torque: float,
         carrier_angle: Float[np.ndarray, " angle"] | None = None,
     ) -> Equilibria:
-        """Return the equilibrium of every sample at the carrier angles.
-
-        Parameters
-        ----------
-        errors
-            Deviations in the order of ``columns`` [m, angles rad].
-        torque
-            Torque on the carrier; negative resists the rotation [N·m].
-        carrier_angle
-            Carrier angles; the coarse angles of the search unless given [rad].
-        """
+        """Return the equilibrium of every sample at the carrier angles."""
         angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
         shape = (errors.shape[0], angle.size)
         turn = Turn(
@@ -147,15 +140,7 @@ class EquivalentModel:
         )
 
     def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
-        """Return the refined extremes of every sample over one output turn.
-
-        Parameters
-        ----------
-        errors
-            Deviations in the order of ``columns`` [m, angles rad].
-        torque
-            Torque on the carrier; negative resists the rotation [N·m].
-        """
+        """Return the refined extremes of every sample over one output turn."""
         samples, halving = errors.shape[0], self.search.halving
         found = Found(
             np.empty((samples, 2)),
@@ -183,13 +168,6 @@ class EquivalentModel:
     ) -> tuple[Extremes, Derivatives]:
         """Return the extremes and the exact derivatives of the peak-to-peak.
 
-        Parameters
-        ----------
-        errors
-            Deviations in the order of ``columns`` [m, angles rad].
-        torque
-            Torque on the carrier; negative resists the rotation [N·m].
-
         Notes
         -----
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
@@ -212,14 +190,7 @@ class EquivalentModel:
     ) -> tuple[Float[np.ndarray, "sample angle"], Derivatives]:
         """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
 
-        Parameters
-        ----------
-        errors
-            Deviations in the order of ``columns`` [m, angles rad].
-        torque
-            Torque on the carrier, one for all samples or one for each; negative resists the rotation [N·m].
-        carrier_angle
-            Carrier angles; the coarse angles of the search unless given [rad].
+        The torque is one for all samples or one for each.
 
         Notes
         -----

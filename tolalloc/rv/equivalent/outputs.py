@@ -40,25 +40,13 @@ class Orders:
 
 
 def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
-    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn.
-
-    Parameters
-    ----------
-    transmission_error
-        Curves over one whole turn, the end point left out [rad].
-    """
+    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn, the end point left out."""
     found = waves(transmission_error)
     return Orders(order=np.arange(1, found.shape[1] + 1), amplitude=np.abs(found), phase=np.angle(found))
 
 
 def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row order"]:
-    """Return the orders 1, 2, … of curves; the real part is the cosine's, minus the imaginary part the sine's.
-
-    Parameters
-    ----------
-    curve
-        Curves on equally spaced angles of one turn, the end point left out [any].
-    """
+    """Return the orders of curves as in `order_spectrum`: cosine amplitudes, minus i times sine amplitudes."""
     angles = curve.shape[1]
     return np.asarray(np.fft.rfft(curve, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles))
 

@@ -16,13 +16,6 @@ def radial_clearance(
 ) -> Float[np.ndarray, " sample"]:
     """Return the smallest gap between all pins and teeth where the normal is radial, negative where they overlap [m].
 
-    Parameters
-    ----------
-    model
-        The reducer.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-
     Notes
     -----
     Minus the compression of the pin rows at no displacement, where a pin stands in the crank direction (root) or

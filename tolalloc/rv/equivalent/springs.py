@@ -67,13 +67,7 @@ def vector_columns(name: str) -> tuple[str, str]:
 
 
 def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
-    """Return the rotation matrices that turn a vector fixed in a part into the housing's frame.
-
-    Parameters
-    ----------
-    direction
-        Angle by which the part has turned [rad].
-    """
+    """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame."""
     cosine, sine = np.cos(direction), np.sin(direction)
     return np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
 

@@ -42,16 +42,11 @@ class PartErrors:
 
 
 def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
-    """Return the deviations that columns of the equivalent model stand for.
+    """Return the deviations that columns of the equivalent model stand for [m].
 
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    errors
-        Column → deviation [m]. Known are ``crank{i}.journal{j}.eccentricity``, ``disc{j}.bore{i}.position``,
-        ``carrier.bore{i}.position`` and ``carrier.assembly``, ``each_pin.position.{k}`` (x radial, y tangential),
-        ``each_pin.diameter.{k}``, ``pin.diameter`` and ``housing.groove.radius``.
+    Known are ``crank{i}.journal{j}.eccentricity``, ``disc{j}.bore{i}.position``, ``carrier.bore{i}.position``,
+    ``carrier.assembly``, ``each_pin.position.{k}`` (x radial, y tangential), ``each_pin.diameter.{k}``,
+    ``pin.diameter`` and ``housing.groove.radius``.
 
     Raises
     ------

@@ -17,14 +17,7 @@ _TABULATED = 1801  # angles of the contact's stiffness along a tooth
 
 
 def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
-    """Return the teeth and pins of a reducer.
-
-    Parameters
-    ----------
-    reducer
-        Design without rotation modification.
-    errors
-        Deviations of its pins.
+    """Return the teeth and pins of a reducer whose pins deviate.
 
     Raises
     ------

@@ -41,15 +41,7 @@ class TimeCourse:
 
     @classmethod
     def step(cls, value: float, start: float, end: float) -> TimeCourse:
-        """Return a smooth rise from 0 to a value, 3s² − 2s³ between two times.
-
-        Parameters
-        ----------
-        value
-            What it reaches [rad/s or N·m].
-        start, end
-            Between which times it rises [s].
-        """
+        """Return a smooth rise from 0 to a value, 3s² − 2s³ between two times [s]."""
         share = np.linspace(0.0, 1.0, _KNOTS)
         return cls(time=start + (end - start) * share, value=value * share**2 * (3.0 - 2.0 * share))
 

@@ -218,13 +218,6 @@ def _identified(data: dict[str, Any], path: Path) -> IdentifiedStiffness:
 def write_identified_stiffness(identified: IdentifiedStiffness, path: Path) -> None:
     """Write a file that `load_identified_stiffness` reads back equal.
 
-    Parameters
-    ----------
-    identified
-        What to write.
-    path
-        New file.
-
     Raises
     ------
     InputError

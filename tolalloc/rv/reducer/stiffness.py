@@ -134,15 +134,6 @@ def checked_correlation(
 ) -> Float[np.ndarray, "stiffness stiffness"]:
     """Return the rows as a correlation of the named stiffnesses.
 
-    Parameters
-    ----------
-    rows
-        One row of numbers for each stiffness [-].
-    names
-        The stiffnesses, in the order of rows and columns.
-    place
-        Where the rows stand, for the sentence that refuses them.
-
     Raises
     ------
     InputError
@@ -182,13 +173,6 @@ def line_contact(face_width: float, contact_modulus: float) -> float:
     -----
     liu2020 prints πbE/(4(1−µ²)), which it is for pin and disc of one material.
 
-    Parameters
-    ----------
-    face_width
-        Loaded width b [m].
-    contact_modulus
-        E* of pin and disc [Pa].
-
     References
     ----------
     liu2020, Table 2 (K_djk without its curvature factor).
@@ -198,13 +182,6 @@ def line_contact(face_width: float, contact_modulus: float) -> float:
 
 def pin_bending(diameter: float, span: float, elastic_modulus: float) -> float:
     """Return 64/31·48EJ/l³, a solid pin on two supports, its load spread over half the span [N/m].
-
-    Parameters
-    ----------
-    diameter, span
-        Pin diameter and distance l of its supports [m].
-    elastic_modulus
-        Young's modulus [Pa].
 
     References
     ----------

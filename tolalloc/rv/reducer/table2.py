@@ -2,6 +2,7 @@
 
 The pins' row, K_djk, has its scale C in `rv.reducer.stiffness.line_contact` and its sound reading along the tooth
 in `tolalloc.rv.cycloid.contact_stiffness.pin_contact_table2`. The ledger of all rows is docs/reference/table-2.md.
+Arguments are in SI units: lengths m, forces N, Young's moduli Pa, angles rad; Poisson's ratios µ are 0 up to 0.5.
 """
 
 from __future__ import annotations
@@ -33,13 +34,6 @@ def shaft_support(diameter: float, length: float, elastic_modulus: float) -> flo
     adds about 0.54(d/l)² of the deflection, 6 % at l = 3d; a reducer file with l below d is refused. The clamp is
     rigid.
 
-    Parameters
-    ----------
-    diameter, length
-        Shaft diameter and overhang [m].
-    elastic_modulus
-        Young's modulus [Pa].
-
     References
     ----------
     liu2020, Table 2 (K_s).
@@ -58,17 +52,6 @@ def roller_bearing(
     the load. Of n rollers around a bearing, n/2 act so if all are preloaded and n/4 if there is neither preload nor
     play: l·n is the length that acts, not the length that is there. Same steel for rollers and rings. Being linear in
     the force it is stiffer than Hertz's line contact, whose logarithm it leaves out.
-
-    Parameters
-    ----------
-    loaded_length
-        Roller length times number of rollers that act, l·n [m].
-    elastic_modulus
-        Young's modulus [Pa].
-    poisson_ratio
-        Poisson's ratio µ, 0 up to 0.5 [-].
-    contact_angle
-        Angle whose sine divides the stiffness, above 0 up to 90° [rad].
 
     References
     ----------
@@ -94,17 +77,6 @@ def gear_mesh(
     as in the print, and lighter loads are softer still. A reducer file may give contact ratios of 1 to 2.5 and
     virtual teeth from 5.
 
-    Parameters
-    ----------
-    contact_ratio
-        Transverse contact ratio ε_α, 1 to 2.5 [-].
-    sun_virtual_teeth, planet_virtual_teeth
-        Virtual numbers of teeth [-].
-    face_width
-        Common face width [m].
-    elastic_modulus
-        Young's modulus of both gears [Pa].
-
     References
     ----------
     liu2020, Table 2 (K_sp); ISO 6336-1.
@@ -116,13 +88,6 @@ def gear_mesh(
 
 def mesh_as_printed(contact_ratio: float, sun_virtual_teeth: float, planet_virtual_teeth: float) -> float:
     """Return K_sp as printed, with 0.1551 and per face width: not a stiffness but one per width [N/(mm·µm)].
-
-    Parameters
-    ----------
-    contact_ratio
-        Transverse contact ratio ε_α [-].
-    sun_virtual_teeth, planet_virtual_teeth
-        Virtual numbers of teeth [-].
 
     References
     ----------
@@ -141,17 +106,6 @@ def ball_coefficient_as_printed(radius: float, balls: int, elastic_modulus: floa
     n balls between two flat races exactly where r_g is half the ball's radius **[D]**. liu2020 takes the number as
     N/m, which it would be at a compression of 4/9 m.
 
-    Parameters
-    ----------
-    radius
-        r_g, half the radius of a ball for the coefficient to be Hertz's [m].
-    balls
-        Number of balls n, all in the direction of the load [-].
-    elastic_modulus
-        Young's modulus of balls and races [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
-
     References
     ----------
     liu2020, Table 2 (K_ca).
@@ -169,19 +123,6 @@ def ball_bearing(ball_radius: float, balls: int, preload: float, elastic_modulus
     of n balls at contact angle α has n/2·cos²α of them. **[A]**: flat races; grooves of 0.515 to 0.53 ball diameters
     make the contact 2.1 to 1.8 times as stiff. Valid up to `largest_preload`, beyond which a reducer file is refused.
 
-    Parameters
-    ----------
-    ball_radius
-        Radius of a ball [m].
-    balls
-        Number of balls that act [-].
-    preload
-        Force F of all balls together, above 0 [N].
-    elastic_modulus
-        Young's modulus of balls and races [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
-
     References
     ----------
     liu2020, Table 2 (K_ca); Hertz's point contact.
@@ -197,17 +138,6 @@ def largest_preload(ball_radius: float, balls: int, elastic_modulus: float, pois
     -----
     Hertz's contact radius a = (3QR/(4E*))^(1/3) with E* = E/(2(1−µ²)). In steel a fifth of it makes 4.2 GPa, ISO 76's
     static limit for ball bearings.
-
-    Parameters
-    ----------
-    ball_radius
-        Radius of a ball [m].
-    balls
-        Number of balls that act [-].
-    elastic_modulus
-        Young's modulus of balls and races [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
     """
     contact_modulus = elastic_modulus / (2.0 * (1.0 - poisson_ratio**2))
     return balls * 4.0 / 3.0 * contact_modulus * ball_radius**2 * LARGEST_CONTACT**3
@@ -223,17 +153,6 @@ def pin_contact_as_printed(
     Sound where T > 0, on the concave part of the tooth. On the convex part, T < 0, it exceeds that of a flat flank,
     and it is singular or negative where the pin is larger than half the radius of the path of its centre; the model
     then takes `tolalloc.rv.cycloid.contact_stiffness.pin_contact_table2`.
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    elastic_modulus
-        Young's modulus of pin and disc [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
-    pin_angle
-        Angle φ of the pin from the crank direction [rad].
 
     References
     ----------

@@ -114,13 +114,7 @@ def wave_outputs(order: int) -> tuple[str, str]:
 
 
 def orders_reading(orders: tuple[int, ...]) -> Reading:
-    """Return the reading of the waves of the transmission error, cosine and sine of every order.
-
-    Parameters
-    ----------
-    orders
-        Waves per output turn [-].
-    """
+    """Return the reading of the waves of the transmission error, cosine and sine of every order."""
 
     def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
         found = model.equilibria(errors, torque)

@@ -26,13 +26,6 @@ SEEN = 0.05
 def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> CorrelatedSource:
     """Return what is not known of the identified stiffnesses as a source of relative changes ln K/K0 [-].
 
-    Parameters
-    ----------
-    identified
-        Values, standard uncertainties and correlation.
-    reducer
-        The reducer with these values.
-
     Raises
     ------
     InputError
@@ -129,15 +122,6 @@ def first_order_error(
     changes: Float[np.ndarray, "change stiffness"],
 ) -> FirstOrderError:
     """Return how far the first order is from the kernel whose reducer has the changed stiffnesses.
-
-    Parameters
-    ----------
-    response
-        The first order.
-    x
-        Units, in the kernel's columns [m, angles rad].
-    changes
-        Joint changes ln K/K0; each takes tables of its own, about a third of a second [-].
 
     Raises
     ------
