@@ -215,9 +215,23 @@ class Model(ABC):
         """Return the response of these outputs with the columns of `uncertain` after its own."""
         return self.reading(outputs)
 
+    def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> Model:
+        """Return the model with other values in the columns of `uncertain`, exactly and for all units."""
+        if change.size:
+            raise ValueError(f"nothing is uncertain of {self.name}")
+        return self
+
+    @property
+    def accuracy(self) -> Mapping[str, float]:
+        """Output → how well it answers for it; no smaller difference means anything [unit of the output]."""
+        return {}
+
     @property
     def spectra(self) -> Mapping[int, tuple[str, str]]:
-        """Order → names of the outputs that hold its cosine and sine, for models with a periodic curve."""
+        """Order → names of the outputs that hold its cosine and sine, for models with a periodic curve.
+
+        `reading` knows them beside `outputs`.
+        """
         return {}
 
     def stand_ins(self) -> tuple[Any, ...]:

@@ -135,10 +135,13 @@ class OutputsResponse:
         Model, torque, columns, and who observes.
     readings
         What is read.
+    chosen
+        Outputs of the readings that are answered, all of them if empty.
     """
 
     kernel: KernelResponse
     readings: tuple[Reading, ...] = REQUIREMENTS
+    chosen: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -147,16 +150,22 @@ class OutputsResponse:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of all outputs with their units."""
+        """Names of the outputs with their units."""
+        return self.chosen or self._read
+
+    @property
+    def _read(self) -> tuple[str, ...]:
         return tuple(name for reading in self.readings for name in reading.outputs)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
-        """Return all outputs of every sample; a sample fails where one of its readings does."""
-        values, status = np.empty((x.shape[0], len(self.outputs))), np.empty(x.shape[0], np.uint8)
+        """Return the outputs of every sample; a sample fails where one of its readings does."""
+        values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
         alone = replace(self, kernel=self.kernel.alone)
         for rows, (answer, worst) in map_chunks(alone.read, x, self.kernel.mapper):
             values[rows], status[rows] = answer, worst
             self.kernel.observe(worst)
+        if self.chosen:
+            values = values[:, [self._read.index(name) for name in self.chosen]]
         return Evaluation(values=values, status=status)
 
     def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:

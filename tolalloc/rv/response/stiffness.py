@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import exp, inf
 from typing import Any
 
@@ -11,10 +13,10 @@ from jaxtyping import Float
 
 from tolalloc.drawing.correlated import CorrelatedSource
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.model import Evaluation, Response, unobserved
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives
 
 NAME = "stiffness (identified)"
 PREFIX = "stiffness."
@@ -88,6 +90,62 @@ class StiffnessResponse:
         }
         reducer = replace(model.reducer, stiffness=replace(old, **values))
         return replace(self.kernel, model=replace(model, reducer=reducer))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputsWithStiffness:
+    """Several outputs with stiffnesses as further columns, to first order in ln K.
+
+    Parameters
+    ----------
+    peak
+        The peak-to-peak with its exact derivative.
+    outputs
+        Names of the outputs with their units.
+    reading
+        From a kernel, the response of these outputs.
+    steps
+        Standard uncertainty of ln K of every stiffness: what a difference is taken over [-].
+
+    Notes
+    -----
+    The peak-to-peak takes its exact derivative. Every other output takes the one-sided difference between the kernel at
+    a stiffness raised by its standard uncertainty and the kernel as it is, unit by unit, so that the effect of one
+    standard uncertainty is that of the kernel. A unit without an answer at one of them has none.
+    """
+
+    peak: StiffnessResponse
+    outputs: tuple[str, ...]
+    reading: Callable[[KernelResponse], Response]
+    steps: tuple[float, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns [m, angles rad], then ``stiffness.<field>`` [-]."""
+        return self.peak.columns
+
+    @cached_property
+    def _raised(self) -> dict[int, Response]:
+        """Position of every stiffness that is not known → the outputs with it raised; tables are made once for each."""
+        raised = ((at, step * np.eye(len(self.steps))[at]) for at, step in enumerate(self.steps) if step > 0.0)
+        # These solves belong to a unit that is counted already.
+        return {at: self.reading(replace(self.peak.changed(change), observe=unobserved)) for at, change in raised}
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample."""
+        own = len(self.peak.kernel.columns)
+        sample, change = np.ascontiguousarray(x[:, :own]), x[:, own:]
+        base = self.reading(self.peak.kernel)(sample)
+        values, status = base.values.copy(), base.status.copy()
+        for at, response in self._raised.items():
+            found = response(sample)
+            values += (found.values - base.values) * (change[:, [at]] / self.steps[at])
+            status = np.maximum(status, found.status)
+        if PEAK_TO_PEAK in self.outputs:
+            exact = replace(self.peak, kernel=replace(self.peak.kernel, observe=unobserved))(x)
+            values[:, self.outputs.index(PEAK_TO_PEAK)] = exact.values[:, 0]
+            status = np.maximum(status, exact.status)
+        return Evaluation(values=values, status=status)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,126 @@
+"""The reducer as a model: what it answers is what its kernel, readings and changed stiffnesses answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.model import ReducerModel
+from tolalloc.rv.reducer.design import Modification
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
+from tolalloc.rv.response.stiffness import StiffnessResponse
+
+LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
+WAVE = "order 1 cosine [arcsec]"
+
+
+@pytest.fixture(scope="module")
+def model(rv20e: EquivalentModel) -> ReducerModel:
+    table = {source.name: source for source in load_tolerance_table("rv20e_baseline")}
+    errors = ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
+    fixed = dict.fromkeys(rv20e.columns, 0.0) | rv20e.reducer.modification.deviations
+    fixed = {name: value for name, value in fixed.items() if name not in errors.columns}
+    kernel = KernelResponse(model=rv20e, torque=-167.0, columns=errors.columns, fixed=fixed)
+    own = rv20e.reducer.stiffness
+    names = ("crank_disc_bearing", "pin_contact", "sun_support")
+    known = IdentifiedStiffness(
+        source="a test",
+        values={name: getattr(own, name) for name in names},
+        standard_uncertainty={
+            name: part * getattr(own, name) for name, part in zip(names, (0.1, 0.2, 0.0), strict=True)
+        },
+    )
+    return ReducerModel(kernel=kernel, flank=(1e-6, 5e-6), radial=(5e-6, 20e-6), identified=known)
+
+
+@pytest.fixture(scope="module")
+def x(model) -> np.ndarray:
+    return 5e-6 * (next(SeedTree(1).uniform_chunks(6, len(model.columns))) - 0.5)
+
+
+def test_readings_are_those_of_kernel_and_outputs_in_the_order_asked_for(model, x):
+    assert model.reading((PEAK_TO_PEAK,)) is model.kernel
+    every = OutputsResponse(kernel=model.kernel, readings=(*REQUIREMENTS, orders_reading((1,))))
+    asked = (RADIAL, WAVE, LOST_MOTION)
+    found = model.reading(asked)
+    assert found.outputs == asked
+    columns = [every.outputs.index(name) for name in asked]
+    np.testing.assert_array_equal(found(x).values, every(x).values[:, columns])
+    assert model.reading(model.outputs) == OutputsResponse(kernel=model.kernel)
+    with pytest.raises(UnknownNameError, match="lost motoin"):
+        model.reading(("lost motoin [arcmin]",))
+
+
+def test_settings_are_the_clearances_of_the_modification(model, x):
+    own, stage = model.reducer.modification, model.reducer.cycloid_stage
+    flank, radial = model.settings
+    assert (flank.value, radial.value) == (own.flank_clearance(stage) / 1e-6, own.radial_clearance / 1e-6)
+    assert (flank.lower, flank.upper, radial.lower, radial.upper) == pytest.approx((1, 5, 5, 20))
+    moved = model.at(np.array([3.0, 12.0]))
+    assert [setting.value for setting in moved.settings] == [3.0, 12.0]
+    other = model.kernel.with_modification(Modification.from_clearances(3.0 * 1e-6, 12.0 * 1e-6, stage))
+    np.testing.assert_array_equal(moved.reading((PEAK_TO_PEAK,))(x).values, other(x).values)
+    assert moved.amounts(np.array([3.0, 12.0]))[flank.name] == 3.0
+    locked = replace(model, flank=None).settings[0]
+    assert locked.lower == locked.upper == locked.value
+
+
+def test_derivatives_by_the_settings_are_those_of_differences(model, x):
+    middle = np.array([3.0, 12.0])
+    found = model.at(middle).derivatives(PEAK_TO_PEAK, x)
+    for at, step in enumerate(1e-4 * np.eye(2)):
+        ends = [model.at(middle + side * step).kernel(x).values[:, 0] for side in (1, -1)]
+        np.testing.assert_allclose(found.by_setting[:, at], (ends[0] - ends[1]) / 2e-4, rtol=1e-4, atol=1e-4)
+    with pytest.raises(UnknownNameError):
+        model.derivatives(LOST_MOTION, x)
+
+
+def test_one_standard_uncertainty_of_a_stiffness_does_to_other_outputs_what_the_kernel_says(model, x):
+    (source,) = model.uncertain
+    assert source.columns == tuple(f"stiffness.{name}" for name in model.identified.values)
+    outputs = (PEAK_TO_PEAK, LOST_MOTION, WAVE)
+    response, deviation = model.with_uncertain(outputs), np.sqrt(np.diag(source.covariance))
+    assert response.columns == (*model.columns, *source.columns)
+    first = StiffnessResponse(kernel=model.kernel, stiffnesses=tuple(model.identified.values))
+    for at, step in enumerate(deviation):
+        change = step * np.eye(3)[at]
+        units = np.concatenate([x, np.tile(change, (len(x), 1))], axis=1)
+        found, exact = response(units), model.changed(change).reading(outputs)(x)
+        assert found.good.all()
+        np.testing.assert_allclose(found.values[:, 1:], exact.values[:, 1:], rtol=1e-12)
+        np.testing.assert_array_equal(found.values[:, :1], first(units).values)
+    known = np.concatenate([x, np.zeros((len(x), 3))], axis=1)
+    np.testing.assert_array_equal(response(known).values, model.reading(outputs)(x).values)
+    assert isinstance(model.with_uncertain((PEAK_TO_PEAK,)), StiffnessResponse)
+
+
+def test_a_change_of_half_and_two_of_them_at_once_is_to_first_order(model, x):
+    steps = np.sqrt(np.diag(model.uncertain[0].covariance))
+    response = model.with_uncertain((LOST_MOTION, RADIAL))
+
+    def at(*parts: float) -> np.ndarray:
+        return response(np.concatenate([x, np.tile(steps * parts, (len(x), 1))], axis=1)).values
+
+    base, one, two = at(0, 0, 0), at(1, 0, 0), at(0, 1, 0)
+    np.testing.assert_allclose(at(0.5, -0.3, 0), base + 0.5 * (one - base) - 0.3 * (two - base), rtol=1e-12)
+    # A stiffness that is known exactly moves nothing, and none moves a gap.
+    np.testing.assert_array_equal(at(0, 0, 7), base)
+    np.testing.assert_array_equal(at(2, 2, 0)[:, 1], base[:, 1])
+
+
+def test_waves_and_stand_ins(model):
+    assert model.spectra[1] == ("order 1 cosine [arcsec]", "order 1 sine [arcsec]")
+    stage = model.reducer.cycloid_stage
+    assert {1, 2, stage.pin_count, 4 * stage.disc_teeth} <= {*model.spectra}
+    names = [candidate.name for candidate in model.stand_ins()]
+    assert names[:2] == ["contact at 468 angles", "contact at 936 angles"]
+    assert len(names) == 3

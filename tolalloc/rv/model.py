@@ -1,0 +1,245 @@
+"""The equivalent model of a reducer as a `tolalloc.model.Model`: what every question asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.model import Model, Observer, Response, Setting, SettingDerivatives
+from tolalloc.rv.cycloid.clearance import linear_model_warnings
+from tolalloc.rv.equivalent.status import OUTCOMES
+from tolalloc.rv.reducer.design import Modification, Reducer
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading, wave_outputs
+from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
+from tolalloc.units import MICROMETRE
+
+FLANK = "flank clearance [µm]"
+RADIAL = "radial clearance [µm]"
+
+_STEP = 0.1
+"""Step of a difference by a clearance, to either side [µm]."""
+_MULTIPLES = 4
+"""Multiples of pins and teeth whose waves are told apart [-]."""
+_ANGLES = (468, 936)
+"""Angles at which the contact is solved without a search between them [-]."""
+_MOST_COLUMNS = 100
+"""Columns beyond which all products of two are more than the samples can tell apart [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducerModel(Model):
+    """The equivalent model of a reducer at the sources of a drawing.
+
+    Parameters
+    ----------
+    kernel
+        Its peak-to-peak at the modification in force.
+    flank, radial
+        Smallest and largest clearance that the modification may leave on the flank and at tip and root; none locks
+        it [m].
+    identified
+        Stiffnesses that replaced the reducer's own, if any.
+    clearances
+        Values of the settings in force; those of the reducer's own modification unless given [µm].
+    """
+
+    kernel: KernelResponse
+    flank: tuple[float, float] | None = None
+    radial: tuple[float, float] | None = None
+    identified: IdentifiedStiffness | None = None
+    clearances: tuple[float, float] | None = None
+
+    @property
+    def reducer(self) -> Reducer:
+        """The reducer with the stiffness in use."""
+        return self.kernel.model.reducer
+
+    @property
+    def name(self) -> str:
+        """The reducer's."""
+        return self.reducer.name
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns [m, angles rad]."""
+        return self.kernel.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All that requirements may limit, the peak-to-peak first."""
+        return tuple(name for reading in REQUIREMENTS for name in reading.outputs)
+
+    def reading(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of these outputs, waves of `spectra` among them if need be.
+
+        Raises
+        ------
+        UnknownNameError
+            An output that the model does not have.
+        """
+        if outputs == (PEAK_TO_PEAK,):
+            return self.kernel
+        waves = {name: order for order, names in self.spectra.items() for name in names}
+        for name in outputs:
+            if name not in self.outputs and name not in waves:
+                raise UnknownNameError.among(self.name, "output", name, self.outputs)
+        orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
+        readings = tuple(own for own in REQUIREMENTS if not {*own.outputs}.isdisjoint(outputs))
+        response = OutputsResponse(
+            kernel=self.kernel, readings=(*readings, *((orders_reading(orders),) if orders else ()))
+        )
+        return response if response.outputs == outputs else replace(response, chosen=outputs)
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """Flank and radial clearance."""
+        bounds = (self.flank, self.radial)
+        return tuple(
+            Setting(
+                name=name,
+                value=value,
+                lower=own[0] / MICROMETRE if own else value,
+                upper=own[1] / MICROMETRE if own else value,
+                step=_STEP,
+            )
+            for name, value, own in zip((FLANK, RADIAL), self._clearances, bounds, strict=True)
+        )
+
+    @property
+    def _clearances(self) -> tuple[float, float]:
+        """Flank and radial clearance in force [µm]."""
+        own, stage = self.reducer.modification, self.reducer.cycloid_stage
+        return self.clearances or (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+
+    def at(self, values: Float[np.ndarray, " setting"]) -> ReducerModel:
+        """Return the model whose modification leaves other clearances [µm]."""
+        kernel = self.kernel.with_modification(self.modification(values))
+        return replace(self, kernel=kernel, clearances=(float(values[0]), float(values[1])))
+
+    def modification(self, values: Float[np.ndarray, " setting"]) -> Modification:
+        """Return the amounts that leave the clearances [µm]."""
+        stage = self.reducer.cycloid_stage
+        return Modification.from_clearances(float(values[0]) * MICROMETRE, float(values[1]) * MICROMETRE, stage)
+
+    @cached_property
+    def _modification_by_clearance(self) -> Float[np.ndarray, "2 2"]:
+        """Change of equidistant and shift amount (rows) with flank and radial clearance (columns) [-]."""
+        stage = self.reducer.cycloid_stage
+        columns = [Modification.from_clearances(*clearances, stage) for clearances in ((1.0, 0.0), (0.0, 1.0))]
+        return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
+
+    @property
+    def exact(self) -> tuple[str, ...]:
+        """The peak-to-peak alone."""
+        return (PEAK_TO_PEAK,)
+
+    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the peak-to-peak of every sample with its derivatives."""
+        if output not in self.exact:
+            raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, self.exact)
+        found = self.kernel.with_derivatives(x)
+        return SettingDerivatives(
+            evaluation=found.evaluation,
+            by_column=found.by_column,
+            by_setting=found.by_modification @ self._modification_by_clearance * MICROMETRE,
+        )
+
+    def observed(self, observe: Observer) -> ReducerModel:
+        """Return the model whose kernel tells someone the statuses of each chunk."""
+        return replace(self, kernel=replace(self.kernel, observe=observe))
+
+    @property
+    def outcomes(self) -> Mapping[int, str]:
+        """Status → outcome of an equilibrium in words."""
+        return OUTCOMES
+
+    @property
+    def conditions(self) -> Mapping[str, float | str]:
+        """Torque on the carrier."""
+        return {"torque [N·m]": self.kernel.torque}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Those of the reducer."""
+        return self.reducer.assumptions
+
+    @property
+    def content(self) -> Any:
+        """Reducer, identified stiffnesses and torque."""
+        return (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
+
+    @property
+    def uncertain(self) -> tuple[CorrelatedSource, ...]:
+        """What is not known of identified stiffnesses."""
+        return (stiffness_source(self.identified, self.reducer),) if self.identified else ()
+
+    def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of the outputs with the stiffnesses as further columns, to first order in ln K."""
+        if self.identified is None:
+            return self.reading(outputs)
+        peak = self._peak_with_stiffness
+        if outputs == peak.outputs:
+            return peak
+        deviations = np.sqrt(np.diag(self.identified.covariance))
+        return OutputsWithStiffness(
+            peak=peak, outputs=outputs, reading=self._reading_on(outputs), steps=tuple(deviations.tolist())
+        )
+
+    def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> ReducerModel:
+        """Return the model of the reducer whose identified stiffnesses are changed, by ln K/K0 [-]."""
+        return replace(self, kernel=self._peak_with_stiffness.changed(change))
+
+    @property
+    def accuracy(self) -> Mapping[str, float]:
+        """That of the peak-to-peak, from the angles of its search [arcsec]."""
+        return {PEAK_TO_PEAK: SEEN}
+
+    @property
+    def _peak_with_stiffness(self) -> StiffnessResponse:
+        stiffnesses = tuple(self.identified.values) if self.identified else ()
+        return StiffnessResponse(kernel=self.kernel, stiffnesses=stiffnesses)
+
+    def _reading_on(self, outputs: tuple[str, ...]) -> Callable[[KernelResponse], Response]:
+        """Return what makes the response of the outputs from a kernel with other stiffnesses."""
+        return lambda kernel: replace(self, kernel=kernel).reading(outputs)
+
+    @cached_property
+    def spectra(self) -> Mapping[int, tuple[str, str]]:
+        """Waves of the output turn: orders 1 and 2, and the multiples of teeth and pins."""
+        stage = self.reducer.cycloid_stage
+        multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
+        return {order: wave_outputs(order) for order in sorted({1, 2, *multiples})}
+
+    def stand_ins(self) -> tuple[Any, ...]:
+        """Return the contact at fewer angles and, for few columns, a regression of the curve."""
+        from tolalloc.rv.stand_ins.contact import ContactCandidate
+
+        contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
+        if len(self.columns) > _MOST_COLUMNS:
+            return contact
+        from tolalloc.rv.stand_ins.curve import CurveCandidate
+
+        return (*contact, CurveCandidate(kernel=self.kernel))
+
+    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
+        """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
+        modification = self.modification(values)
+        return {
+            "equidistant Δr_rp [µm]": modification.equidistant / MICROMETRE,
+            "shift Δr_p [µm]": modification.shift / MICROMETRE,
+            FLANK: float(values[0]),
+            RADIAL: float(values[1]),
+        }
+
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
+        """Return what a reader must know of a large modification."""
+        return linear_model_warnings(self.reducer.cycloid_stage, self.modification(values))
