@@ -10,9 +10,9 @@ import numpy as np
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.plots import save_png
 from tolalloc.rv.equivalent.attribution import attribute
-from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE

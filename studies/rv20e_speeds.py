@@ -12,10 +12,8 @@ from tolalloc.cli.document_script import run_document
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import ASSUMPTIONS, inertia_of
-from tolalloc.rv.dynamics.integrator import generalised_alpha
 from tolalloc.rv.dynamics.modes import modes
+from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
 from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, orders_against_speed
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer

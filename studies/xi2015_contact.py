@@ -15,10 +15,9 @@ from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.cycloid.clearance import formula_gap
-from tolalloc.rv.cycloid.law_at_every_pin import pressed
-from tolalloc.rv.cycloid.linear_method import pressed_linear
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
 from tolalloc.rv.cycloid.mesh import normals
+from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.teeth.answer import contact_answer

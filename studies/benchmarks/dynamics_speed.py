@@ -30,10 +30,8 @@ from scipy.optimize import brentq
 from tests.random_units import random_units
 from tolalloc.blas import one_blas_thread
 from tolalloc.compiled import use_threads
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import inertia_of
-from tolalloc.rv.dynamics.integrator import generalised_alpha
-from tolalloc.rv.dynamics.motion import Profile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, inertia_of
 from tolalloc.rv.dynamics.simulation import simulate
 from tolalloc.rv.dynamics.tables import Steps
 from tolalloc.rv.equivalent.condensation import spring_groups
@@ -124,9 +122,9 @@ def answer(units: int, rounds: int) -> dict[str, Any]:
     model = EquivalentModel(load_reducer("rv20e"))
     unit, reducer = load_unit("table4").errors(model.columns), model.reducer
     errors = random_units(unit, model.columns, np.random.default_rng(SEED), units)
-    speed = Profile.constant(2 * np.pi / TURN * reducer.ratio)
+    speed = SpeedProfile.constant(2 * np.pi / TURN * reducer.ratio)
     given = (
-        motion_of(reducer, speed, Profile.constant(TORQUE), TURN, STEPS),
+        motion_of(reducer, speed, SpeedProfile.constant(TORQUE), TURN, STEPS),
         inertia_of(reducer),
         Damping(stiffness_proportional=DELAY),
         generalised_alpha(0.8),

@@ -25,7 +25,7 @@ from numpy_cores import timed
 from tolalloc.blas import one_blas_thread
 from tolalloc.cli.console import UnitProgress
 from tolalloc.compiled import use_threads
-from tolalloc.rv.dynamics.damping import Damping
+from tolalloc.rv.dynamics.properties import Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
 from tolalloc.rv.simulation.answer.results import SimulationResults
 from tolalloc.rv.simulation.definition import (

@@ -16,9 +16,8 @@ from scipy.optimize import brentq
 
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.clearance import formula_gap
-from tolalloc.rv.cycloid.law_at_every_pin import pressed
-from tolalloc.rv.cycloid.linear_method import pressed_linear
 from tolalloc.rv.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
+from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import PRESETS, load_reducer
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE

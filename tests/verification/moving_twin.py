@@ -9,8 +9,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
-from tolalloc.rv.dynamics.inertia import Inertia
-from tolalloc.rv.dynamics.motion import Profile
+from tolalloc.rv.dynamics.motion import SpeedProfile
+from tolalloc.rv.dynamics.properties import Inertia
 from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates
 from tolalloc.rv.reducer.design import Reducer
 
@@ -45,8 +45,8 @@ class MovingTwin:
     reducer: Reducer
     errors: dict[str, float]
     inertia: Inertia
-    carrier_speed: Profile
-    torque: Profile
+    carrier_speed: SpeedProfile
+    torque: SpeedProfile
     mass_damping: float = 0.0
     stiffness_damping: float = 0.0
     angle: float = 0.0

@@ -24,7 +24,7 @@ from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.study import AssemblyStudy, PreparedAssembly, assemble
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.report.plots import as_html
-from tolalloc.rv.equivalent.contact_pattern import ContactPattern
+from tolalloc.rv.equivalent.line_load import ContactPattern
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 

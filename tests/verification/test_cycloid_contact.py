@@ -17,11 +17,10 @@ from scipy.optimize import brentq
 from tests.random_reducers import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.law_at_every_pin import pressed
-from tolalloc.rv.cycloid.linear_method import pressed_linear
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Clearances, CycloidStage, Modification, Reducer
 from tolalloc.rv.reducer.files import load_reducer

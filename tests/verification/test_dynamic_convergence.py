@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tests.verification.test_dynamics import input_of, run
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
-from tolalloc.rv.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
+from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, newmark
 
 INTEGRATORS = {"newmark": newmark(), "alpha 0": generalised_alpha(0.0), "alpha 0.8": generalised_alpha(0.8)}
 STEPS = 160 * 2 ** np.arange(5)
@@ -17,7 +16,7 @@ STEPS = 160 * 2 ** np.arange(5)
 def differences(model, errors, integrator, angle: float) -> tuple[np.ndarray, bool]:
     """Change of rotation and speed at common times with each halving, and whether a contact changed."""
     end = 4e-4
-    speed, torque = Profile((0.0, end), (0.0, 3.0), "step"), Profile((0.0, end), (-1000.0, -1050.0), "step")
+    speed, torque = SpeedProfile((0.0, end), (0.0, 3.0), "step"), SpeedProfile((0.0, end), (-1000.0, -1050.0), "step")
     rotations, changed = [], False
     for steps in STEPS.tolist():
         motion = motion_of(model.reducer, input_of(model.reducer, speed), torque, end, steps, angle)

@@ -10,11 +10,9 @@ from scipy.linalg import eigh
 
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import inertia_of
-from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
 from tolalloc.rv.dynamics.modes import Modes, modes
-from tolalloc.rv.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
+from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.dynamics.simulation import simulate
 from tolalloc.rv.dynamics.speeds import campbell, orders_against_speed
 from tolalloc.rv.equivalent.kinematics import Coordinates
@@ -70,8 +68,8 @@ def test_frequencies_are_those_of_differences_of_the_dense_gradient(preset, law,
 def test_a_kicked_unit_rings_at_the_frequency_of_the_carriers_mode(rv20e, table4):
     """The strongest frequency of the record lies within its resolution of the mode that moves the carrier most."""
     angle, duration, steps = 0.3, 0.5, 25000
-    torque = Profile((0.0, 1e-9), (-167.0, -167.1))
-    motion = motion_of(rv20e.reducer, Profile.constant(0.0), torque, duration, steps, angle)
+    torque = SpeedProfile((0.0, 1e-9), (-167.0, -167.1))
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(0.0), torque, duration, steps, angle)
     inertia = heavy(rv20e, 1.0)
     curve = simulate(rv20e, table4, motion, inertia, Damping(), newmark()).transmission_error[0, 1:]
     spectrum = np.abs(np.fft.rfft((curve - curve.mean()) * np.hanning(curve.size)))

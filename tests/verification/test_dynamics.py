@@ -14,10 +14,8 @@ from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
 from tolalloc.compiled import thread_count, use_threads
 from tolalloc.exceptions import InputError
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import Inertia, inertia_of
-from tolalloc.rv.dynamics.integrator import Integrator, generalised_alpha, newmark
-from tolalloc.rv.dynamics.motion import Motion, Profile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.motion import Motion, SpeedProfile, motion_of, nominal_acceleration
+from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.dynamics.simulation import Simulated, simulate
 from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -28,7 +26,7 @@ from tolalloc.units import ARCSECOND
 UNDAMPED = Damping()
 
 
-def input_of(reducer, carrier_speed: Profile) -> Profile:
+def input_of(reducer, carrier_speed: SpeedProfile) -> SpeedProfile:
     return replace(carrier_speed, values=tuple(value * reducer.ratio for value in carrier_speed.values))
 
 
@@ -44,8 +42,8 @@ def rv20e_mass(rv20e) -> np.ndarray:
 @pytest.fixture(scope="module")
 def free_vibration(rv20e, table4):
     """At rest at one angle; from the first step on the torque is a little another one, no contact changes."""
-    torque, angle, duration, steps = Profile((0.0, 1e-9), (-500.0, -505.0)), 0.3, 4e-3, 4000
-    motion = motion_of(rv20e.reducer, Profile.constant(0.0), torque, duration, steps, angle)
+    torque, angle, duration, steps = SpeedProfile((0.0, 1e-9), (-500.0, -505.0)), 0.3, 4e-3, 4000
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(0.0), torque, duration, steps, angle)
     found = run(rv20e, table4, motion, observe=np.arange(steps + 1))
     assert (found.pins_in_contact == found.pins_in_contact[:, :1]).all()
     unit = dict(zip(rv20e.columns, table4[0].tolist(), strict=True))
@@ -54,7 +52,7 @@ def free_vibration(rv20e, table4):
 
 def test_agrees_with_radau(rv20e, table4):
     reducer, end, steps = rv20e.reducer, 1e-4, 8000
-    torque, speed = Profile((0.0, end), (-167.0, -120.0), "step"), Profile((0.0, end), (2.0, 12.0), "step")
+    torque, speed = SpeedProfile((0.0, end), (-167.0, -120.0), "step"), SpeedProfile((0.0, end), (2.0, 12.0), "step")
     unit = dict(zip(rv20e.columns, table4[0].tolist(), strict=True))
     twin = MovingTwin(reducer, unit, inertia_of(reducer), speed, torque, 50.0, 1e-7, angle=0.3)
     expected = twin.integrated(np.linspace(0.0, end, 6))
@@ -71,8 +69,8 @@ def test_agrees_with_radau(rv20e, table4):
 def test_approaches_the_static_model_as_the_speed_falls(rv20e, table4):
     apart = []
     for minutes in (1.0, 4.0, 20.0):  # of one output turn
-        speed = Profile.constant(2 * np.pi / (60 * minutes) * rv20e.reducer.ratio)
-        motion = motion_of(rv20e.reducer, speed, Profile.constant(-1.0), 60 * minutes, 1404)
+        speed = SpeedProfile.constant(2 * np.pi / (60 * minutes) * rv20e.reducer.ratio)
+        motion = motion_of(rv20e.reducer, speed, SpeedProfile.constant(-1.0), 60 * minutes, 1404)
         damping = Damping(mass_proportional=100.0, stiffness_proportional=1e-5)
         found = run(rv20e, table4, motion, damping, generalised_alpha(0.8))
         static = rv20e.equilibria(table4, -1.0, motion.carrier_angle)
@@ -83,7 +81,7 @@ def test_approaches_the_static_model_as_the_speed_falls(rv20e, table4):
 
 
 def test_the_start_is_the_static_equilibrium(rv20e, table4):
-    motion = motion_of(rv20e.reducer, Profile.constant(0.0), Profile.constant(-10.0), 1e-3, 100, 0.7)
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(0.0), SpeedProfile.constant(-10.0), 1e-3, 100, 0.7)
     found = run(rv20e, table4, motion)
     static = rv20e.equilibria(table4, -10.0, np.array([0.7])).transmission_error
     np.testing.assert_allclose(found.transmission_error, np.broadcast_to(static, (1, 101)), rtol=0, atol=1e-16)
@@ -120,7 +118,7 @@ def test_frequencies_are_those_of_the_eigenproblem(rv20e, free_vibration):
 def energy_drift(model, errors, steps: int, integrator: Integrator) -> float:
     """What is missing in the energy balance of a turning, undamped unit, over the largest kinetic energy."""
     reducer, end = model.reducer, 4e-4
-    speed, torque = Profile((0.0, end), (0.0, 20.0), "step"), Profile((0.0, end), (-300.0, -250.0), "step")
+    speed, torque = SpeedProfile((0.0, end), (0.0, 20.0), "step"), SpeedProfile((0.0, end), (-300.0, -250.0), "step")
     unit = dict(zip(model.columns, errors[0].tolist(), strict=True))
     twin = MovingTwin(reducer, unit, inertia_of(reducer), speed, torque, angle=0.3)
     motion = motion_of(reducer, input_of(reducer, speed), torque, end, steps, 0.3)
@@ -149,8 +147,8 @@ def test_forces_balance_at_every_step_whatever_law_tilt_and_play(seed):
     case = random_case(seed)
     model, reducer = EquivalentModel(case.reducer, orders=case.orders), case.reducer
     errors = np.array([[unit.get(column, 0.0) for column in model.columns] for unit in case.units])
-    speed = Profile((0.0, 2e-3), (0.5, 3.0), "step")
-    torque = Profile((0.0, 2e-3), (case.torque, 2 * case.torque))
+    speed = SpeedProfile((0.0, 2e-3), (0.5, 3.0), "step")
+    torque = SpeedProfile((0.0, 2e-3), (case.torque, 2 * case.torque))
     motion = motion_of(reducer, input_of(reducer, speed), torque, 2e-3, 200, float(case.carrier_angle[0]))
     chosen, damping = np.array([1, 60, 200]), Damping(mass_proportional=30.0, stiffness_proportional=2e-7)
     found = run(model, errors, motion, damping, generalised_alpha(0.7), chosen)
@@ -182,7 +180,7 @@ def test_forces_balance_at_every_step_whatever_law_tilt_and_play(seed):
 
 def test_bits_depend_neither_on_threads_nor_on_the_batch(rv20e, table4):
     errors = random_units(table4, rv20e.columns, np.random.default_rng(3), 5)
-    motion = motion_of(rv20e.reducer, Profile.constant(100.0), Profile.constant(-20.0), 0.02, 600)
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(100.0), SpeedProfile.constant(-20.0), 0.02, 600)
     damping, some = Damping(stiffness_proportional=1e-6), np.array([0, 600])
     before, threads = run(rv20e, errors, motion, damping, observe=some), thread_count()
     try:
@@ -200,21 +198,21 @@ def test_bits_depend_neither_on_threads_nor_on_the_batch(rv20e, table4):
 def test_a_failed_sample_is_a_status_and_never_a_number(rv20e, table4):
     errors = np.repeat(table4, 2, axis=0)
     errors[0, 3] = np.nan
-    motion = motion_of(rv20e.reducer, Profile.constant(10.0), Profile.constant(-5.0), 1e-3, 10)
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(10.0), SpeedProfile.constant(-5.0), 1e-3, 10)
     found = run(rv20e, errors, motion, observe=np.array([4]))
     assert (found.status == np.array([[Status.NOT_FINITE], [Status.CONVERGED]])).all()
     for values in (found.transmission_error, found.output_speed, found.input_torque, found.observed.pin_forces):
         assert np.isnan(values[0]).all()
         assert np.isfinite(values[1]).all()
-    no_torque = motion_of(rv20e.reducer, Profile.constant(10.0), Profile.constant(0.0), 1e-3, 10)
+    no_torque = motion_of(rv20e.reducer, SpeedProfile.constant(10.0), SpeedProfile.constant(0.0), 1e-3, 10)
     floating = run(rv20e, 0 * table4 - 1e-5 * (np.array(rv20e.columns) == "pin.diameter"), no_torque)
     assert ((floating.status == Status.CONVERGED) == np.isfinite(floating.transmission_error)).all()
 
 
 def test_damping_of_one_interface_acts_there_alone(rv20e, table4):
     """An oscillation decays under damped meshes; the same factor on all interfaces is that on each of them."""
-    torque = Profile((0.0, 1e-9), (-500.0, -505.0))
-    motion = motion_of(rv20e.reducer, Profile.constant(0.0), torque, 4e-3, 2000, 0.3)
+    torque = SpeedProfile((0.0, 1e-9), (-500.0, -505.0))
+    motion = motion_of(rv20e.reducer, SpeedProfile.constant(0.0), torque, 4e-3, 2000, 0.3)
     names = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
     free = run(rv20e, table4, motion)
     meshes = run(rv20e, table4, motion, Damping(interfaces={"gear_mesh": 1e-5}))
@@ -225,17 +223,17 @@ def test_damping_of_one_interface_acts_there_alone(rv20e, table4):
 
 
 def test_the_nominal_acceleration_is_the_second_derivative_of_the_nominal_motion(rv20e):
-    speed = Profile((0.0, 0.1), (5.0, 60.0), "step")
-    motion = motion_of(rv20e.reducer, input_of(rv20e.reducer, speed), Profile.constant(-1.0), 0.1, 7)
+    speed = SpeedProfile((0.0, 0.1), (5.0, 60.0), "step")
+    motion = motion_of(rv20e.reducer, input_of(rv20e.reducer, speed), SpeedProfile.constant(-1.0), 0.1, 7)
     found = nominal_acceleration(Positions(rv20e.reducer, motion.carrier_angle), motion)
-    twin = MovingTwin(rv20e.reducer, {}, inertia_of(rv20e.reducer), speed, Profile.constant(-1.0))
+    twin = MovingTwin(rv20e.reducer, {}, inertia_of(rv20e.reducer), speed, SpeedProfile.constant(-1.0))
     expected = np.stack([twin.nominal_acceleration(float(time)) for time in motion.time])
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("blend", ["linear", "step"])
 def test_a_profile_fits_its_slope_and_its_integral(blend):
-    profile, h = Profile((-0.5, 0.2, 0.5, 1.5), (3.0, -1.0, 4.0, 4.5), blend), 1e-6
+    profile, h = SpeedProfile((-0.5, 0.2, 0.5, 1.5), (3.0, -1.0, 4.0, 4.5), blend), 1e-6
     time = np.array([-0.9, -0.3, 0.1, 0.4, 0.9, 2.0])
     np.testing.assert_allclose(profile.slope(time), (profile.at(time + h) - profile.at(time - h)) / (2 * h), atol=1e-7)
     rate = (profile.integral(time + h) - profile.integral(time - h)) / (2 * h)
@@ -257,10 +255,10 @@ def test_masses_follow_from_the_geometry(rv20e):
 
 
 def test_wrong_input_is_told_in_one_sentence(rv20e, table4):
-    constant = Profile.constant(1.0)
+    constant = SpeedProfile.constant(1.0)
     wrong = [
-        lambda: Profile((0.0, 0.0), (1.0, 2.0)),
-        lambda: Profile((0.0,), (1.0, 2.0)),
+        lambda: SpeedProfile((0.0, 0.0), (1.0, 2.0)),
+        lambda: SpeedProfile((0.0,), (1.0, 2.0)),
         lambda: motion_of(rv20e.reducer, constant, constant, 0.0, 10),
         lambda: motion_of(rv20e.reducer, constant, constant, 1.0, 0),
         lambda: inertia_of(rv20e.reducer, density=0.0),
@@ -282,7 +280,7 @@ def test_wrong_input_is_told_in_one_sentence(rv20e, table4):
 def test_interfaces_with_play_cannot_be_damped(rv20e, table4):
     loose = EquivalentModel(replace(rv20e.reducer, clearances=Clearances(gear_mesh=5e-6)))
     errors = np.zeros((1, len(loose.columns)))
-    motion = motion_of(loose.reducer, Profile.constant(10.0), Profile.constant(-5.0), 1e-3, 10)
+    motion = motion_of(loose.reducer, SpeedProfile.constant(10.0), SpeedProfile.constant(-5.0), 1e-3, 10)
     with pytest.raises(InputError, match="without play"):
         run(loose, errors, motion, Damping(interfaces={"gear_mesh": 1e-6}))
     assert (run(loose, errors, motion, Damping(stiffness_proportional=1e-6)).status == Status.CONVERGED).all()

@@ -12,9 +12,8 @@ from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
 from tolalloc.rv.cycloid.mesh import normals
 from tolalloc.rv.cycloid.solvers.contact_law import LINEAR, pin_force
-from tolalloc.rv.equivalent.contact_pattern import contact_pattern
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
-from tolalloc.rv.equivalent.line_load import LineContact, line_contact, peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.line_load import LineContact, contact_pattern, line_contact, peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
 from tolalloc.rv.response.kernel import KernelResponse

@@ -10,8 +10,8 @@ import pytest
 from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.equivalent.radial_clearance import radial_clearance
 from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Modification

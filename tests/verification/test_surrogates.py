@@ -14,8 +14,7 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Evaluation, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.stand_ins.contact import ContactCandidate, Corrected, corrected
-from tolalloc.rv.stand_ins.curve import CurveCandidate
+from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
 from tolalloc.surrogate.choice import Gate, choose
 from tolalloc.surrogate.regression import (
     RegressionCandidate,

@@ -15,17 +15,14 @@ from scipy.optimize import brentq
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.multibody import engine as door
-from tolalloc.rv.multibody.drive import Damping, Drive
-from tolalloc.rv.multibody.masses import Masses
-from tolalloc.rv.multibody.part_errors import part_errors
+from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
+from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import RIGID, with_rigid_bearings
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
 from tolalloc.rv.multibody.solvers.pin_forces import fill_forces, pin_contacts
-from tolalloc.rv.multibody.teeth import mesh_of
-from tolalloc.rv.multibody.time_course import TimeCourse
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
@@ -43,7 +40,7 @@ MASSES = Masses(
     carrier_mass=5.0,
     carrier_inertia=0.02,
 )
-DAMPING = Damping(bearings=1e-5, output=100.0)
+DAMPING = PrototypeDamping(bearings=1e-5, output=100.0)
 
 
 def with_stiffness(reducer: Reducer, **values) -> Reducer:

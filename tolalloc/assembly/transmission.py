@@ -15,7 +15,7 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.model import Observer
-from tolalloc.rv.equivalent.contact_pattern import contact_pattern
+from tolalloc.rv.equivalent.line_load import contact_pattern
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 

@@ -14,8 +14,7 @@ from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
-from tolalloc.rv.stand_ins.contact import ContactCandidate
-from tolalloc.rv.stand_ins.curve import CurveCandidate
+from tolalloc.rv.stand_ins import ContactCandidate, CurveCandidate
 from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
 from tolalloc.sensitivity.derivatives import (
     DerivativeMeasures,

@@ -15,7 +15,7 @@ from tolalloc.assembly.orientations import TransmissionCurves
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import PrecisionSweep
 from tolalloc.assembly.trajectory import Trajectory
-from tolalloc.rv.equivalent.contact_pattern import ContactPattern
+from tolalloc.rv.equivalent.line_load import ContactPattern
 from tolalloc.rv.reducer.design import Reducer
 
 

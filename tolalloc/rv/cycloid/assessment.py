@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from tolalloc.rv.cycloid.clearance import LARGE, Clearance, clearance_of, is_large
-from tolalloc.rv.cycloid.law_at_every_pin import pressed
-from tolalloc.rv.cycloid.linear_method import pressed_linear
 from tolalloc.rv.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
+from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import MICROMETRE

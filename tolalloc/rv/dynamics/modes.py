@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.dynamics.inertia import Inertia
+from tolalloc.rv.dynamics.properties import Inertia
 from tolalloc.rv.equivalent.condensation import bilateral_groups
-from tolalloc.rv.equivalent.forces import forces
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.equivalent.pins import pin_contact
 from tolalloc.rv.equivalent.springs import vector_columns
 from tolalloc.rv.equivalent.status import Status

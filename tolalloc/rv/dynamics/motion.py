@@ -28,7 +28,7 @@ class _Piece(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Profile:
+class SpeedProfile:
     """A quantity over time: given at some times, blended in between, held before the first and after the last.
 
     Parameters
@@ -57,7 +57,7 @@ class Profile:
             raise InputError.at("profile", "values", self.values, "one finite value per time")
 
     @classmethod
-    def constant(cls, value: float) -> Profile:
+    def constant(cls, value: float) -> SpeedProfile:
         """Return the profile that keeps one value [rad/s or N·m]."""
         return cls((0.0,), (value,))
 
@@ -120,7 +120,12 @@ class Motion:
 
 
 def motion_of(
-    reducer: Reducer, input_speed: Profile, output_torque: Profile, duration: float, steps: int, angle: float = 0.0
+    reducer: Reducer,
+    input_speed: SpeedProfile,
+    output_torque: SpeedProfile,
+    duration: float,
+    steps: int,
+    angle: float = 0.0,
 ) -> Motion:
     """Return the nominal motion under an input speed and an output torque.
 

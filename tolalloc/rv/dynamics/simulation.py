@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import Inertia
-from tolalloc.rv.dynamics.integrator import Integrator
 from tolalloc.rv.dynamics.motion import Motion
+from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator
 from tolalloc.rv.dynamics.solvers.stepping import Parts, Record, Scheme, State, advance
 from tolalloc.rv.dynamics.tables import Steps
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -127,7 +125,7 @@ def simulate(
     inertia, damping
         Of the parts and interfaces.
     integrator
-        `tolalloc.rv.dynamics.integrator.newmark` or `tolalloc.rv.dynamics.integrator.generalised_alpha`.
+        `tolalloc.rv.dynamics.properties.newmark` or `tolalloc.rv.dynamics.properties.generalised_alpha`.
     observe
         Numbers of the steps at which the whole state is given, each once; none unless given [-].
     progress

@@ -9,11 +9,9 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from tolalloc.exceptions import InputError
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import Inertia
-from tolalloc.rv.dynamics.integrator import Integrator
 from tolalloc.rv.dynamics.modes import Modes
-from tolalloc.rv.dynamics.motion import Profile, motion_of
+from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
+from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator
 from tolalloc.rv.dynamics.simulation import simulate
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import order_spectrum
@@ -146,7 +144,7 @@ def orders_against_speed(
     inertia, damping
         Of the parts and interfaces.
     integrator
-        `tolalloc.rv.dynamics.integrator.newmark` or `tolalloc.rv.dynamics.integrator.generalised_alpha`.
+        `tolalloc.rv.dynamics.properties.newmark` or `tolalloc.rv.dynamics.properties.generalised_alpha`.
     speeds
         Output speeds [rad/s].
     orders
@@ -179,8 +177,8 @@ def orders_against_speed(
     peak_to_peak, unsettled, status = np.empty(shape), np.empty(shape), np.empty(shape, np.uint8)
     amplitude = np.empty((*shape, order.size))
     for at, speed in enumerate(speeds):
-        sun, duration = Profile.constant(float(speed) * model.reducer.ratio), turns * 2 * pi / float(speed)
-        motion = motion_of(model.reducer, sun, Profile.constant(torque), duration, turns * steps_per_turn)
+        sun, duration = SpeedProfile.constant(float(speed) * model.reducer.ratio), turns * 2 * pi / float(speed)
+        motion = motion_of(model.reducer, sun, SpeedProfile.constant(torque), duration, turns * steps_per_turn)
         found = simulate(model, errors, motion, inertia, damping, integrator)
         before, last = np.split(found.transmission_error[:, -2 * steps_per_turn :], 2, axis=1)
         difference = (last - before)[:, steps_per_turn // 2 :]

@@ -10,10 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import Inertia
-from tolalloc.rv.dynamics.integrator import Integrator
 from tolalloc.rv.dynamics.motion import Motion, nominal_acceleration
+from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator
 from tolalloc.rv.equivalent.condensation import (
     CondensedAngles,
     bilateral_groups,

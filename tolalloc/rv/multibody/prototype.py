@@ -9,9 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.multibody.drive import Damping, Drive
+from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
 from tolalloc.rv.multibody.engine import engine
-from tolalloc.rv.multibody.masses import Masses
 from tolalloc.rv.multibody.part_errors import PartErrors
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh
 from tolalloc.rv.multibody.system import System
@@ -61,7 +60,7 @@ def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
 
 
 def assemble(
-    reducer: Reducer, masses: Masses, errors: PartErrors, mesh: Mesh, drive: Drive, damping: Damping
+    reducer: Reducer, masses: Masses, errors: PartErrors, mesh: Mesh, drive: Drive, damping: PrototypeDamping
 ) -> Prototype:
     """Return a reducer in the engine, at rest at the carrier angle 0.
 

@@ -7,17 +7,74 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.multibody.answer import PrototypeAnswer
-from tolalloc.rv.multibody.drive import Damping, Drive
+from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
 from tolalloc.rv.multibody.engine import engine
-from tolalloc.rv.multibody.masses import Masses
-from tolalloc.rv.multibody.part_errors import part_errors
+from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import Prototype, assemble, reference_places
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_pin_forces
-from tolalloc.rv.multibody.teeth import mesh_of
 from tolalloc.rv.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrototypeAnswer:
+    """What the virtual prototype does.
+
+    Parameters
+    ----------
+    time
+        Times of the answers [s].
+    input_speed
+        Of the sun, as prescribed [rad/s].
+    input_angle
+        Of the sun, as prescribed [rad].
+    output_speed
+        Of the carrier [rad/s].
+    output_acceleration
+        Of the carrier [rad/s²].
+    output_angle
+        Of the carrier [rad].
+    transmission_error
+        Carrier angle beyond the sun's over the ratio [rad].
+    input_torque
+        On the sun, positive where it drives [N·m].
+    output_torque
+        On the carrier, as prescribed [N·m].
+    pin_forces
+        Normal force of every pin [N].
+    kinetic_energy
+        Of all bodies but the sun [J].
+    """
+
+    time: Float[np.ndarray, " time"]
+    input_speed: Float[np.ndarray, " time"]
+    input_angle: Float[np.ndarray, " time"]
+    output_speed: Float[np.ndarray, " time"]
+    output_acceleration: Float[np.ndarray, " time"]
+    output_angle: Float[np.ndarray, " time"]
+    transmission_error: Float[np.ndarray, " time"]
+    input_torque: Float[np.ndarray, " time"]
+    output_torque: Float[np.ndarray, " time"]
+    pin_forces: Float[np.ndarray, "time disc pin"]
+    kinetic_energy: Float[np.ndarray, " time"]
+
+    @property
+    def input_power(self) -> Float[np.ndarray, " time"]:
+        """Power that the sun brings in [W]."""
+        return np.asarray(self.input_torque * self.input_speed)
+
+    @property
+    def output_power(self) -> Float[np.ndarray, " time"]:
+        """Power that the carrier gives away, positive against a resisting torque [W]."""
+        return np.asarray(-self.output_torque * self.output_speed)
+
+    @property
+    def pins_in_contact(self) -> Int[np.ndarray, "time disc"]:
+        """Pins that carry, on each disc [-]."""
+        return np.asarray((self.pin_forces > 0).sum(axis=2))
+
 
 Progress = Callable[[float], None]
 """Told which share of the time is simulated [-]."""
@@ -139,7 +196,7 @@ def simulate_prototype(
     masses: Masses,
     drive: Drive,
     steps: TimeSteps,
-    damping: Damping,
+    damping: PrototypeDamping,
     errors: Mapping[str, float] | None = None,
     progress: Progress = _untold,
 ) -> PrototypeAnswer:

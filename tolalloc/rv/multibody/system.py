@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.rv.multibody.drive import Drive
+from tolalloc.rv.multibody.drive import Drive, TimeCourse
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_forces
-from tolalloc.rv.multibody.time_course import TimeCourse
 from tolalloc.rv.reducer.design import Reducer
 
 

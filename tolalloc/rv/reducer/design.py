@@ -215,7 +215,9 @@ class Reducer:
         return replace(self, stiffness=replace(self.stiffness, pin_bending=pin_bending(diameter, span, modulus)))
 
     def torque_on_carrier(self, asked: float | None, place: str) -> float:
-        """Return the torque to use, the test torque unless one is asked for [N·m].
+        """Return the torque to use, the test torque unless one is asked for; negative resists the rotation [N·m].
+
+        Commands and files take torques with this sign only, nomenclature page.
 
         Raises
         ------

@@ -27,6 +27,18 @@ PRESETS = Path(__file__).parent / "presets"
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
 
+_SI = {"mm": MILLIMETRE, "um": MICROMETRE, "deg": DEGREE, "gpa": GIGAPASCAL, "nm": 1.0}
+"""Unit of measurement at the end of a field's name → what it is in SI units; ``nm`` is N·m."""
+
+
+def _in_si(record: Record) -> dict[str, Any]:
+    """Return the fields of a record in SI units, named without their units of measurement."""
+    fields: dict[str, Any] = {}
+    for name, value in record:
+        quantity, _, unit = name.rpartition("_")
+        fields |= {quantity: value * _SI[unit]} if unit in _SI and value is not None else {name: value}
+    return fields
+
 
 class FirstStageRecord(Record):
     """Table ``[first_stage]``."""
@@ -64,16 +76,8 @@ class CycloidStageRecord(Record):
 
     def stage(self) -> CycloidStage:
         """Return the cycloid stage in SI units."""
-        width = self.face_width_mm * MILLIMETRE
-        return CycloidStage(
-            pin_count=self.pin_count,
-            disc_teeth=self.disc_teeth,
-            pin_circle_radius=self.pin_circle_radius_mm * MILLIMETRE,
-            pin_radius=self.pin_radius_mm * MILLIMETRE,
-            eccentricity=self.eccentricity_mm * MILLIMETRE,
-            face_width=width,
-            disc_spacing=width if self.disc_spacing_mm is None else self.disc_spacing_mm * MILLIMETRE,
-        )
+        spacing = self.face_width_mm if self.disc_spacing_mm is None else self.disc_spacing_mm
+        return CycloidStage(**_in_si(self.model_copy(update={"disc_spacing_mm": spacing})))
 
 
 class MaterialRecord(Record):
@@ -81,10 +85,6 @@ class MaterialRecord(Record):
 
     elastic_modulus_gpa: Annotated[float, Field(ge=10, le=1000)]
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
-
-    def material(self) -> Material:
-        """Return the material in SI units."""
-        return Material(elastic_modulus=self.elastic_modulus_gpa * GIGAPASCAL, poisson_ratio=self.poisson_ratio)
 
 
 class ClearancesRecord(Record):
@@ -94,15 +94,6 @@ class ClearancesRecord(Record):
     crank_disc_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
     crank_carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
     carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
-
-    def clearances(self) -> Clearances:
-        """Return the clearances in SI units."""
-        return Clearances(
-            gear_mesh=self.gear_mesh_um * MICROMETRE,
-            crank_disc_bearing=self.crank_disc_bearing_um * MICROMETRE,
-            crank_carrier_bearing=self.crank_carrier_bearing_um * MICROMETRE,
-            carrier_bearing=self.carrier_bearing_um * MICROMETRE,
-        )
 
 
 class ModificationRecord(Record):
@@ -114,9 +105,7 @@ class ModificationRecord(Record):
 
     def modification(self) -> Modification:
         """Return the modification in SI units and in the program's convention."""
-        return Modification.from_convention(
-            self.convention, equidistant=self.equidistant_um * MICROMETRE, shift=self.shift_um * MICROMETRE
-        )
+        return Modification.from_convention(**_in_si(self))
 
 
 class LoadRecord(Record):
@@ -146,31 +135,26 @@ class ReducerRecord(Record):
     @model_validator(mode="after")
     def _preload_is_carried(self) -> ReducerRecord:
         if isinstance(self.stiffness.carrier_bearing, BallRecord):
-            self.stiffness.carrier_bearing.stiffness(self.material.material())
+            self.stiffness.carrier_bearing.stiffness(Material(**_in_si(self.material)))
         return self
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        first, stage, disc = self.first_stage, self.cycloid_stage.stage(), self.material.material()
-        pin = self.pin_material.material() if self.pin_material else disc
+        stage, disc = self.cycloid_stage.stage(), Material(**_in_si(self.material))
+        pin = Material(**_in_si(self.pin_material)) if self.pin_material else disc
         return Reducer(
             name=self.name,
             source=self.source,
             crank_count=self.crank_count,
             disc_count=self.disc_count,
-            first_stage=FirstStage(
-                sun_teeth=first.sun_teeth,
-                planet_teeth=first.planet_teeth,
-                module=first.module_mm * MILLIMETRE,
-                pressure_angle=first.pressure_angle_deg * DEGREE,
-            ),
+            first_stage=FirstStage(**_in_si(self.first_stage)),
             cycloid_stage=stage,
             disc_material=disc,
             pin_material=pin,
             stiffness=self.stiffness.stiffness(disc, pin, stage),
             modification=self.modification.modification(),
-            load=Load(test_torque=self.load.test_torque_nm, rated_torque=self.load.rated_torque_nm),
-            clearances=self.clearances.clearances(),
+            load=Load(**_in_si(self.load)),
+            clearances=Clearances(**_in_si(self.clearances)),
             assumptions=self.assumptions,
         )
 

@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.dynamics.inertia import Inertia, inertia_of
-from tolalloc.rv.dynamics.integrator import generalised_alpha, newmark
-from tolalloc.rv.dynamics.motion import Motion, Profile, motion_of
+from tolalloc.rv.dynamics.motion import Motion, SpeedProfile, motion_of
+from tolalloc.rv.dynamics.properties import Inertia, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.multibody.engine import engine as multibody_engine
@@ -172,8 +171,8 @@ class PreparedSimulation:
     def motion(self) -> Motion:
         """Nominal motion and load."""
         asked = self.asked
-        speed = Profile((0.0, asked.ramp), (0.0, self.speed), "step")
-        torque = Profile((asked.ramp, self.loaded), (0.0, -self.load), "step")
+        speed = SpeedProfile((0.0, asked.ramp), (0.0, self.speed), "step")
+        torque = SpeedProfile((asked.ramp, self.loaded), (0.0, -self.load), "step")
         return motion_of(self.reducer, speed, torque, asked.duration, round(asked.duration / asked.step))
 
     @cached_property

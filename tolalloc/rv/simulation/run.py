@@ -9,18 +9,14 @@ import numpy as np
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.progress import Progress
-from tolalloc.rv.dynamics.damping import Damping
-from tolalloc.rv.dynamics.inertia import ASSUMPTIONS
 from tolalloc.rv.dynamics.modes import modes
 from tolalloc.rv.dynamics.motion import Motion
+from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
-from tolalloc.rv.equivalent.forces import forces
+from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.equivalent.status import Status
-from tolalloc.rv.multibody.drive import Damping as PrototypeDamping
-from tolalloc.rv.multibody.drive import Drive
-from tolalloc.rv.multibody.masses import Masses
+from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.rv.multibody.time_course import TimeCourse
 from tolalloc.rv.simulation.answer.results import AtRest, SimulationResults, TimeSeries
 from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
 

@@ -1,1 +1,0 @@
-"""Stand-ins for the equivalent model that use its structure."""
