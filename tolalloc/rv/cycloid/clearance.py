@@ -59,8 +59,6 @@ def linear_clearance(
 def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
     """Return Li Lixing's gap after closing at φ0, Δr_rp(1 − S) − Δr_p(cos κ − q·S) [m].
 
-    Notes
-    -----
     Right only if Δr_rp·q ≥ Δr_p; otherwise another pin touches first and the formula goes negative.
 
     References

@@ -50,8 +50,6 @@ def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angl
 def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
     """Return K_djk along the tooth: C(ρ−r)/(ρ+r) on the concave part, C on the convex part [N/m].
 
-    Notes
-    -----
     With the curvature κ of the pin centre's path it is C/(1 + 2rκ). The printed formula with its signed curvature is
     singular or negative on the convex part for pin radii above about 2.5 mm on an RV-20E, so only the concave part
     follows the print.
@@ -66,8 +64,6 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
 def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
     """Return λ = L·exp(2/3) of the approach F/c·ln(cλ/F), theory page equation (30) [m].
 
-    Notes
-    -----
     L is the radius of curvature of the path of the pin's centre on the disc: the flank's radius plus r_rp where the
     flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
     alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length

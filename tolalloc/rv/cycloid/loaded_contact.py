@@ -38,12 +38,8 @@ class LoadedContact:
         Clearance after the first contact, with a pin at every angle, before the load [m].
     deflection
         δ_max = r_d·rotation under the load, what a pin with the longest lever yields [m].
-    force
-        Pin forces [N].
-    pressure
-        Hertz's peak pressure of every pin [Pa].
-    torque
-        Torque of the pins on each disc [N·m].
+    force, pressure, torque
+        Force and Hertz's peak pressure of every pin, torque of the pins on each disc [N, Pa, N·m].
     zone
         First and last angle at which a pin would carry; where two places touch first, pins between may be free [rad].
     iterations
@@ -88,10 +84,8 @@ class PressedDiscs:
     ----------
     reducer
         Nominal design; its contact law, bending of the pins and modification are used.
-    torque
-        Torque of the pins on all discs together [N·m].
-    discs
-        Number of discs that share it [-].
+    torque, discs
+        Torque of the pins on all discs together; number of discs that share it [N·m, -].
     exact
         Whether clearances are exact distances; by default where the modification is too large for the formula.
     """

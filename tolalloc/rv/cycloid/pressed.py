@@ -31,16 +31,14 @@ def pressed_linear(
     Without a deflection δ_max [m] it is iterated until it is the approach under the largest force, by the reducer's
     law with the curvature at φ0.
 
+    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
+
     Raises
     ------
     InputError
         The deflection reaches no pin.
     SolveError
         The iteration does not settle.
-
-    Notes
-    -----
-    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
 
     References
     ----------
@@ -152,14 +150,12 @@ class _Press:
 def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
     """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
 
+    Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
+
     Raises
     ------
     InputError
         The torque would press a pin in by more than its radius.
-
-    Notes
-    -----
-    Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
     """
     closed, angles = discs.clearance, discs.pin_angles(phase)
     gap = gap_of(discs.profile, closed.exact)

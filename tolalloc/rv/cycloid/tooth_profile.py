@@ -20,17 +20,15 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 class ToothProfile:
     """Profile ground by a pin of radius r_rp + Δr_rp on the circle Rp + Δr_p, turned by the rotation modification.
 
+    The frame is the disc's: its centre, and the middle of a root at angle 0. The parameter φ is the angle of the pin
+    that grinds the point: 0 at the root, π at the tip. Theory page equation (34).
+
     Parameters
     ----------
     stage
         Cycloid stage.
     modification
         Tooth modification; none unless given.
-
-    Notes
-    -----
-    The frame is the disc's: its centre, and the middle of a root at angle 0. The parameter φ is the angle of the pin
-    that grinds the point: 0 at the root, π at the tip. Theory page equation (34).
     """
 
     stage: CycloidStage

@@ -91,19 +91,17 @@ def modes(
 ) -> Modes:
     """Return the natural frequencies and modes of one unit, linearised about its static equilibrium.
 
+    K·φ = ω²·M·φ with the pins that carry. The sun's rotation is prescribed, so with pins that carry nothing moves
+    freely and all frequencies are positive; where no pin carries, discs and carrier turn without resistance and the
+    first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
+    inertia are small beside the load.
+
     Raises
     ------
     InputError
         Play, tilted discs or the logarithmic contact law: their stiffness changes with the least vibration.
     SolveError
         An angle without a static equilibrium.
-
-    Notes
-    -----
-    K·φ = ω²·M·φ with the pins that carry. The sun's rotation is prescribed, so with pins that carry nothing moves
-    freely and all frequencies are positive; where no pin carries, discs and carrier turn without resistance and the
-    first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
-    inertia are small beside the load.
     """
     _check_linear(model, errors)
     at = Positions(model.reducer, carrier_angle, model.orders)

@@ -166,8 +166,6 @@ def motion_of(
 def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "time coordinate"]:
     """Return the acceleration of every coordinate's part in the nominal motion [m/s², rad/s²].
 
-    Notes
-    -----
     Crank axes run on the circle of radius a_sp with the carrier, disc centres on that of radius e with the crank; the
     sun's centre rests. Cranks turn with −zc·θc, discs and carrier with θc.
     """

@@ -107,6 +107,9 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
 class Damping:
     """Damping in proportion to masses and to stiffness; pin contacts and interfaces with play have none of the latter.
 
+    A mode of angular frequency ω that strains one damped interface alone has the damping ratio
+    mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
+
     Parameters
     ----------
     mass_proportional
@@ -121,11 +124,6 @@ class Damping:
     ------
     InputError
         A factor that is negative or not finite.
-
-    Notes
-    -----
-    A mode of angular frequency ω that strains one damped interface alone has the damping ratio
-    mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
     """
 
     mass_proportional: float = 0.0
@@ -160,17 +158,15 @@ class Damping:
 class Integrator:
     """Constants of a one-step integrator of second order, in the form of Arnold and Brüls (2007).
 
+    The equations of motion hold exactly at every step:
+    (1 − αm)·a' + αm·a = (1 − αf)·q̈' + αf·q̈, q' = q + h·q̇ + h²((½ − β)·a + β·a'), q̇' = q̇ + h((1 − γ)·a + γ·a').
+
     Parameters
     ----------
     alpha_m, alpha_f
         Weights of the old step's accelerations, algorithmic and true [-].
     beta, gamma
         Newmark's weights of the new acceleration in displacement and in velocity [-].
-
-    Notes
-    -----
-    The equations of motion hold exactly at every step:
-    (1 − αm)·a' + αm·a = (1 − αf)·q̈' + αf·q̈, q' = q + h·q̇ + h²((½ − β)·a + β·a'), q̇' = q̇ + h((1 − γ)·a + γ·a').
 
     References
     ----------

@@ -59,12 +59,8 @@ class Simulated:
     input_torque
         Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it
         [N·m].
-    pins_in_contact
-        Number of pins that carry load [-].
-    status
-        Values of `tolalloc.rv.equivalent.status.Status` [-].
-    residual
-        Largest component of the unbalanced force over the largest force [-].
+    pins_in_contact, status, residual
+        Number of pins that carry load, `tolalloc.rv.equivalent.status.Status`, unbalanced over largest force [-].
     observed
         The whole state at the times asked for.
     """
@@ -114,16 +110,16 @@ def simulate(
 ) -> Simulated:
     """Return what every sample does over time.
 
+    M·q̈ + C·q̇ + ∂V(q, θc)/∂q = f − M·a, with V the energy of the static model, f the torque on the carrier and a the
+    acceleration of the nominal motion; the sun's rotation is prescribed. At time 0 every sample is in the equilibrium
+    of the static model, its deviations have no velocity and the acceleration −a that follows.
+
     Parameters
     ----------
-    model
-        The equivalent model.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-    motion
-        Nominal motion and load.
-    inertia, damping
-        Of the parts and interfaces.
+    model, errors
+        The equivalent model; deviations in the order of its columns [m, angles rad].
+    motion, inertia, damping
+        Nominal motion and load; of the parts and interfaces.
     integrator
         `tolalloc.rv.dynamics.properties.newmark` or `tolalloc.rv.dynamics.properties.generalised_alpha`.
     observe
@@ -135,12 +131,6 @@ def simulate(
     ------
     InputError
         Damping of an interface that is not there or has play.
-
-    Notes
-    -----
-    M·q̈ + C·q̇ + ∂V(q, θc)/∂q = f − M·a, with V the energy of the static model, f the torque on the carrier and a the
-    acceleration of the nominal motion; the sun's rotation is prescribed. At time 0 every sample is in the equilibrium
-    of the static model, its deviations have no velocity and the acceleration −a that follows.
     """
     steps = Steps(model=model, motion=motion, inertia=inertia, damping=damping, integrator=integrator)
     columns, coordinates, samples = model.error_columns, steps.coordinates, errors.shape[0]

@@ -60,15 +60,13 @@ class Campbell:
 def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]) -> Campbell:
     """Return the frequency bands and where orders meet them between a slowest and a fastest output speed [rad/s].
 
+    An order n excites with n·Ω/2π at the output speed Ω. A mode is told by its rank in frequency at every angle, not by
+    its shape; where two frequencies cross over a turn, their bands share the crossing.
+
     Raises
     ------
     InputError
         An order below 1.
-
-    Notes
-    -----
-    An order n excites with n·Ω/2π at the output speed Ω. A mode is told by its rank in frequency at every angle, not by
-    its shape; where two frequencies cross over a turn, their bands share the crossing.
     """
     if min(orders, default=1) < 1:
         raise InputError.at("speeds", "orders", orders, "1 or more waves per output turn")
@@ -133,22 +131,18 @@ def orders_against_speed(
 ) -> OrdersAgainstSpeed:
     """Return the orders of the transmission error at constant speeds under a constant torque.
 
+    Every run starts at carrier angle 0 in the equilibrium of `tolalloc.rv.dynamics.simulation.simulate`, and
+    what the start sets swinging decays. Where the second half of a turn repeats itself in the next one, it has decayed
+    before the last turn begins; this holds for gear ratios that bring the sun back to its place after an output turn.
+    Newmark's method may feed modes too fast for the step while pins come and go; the generalised-α method with a
+    spectral radius below 1 damps them.
+
     Parameters
     ----------
-    model
-        The equivalent model.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    inertia, damping
-        Of the parts and interfaces.
-    integrator
-        `tolalloc.rv.dynamics.properties.newmark` or `tolalloc.rv.dynamics.properties.generalised_alpha`.
-    speeds
-        Output speeds [rad/s].
-    orders
-        Waves per output turn whose amplitudes are wanted [-].
+    model, errors, torque, inertia, damping, integrator
+        As in `tolalloc.rv.dynamics.simulation.simulate`; a constant torque on the carrier [N·m].
+    speeds, orders
+        Output speeds; waves per output turn whose amplitudes are wanted [rad/s, -].
     steps_per_turn
         Time steps per output turn; a wave at resonance needs some twenty of them [-].
     turns
@@ -158,14 +152,6 @@ def orders_against_speed(
     ------
     InputError
         A speed that is not positive, fewer than two turns, or too few steps for an order.
-
-    Notes
-    -----
-    Every run starts at carrier angle 0 in the equilibrium of `tolalloc.rv.dynamics.simulation.simulate`, and
-    what the start sets swinging decays. Where the second half of a turn repeats itself in the next one, it has decayed
-    before the last turn begins; this holds for gear ratios that bring the sun back to its place after an output turn.
-    Newmark's method may feed modes too fast for the step while pins come and go; the generalised-α method with a
-    spectral radius below 1 damps them.
     """
     if not np.all((speeds > 0.0) & np.isfinite(speeds)):
         raise InputError.at("speeds", "speeds", speeds.tolist(), "positive numbers")

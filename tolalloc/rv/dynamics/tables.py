@@ -78,14 +78,8 @@ class Steps:
 
     Parameters
     ----------
-    model
-        The equivalent model.
-    motion
-        Nominal motion and load.
-    inertia, damping
-        Of its parts and interfaces.
-    integrator
-        Constants of the time integrator [-].
+    model, motion, inertia, damping, integrator
+        As in `tolalloc.rv.dynamics.simulation.simulate`.
 
     Raises
     ------

@@ -18,18 +18,12 @@ class Equilibria:
 
     Parameters
     ----------
-    reducer
-        The nominal design.
-    columns
-        Its error columns and the values that they move.
-    tables
-        Its condensed tables at the carrier angles.
+    reducer, columns, tables
+        The nominal design, its error columns and the values that they move, its condensed tables at the angles.
     errors
         Deviations in the order of the model's columns [m, angles rad].
-    torque
-        Torque on the carrier [N·m].
-    carrier_angle
-        θc [rad].
+    torque, carrier_angle
+        Torque on the carrier; θc [N·m, rad].
     transmission_error
         Carrier rotation beyond θc, output side [rad].
     kept
@@ -67,12 +61,8 @@ class Extremes:
         Where they occur [rad].
     remaining
         What still finer angles may add to the peak-to-peak, an estimate [rad].
-    solves
-        Equilibria solved [-].
-    status
-        Worst status of the sample's angles [-].
-    residual
-        Largest residual over the largest force of the sample's angles [-].
+    solves, status, residual
+        Equilibria solved; worst status and largest residual over the largest force of the sample's angles [-].
     """
 
     largest: Float[np.ndarray, " sample"]
@@ -95,10 +85,8 @@ class Derivatives:
 
     Parameters
     ----------
-    by_error
-        By every error column, modification included [rad/m, rad/rad].
-    by_torque
-        By the torque [rad/(N·m)].
+    by_error, by_torque
+        By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)].
     by_stiffness
         By the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [rad].
     status

@@ -44,8 +44,6 @@ class Attribution:
 def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> Attribution:
     """Return what every source of one unit [m, angles rad] adds to its transmission error and to each order.
 
-    Notes
-    -----
     Theory page, equation (32). All gaps, clearances and the torque scaled together scale the transmission error, as
     long as the contact law is linear, so Euler's theorem splits it into deviation times derivative. The split holds for
     this unit: with other errors other pins carry, and a source's share changes. Under the logarithmic law the part that

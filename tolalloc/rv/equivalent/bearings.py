@@ -22,8 +22,6 @@ def _tilted(height: float, direction: Float[np.ndarray, " angle"]) -> Float[np.n
 def crank_disc(at: Positions) -> SpringGroup:
     """Return two springs per crank journal and disc bore, theory page equations (8) and (9).
 
-    Notes
-    -----
     Journals turn with the crankshaft, bores with the disc, that is with the carrier angle:
     ``crank{i}.journal{j}.eccentricity`` and ``disc{j}.bore{i}.position`` [m]. Angles [rad], equation (29):
     ``crank{i}.journal{j}.phase`` (the journal turned on its crankshaft), ``disc{j}.bores.rotation`` (the pattern of the
@@ -73,8 +71,6 @@ def crank_disc(at: Positions) -> SpringGroup:
 def crank_carrier(at: Positions) -> SpringGroup:
     """Return two springs per crankshaft bearing in the carrier, theory page equations (10) and (11).
 
-    Notes
-    -----
     ``carrier.bore{i}.position`` turns with the carrier [m].
     """
     reducer, coordinates = at.reducer, at.coordinates
@@ -105,8 +101,6 @@ def crank_carrier(at: Positions) -> SpringGroup:
 def carrier_support(at: Positions) -> SpringGroup:
     """Return the two springs of the carrier's bearing in the housing, theory page equation (12).
 
-    Notes
-    -----
     ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m].
     """
     angles, carrier = at.carrier_angle.size, at.coordinates.carrier

@@ -32,18 +32,12 @@ class Layout(NamedTuple):
 
     Parameters
     ----------
-    torque
-        Torque on the carrier, behind the spring rows' columns [-].
-    clearance
-        Clearance of every element with play [-].
+    torque, clearance
+        Torque on the carrier, behind the spring rows' columns; clearance of every element with play [-].
     pin
         Radial, tangential and radius deviation of every pin [-].
-    wave
-        Harmonic amplitudes of each disc's pitch, then run-out [-].
-    tooth
-        Pitch, then run-out of each disc's single teeth [-].
-    tilt
-        Tilt x, y of each disc [-].
+    wave, tooth, tilt
+        Of each disc: harmonic amplitudes of pitch, then run-out; pitch, then run-out of single teeth; tilt x, y [-].
     end
         Number of values [-].
     pins, waves, teeth
@@ -85,12 +79,8 @@ class Columns:
 
     Parameters
     ----------
-    names
-        Columns in the order of X.
-    layout
-        Blocks of the values.
-    map
-        From columns to values.
+    names, layout, map
+        Columns in the order of X; blocks of the values; from columns to values.
     rows_of_stiffness
         Field of `tolalloc.rv.reducer.stiffness.Stiffness` → its bilateral rows, or its elements with play
         behind them [-].

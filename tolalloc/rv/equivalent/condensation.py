@@ -210,8 +210,6 @@ def _condense_some(at: Positions) -> CondensedAngles:
 def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
     """Return the condensed model of a reducer at the carrier angles.
 
-    Notes
-    -----
     Theory page, equations (19)–(21).
     """
     parts = [

@@ -19,8 +19,6 @@ from tolalloc.rv.equivalent.springs import (
 def sun_support(at: Positions) -> SpringGroup:
     """Return the two support springs of the sun gear, theory page equation (6).
 
-    Notes
-    -----
     ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m].
     """
     angles = at.carrier_angle.size
@@ -41,8 +39,6 @@ def _along_line_of_action(
 ) -> tuple[dict[str, Float[np.ndarray, " angle"]], Float[np.ndarray, "angle 2"]]:
     """Return what every error column of one mesh adds to its compression, and the direction of the line of action.
 
-    Notes
-    -----
     Pitch deviations, counter-clockwise about their own gear, lie along the pitch circle, so cos α of them along the
     line of action. The teeth in mesh stand at P_i seen from the sun's centre and opposite to it seen from the planet's;
     there a planet's tooth that is ahead moves against the line of action, which compresses as the sun's does.
@@ -66,8 +62,6 @@ def _along_line_of_action(
 def gear_mesh(at: Positions) -> SpringGroup:
     """Return one spring per sun–planet mesh along its line of action, theory page equation (7).
 
-    Notes
-    -----
     ``sun.eccentricity`` and ``sun.pitch`` turn with the sun, ``planet{i}.eccentricity`` and ``planet{i}.pitch`` with
     the crankshaft; ``mesh{i}.deviation`` is what the pair adds along its line of action (tooth thickness) [m].
     """

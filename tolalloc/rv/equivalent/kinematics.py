@@ -49,6 +49,8 @@ class Coordinates:
 class Positions:
     """Directions of all parts of a reducer at the given carrier angles.
 
+    Theory page, equations (1)–(4). Counts start at 0 here and at 1 in names.
+
     Parameters
     ----------
     reducer
@@ -57,10 +59,6 @@ class Positions:
         θc, counter-clockwise positive; one output turn is 0 … 2π [rad].
     orders
         Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
-
-    Notes
-    -----
-    Theory page, equations (1)–(4). Counts start at 0 here and at 1 in names.
     """
 
     reducer: Reducer

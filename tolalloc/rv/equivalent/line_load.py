@@ -20,21 +20,17 @@ from tolalloc.rv.equivalent.outputs import Forces, Solved
 class LineContact:
     """Contacts of pins and teeth as springs side by side along the width of the tooth, theory page equation (31).
 
+    What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
+    stiffness and `deformation` mean nothing.
+
     Parameters
     ----------
-    force
-        Normal force [N].
-    stiffness
-        Of the whole width, bending of the pin included [N/m].
+    force, stiffness
+        Normal force; stiffness of the whole width, bending of the pin included [N, N/m].
     slope
         By how much the tooth lies deeper in the pin per length along the width [rad].
     face_width
         Width b of the tooth [m].
-
-    Notes
-    -----
-    What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
-    stiffness and `deformation` mean nothing.
     """
 
     force: Float[np.ndarray, "*contacts"]
@@ -70,8 +66,6 @@ class LineContact:
 def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     """Return the contacts of all pins and discs, [sample, angle, disc, pin].
 
-    Notes
-    -----
     A tilt γ moves a tooth at height z by z·(γy, −γx) in the housing's plane; the tilt turns with the disc.
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
@@ -108,16 +102,12 @@ class ContactPattern:
 
     Parameters
     ----------
-    disc
-        Number of the disc, 1 for the first [-].
-    carrier_angle
-        θc [rad].
+    disc, carrier_angle
+        Number of the disc, 1 for the first; θc [-, rad].
     position
         Places along the width, 0 in the middle of the tooth [m].
-    force
-        Normal force of every pin [N].
-    deformation
-        Largest compression of every pin along its width, 0 without contact [m].
+    force, deformation
+        Normal force of every pin; its largest compression along the width, 0 without contact [N, m].
     line_load, pressure
         Along the width of every pin [N/m]; Hertz's peak pressure there [Pa].
     """
@@ -143,12 +133,8 @@ def contact_pattern(
 
     Parameters
     ----------
-    model
-        The reducer.
-    errors
-        Deviations of one unit in the order of the model's columns [m, angles rad].
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
+    model, errors, torque
+        The reducer; deviations of one unit and torque on the carrier, as it takes them [m, angles rad; N·m].
     disc
         Number of the disc, 1 for the first [-].
     carrier_angle

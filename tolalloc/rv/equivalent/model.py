@@ -31,6 +31,11 @@ from tolalloc.rv.reducer.design import Reducer
 class EquivalentModel:
     """Equivalent spring model of one reducer, liu2020 equations (1)–(14).
 
+    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
+
+    Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
+    rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
+
     Parameters
     ----------
     reducer
@@ -44,13 +49,6 @@ class EquivalentModel:
     ------
     InputError
         The reducer's teeth have a rotation modification, which no column of the model can stand for.
-
-    Notes
-    -----
-    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
-
-    Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
-    rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
     """
 
     reducer: Reducer
@@ -168,8 +166,6 @@ class EquivalentModel:
     ) -> tuple[Extremes, Derivatives]:
         """Return the extremes and the exact derivatives of the peak-to-peak.
 
-        Notes
-        -----
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
         is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
         """
@@ -192,8 +188,6 @@ class EquivalentModel:
 
         The torque is one for all samples or one for each.
 
-        Notes
-        -----
         They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
         """
         if carrier_angle is None:

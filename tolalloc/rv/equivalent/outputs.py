@@ -53,8 +53,6 @@ class Forces:
 def forces(equilibria: Equilibria) -> Forces:
     """Return the forces in all interfaces.
 
-    Notes
-    -----
     Stiffness times compression of every row, theory page equation (5); pins by their law, equations (30) and (31),
     elements with play by equation (28).
     """

@@ -51,8 +51,6 @@ class PinContact:
 def pin_contact(at: Positions) -> PinContact:
     """Return the contacts of all discs, theory page equations (13)–(18).
 
-    Notes
-    -----
     A tooth reaches from one root to the next. Its number follows from the contact's place on the disc, so it is tracked
     through the whole turn; at a root, where it changes, a pitch deviation has no effect.
     """
@@ -88,8 +86,6 @@ def pin_contact(at: Positions) -> PinContact:
 def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
     """Return what each column adds to the pins: entries 0, zp, 2zp … are radial, tangential and radius deviations.
 
-    Notes
-    -----
     Outward, counter-clockwise or material added is positive unless said otherwise [m]. For all pins alike:
     ``pin.diameter`` d_k, ``housing.groove.radius`` r_k (a larger groove lets the pin sink),
     ``modification.equidistant`` Δr_rp and ``modification.shift`` Δr_p. Along the ring: ``housing.runout`` radial,

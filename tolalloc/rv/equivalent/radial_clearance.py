@@ -16,8 +16,6 @@ def radial_clearance(
 ) -> Float[np.ndarray, " sample"]:
     """Return the smallest gap between all pins and teeth where the normal is radial, negative where they overlap [m].
 
-    Notes
-    -----
     Minus the compression of the pin rows at no displacement, where a pin stands in the crank direction (root) or
     opposite to it (tip). What the rows feel there is radial: both modification amounts, pin diameter and groove radius
     in full, because the pin rests on the far side of its groove, the radial place of a pin and the run-out of a tooth.

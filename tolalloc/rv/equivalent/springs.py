@@ -13,6 +13,9 @@ from jaxtyping import Float
 class SpringGroup:
     """Spring rows of one kind of interface at a batch of carrier angles.
 
+    The energy is ½Σk·δ², with δ₊ for unilateral rows and (|δ| − c)₊ for elements with play, theory page equations (5)
+    and (28): convex in every case, so the stiffness matrix is symmetric by construction.
+
     Parameters
     ----------
     name
@@ -35,11 +38,6 @@ class SpringGroup:
     clearance_columns
         Names of the deviations of each element's clearance; an element is as many successive rows as make the
         group even: one row of a mesh, two of a bearing.
-
-    Notes
-    -----
-    The energy is ½Σk·δ², with δ₊ for unilateral rows and (|δ| − c)₊ for elements with play, theory page equations (5)
-    and (28): convex in every case, so the stiffness matrix is symmetric by construction.
     """
 
     name: str

@@ -26,22 +26,14 @@ class PrototypeAnswer:
     ----------
     time
         Times of the answers [s].
-    input_speed
-        Of the sun, as prescribed [rad/s].
-    input_angle
-        Of the sun, as prescribed [rad].
-    output_speed
-        Of the carrier [rad/s].
-    output_acceleration
-        Of the carrier [rad/s²].
-    output_angle
-        Of the carrier [rad].
+    input_speed, input_angle
+        Of the sun, as prescribed [rad/s, rad].
+    output_speed, output_acceleration, output_angle
+        Of the carrier [rad/s, rad/s², rad].
     transmission_error
         Carrier angle beyond the sun's over the ratio [rad].
-    input_torque
-        On the sun, positive where it drives [N·m].
-    output_torque
-        On the carrier, as prescribed [N·m].
+    input_torque, output_torque
+        On the sun, positive where it drives; on the carrier, as prescribed [N·m].
     pin_forces
         Normal force of every pin [N].
     kinetic_energy
@@ -92,6 +84,9 @@ def _untold(share: float) -> None:
 class TimeSteps:
     """Times of a simulation.
 
+    At a spectral radius of 0.9 a start with parts that do not fit by 1 µm left strongly damped rigid bearings swinging
+    from step to step for good; at 0.5 and below it did not.
+
     Parameters
     ----------
     duration
@@ -102,11 +97,6 @@ class TimeSteps:
         Time between answers [s].
     spectral_radius
         What the generalised-α method leaves of the fastest vibrations in one step [-].
-
-    Notes
-    -----
-    At a spectral radius of 0.9 a start with parts that do not fit by 1 µm left strongly damped rigid bearings swinging
-    from step to step for good; at 0.5 and below it did not.
     """
 
     duration: float

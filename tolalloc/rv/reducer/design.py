@@ -17,10 +17,8 @@ class FirstStage:
     ----------
     sun_teeth, planet_teeth
         Numbers of teeth Z1 and Z2 [-].
-    module
-        Module m [m].
-    pressure_angle
-        Pressure angle α [rad].
+    module, pressure_angle
+        Module m and pressure angle α [m, rad].
     """
 
     sun_teeth: int
@@ -37,16 +35,12 @@ class CycloidStage:
     ----------
     pin_count, disc_teeth
         Numbers zp and zc [-]; the pair has one tooth difference.
-    pin_circle_radius
-        Radius Rp of the circle of pin centres [m].
-    pin_radius
-        Radius r_rp of a pin [m].
+    pin_circle_radius, pin_radius
+        Radius Rp of the circle of pin centres, and r_rp of a pin [m].
     eccentricity
         Crank eccentricity e [m].
-    face_width
-        Loaded width b of a disc [m].
-    disc_spacing
-        Distance between the middle planes of neighbouring discs [m].
+    face_width, disc_spacing
+        Loaded width b of a disc; distance between the middle planes of neighbouring discs [m].
     """
 
     pin_count: int

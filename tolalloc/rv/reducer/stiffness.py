@@ -24,16 +24,11 @@ class Stiffness:
 
     Parameters
     ----------
-    sun_support
-        K_s, support of the sun gear shaft [N/m].
-    gear_mesh
-        K_sp, one sun–planet mesh along its line of action [N/m].
-    crank_disc_bearing
-        K_pd, one bearing between a crank journal and a disc bore [N/m].
-    crank_carrier_bearing
-        K_b, one bearing between a crankshaft and the carrier [N/m].
-    carrier_bearing
-        K_ca, the carrier in the housing [N/m].
+    sun_support, gear_mesh
+        K_s, support of the sun gear shaft; K_sp, one sun–planet mesh along its line of action [N/m].
+    crank_disc_bearing, crank_carrier_bearing, carrier_bearing
+        K_pd, one crank journal in a disc bore; K_b, one crankshaft in the carrier; K_ca, the carrier in the housing
+        [N/m].
     pin_contact
         C, one pin against one disc tooth [N/m].
     pin_contact_law
@@ -59,10 +54,8 @@ class Material:
 
     Parameters
     ----------
-    elastic_modulus
-        Young's modulus E [Pa].
-    poisson_ratio
-        Poisson's ratio µ [-].
+    elastic_modulus, poisson_ratio
+        Young's modulus E and Poisson's ratio µ [Pa, -].
     """
 
     elastic_modulus: float
@@ -169,8 +162,6 @@ def checked_correlation(
 def line_contact(face_width: float, contact_modulus: float) -> float:
     """Return C = πbE*/2, the stiffness of a pin on a flat or convex flank [N/m].
 
-    Notes
-    -----
     liu2020 prints πbE/(4(1−µ²)), which it is for pin and disc of one material.
 
     References

@@ -28,10 +28,8 @@ class WithDerivatives:
     ----------
     evaluation
         Peak-to-peak and status of every sample.
-    by_column
-        Derivative by every varied column [arcsec/m].
-    by_modification
-        Derivative by the equidistant and the shift amount [arcsec/m].
+    by_column, by_modification
+        Derivative by every varied column; by the equidistant and the shift amount [arcsec/m].
     by_stiffness
         Derivative by the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [arcsec].
     """
@@ -48,18 +46,14 @@ class KernelResponse:
 
     Parameters
     ----------
-    model
-        The equivalent model.
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
+    model, torque
+        The equivalent model; torque on the carrier, negative resists the rotation [N·m].
     columns
         Columns that vary, in the order of X.
     fixed
         Value of every other column of the model [m].
-    observe
-        Told the statuses of each chunk.
-    mapper
-        What solves the chunks, `tolalloc.chunks.map_chunks`.
+    observe, mapper
+        Told the statuses of each chunk; what solves the chunks, `tolalloc.chunks.map_chunks`.
 
     Raises
     ------

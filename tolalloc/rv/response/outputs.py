@@ -67,8 +67,6 @@ def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"
 def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
     """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
 
-    Notes
-    -----
     Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     """
     line_load = peak_line_load(solved.equilibria, solved.forces)
