@@ -79,7 +79,7 @@ class Steps:
     Parameters
     ----------
     model, motion, inertia, damping, integrator
-        As in `tolalloc.rv.dynamics.simulation.simulate`.
+        As in `tolalloc.rv.dynamics.simulation.simulate`; numbers in SI units [-].
 
     Raises
     ------
