@@ -1,11 +1,17 @@
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
+from tolalloc.compiled import use_threads
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    use_threads(1)  # every core has a worker already
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from command import refused, tolalloc
 
+from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.mounting.drawn_parts import drawn_parts
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree

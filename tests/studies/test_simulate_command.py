@@ -9,8 +9,8 @@ from importlib.util import find_spec
 import numpy as np
 import pandas as pd
 import pytest
-from command import refused, tolalloc
 
+from tests.studies.command import process, refused, tolalloc
 from tolalloc.exceptions import TolallocError
 from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation
 
@@ -130,4 +130,4 @@ def test_a_number_or_name_out_of_range_is_refused(option, words):
 
 def test_a_missing_engine_is_said_in_one_sentence(tmp_path):
     (tmp_path / "exudyn.py").write_text("raise ImportError\n", encoding="utf-8")
-    refused(tolalloc("simulate", "--engine", "exudyn", PYTHONPATH=str(tmp_path)), "pip install tolalloc[multibody]")
+    refused(process("simulate", "--engine", "exudyn", PYTHONPATH=str(tmp_path)), "pip install tolalloc[multibody]")

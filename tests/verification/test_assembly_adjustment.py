@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from tests.random_assemblies import random_plan
+from tests.seeds import seeds
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
 from tolalloc.assembly.files import load_plan
@@ -265,7 +266,7 @@ def test_simulated_assemblies_scatter_by_the_covariance_within_sampling_error(se
     assert abs(efforts.mean() - exact.expected_effort(variances)) <= 4 * efforts.std() / np.sqrt(samples)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40))
 def test_the_norm_falls_and_is_convex_in_the_precision_for_every_set_of_parts(seed):
     plan = random_plan(seed)
     found = norms(plan, errors_of(plan, 50), np.linspace(0, 20, 41))

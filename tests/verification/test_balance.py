@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 from tests.random_reducers import Case, random_case, random_reducer, random_unit
+from tests.seeds import seeds
 from tests.verification.dense_twin import DenseModel, dense_model
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates
@@ -29,7 +30,7 @@ from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND
 
-SEEDS = range(40)
+SEEDS = seeds(40)
 
 
 class State(NamedTuple):

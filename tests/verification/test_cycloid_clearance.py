@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.random_reducers import random_cycloid_stage
+from tests.seeds import seeds
 from tests.verification.distance_search import grindable, places, random_amounts, searched, searched_between
 from tests.verification.test_cycloid_profile import path_bend
 from tolalloc.exceptions import InputError
@@ -89,7 +90,7 @@ def test_edges_at_root_and_tip_of_turned_flanks(pin_angle):
     np.testing.assert_allclose(found, searched_between(stage, amounts, pins), rtol=0, atol=NANOMETRE_MILLIONTH)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", seeds(30))
 def test_linear_formula_is_right_to_second_order(seed):
     """Away from the root, where the path of a pin bends so much that amounts of micrometres are not small."""
     generator = np.random.default_rng([35, seed])
@@ -262,7 +263,7 @@ def test_conventions_of_the_sources():
         Modification.from_convention("neither", equidistant=0.0, shift=0.0)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40))
 def test_first_contact_of_the_linear_clearance(seed):
     """At φ0 where Δr_rp·q ≥ Δr_p; else where cos κ = Δr_p/Δr_rp, which two pins reach at once.
 

@@ -9,11 +9,12 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from tests.random_reducers import random_cycloid_stage
+from tests.seeds import seeds
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.rv.reducer.design import CycloidStage, Modification
 
-SEEDS = range(40)
+SEEDS = seeds(40)
 AROUND = np.linspace(-np.pi, np.pi, 4001)
 FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])

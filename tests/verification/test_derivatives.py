@@ -9,6 +9,7 @@ import pytest
 
 from tests.random_reducers import is_angle, random_case
 from tests.random_units import random_units
+from tests.seeds import seeds
 from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.status import Status
@@ -58,7 +59,7 @@ def rotation_at_first_angle(case, errors, torque):
     return model.equilibria(errors, torque, np.zeros(1)).transmission_error[0, 0]
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", seeds(60))
 def test_rotation_derivatives_of_any_reducer_agree_with_differences(seed):
     """By every error along a random direction, by the torque and by each stiffness, with any law, play and tilt."""
     case, generator = random_case(seed), np.random.default_rng(seed)

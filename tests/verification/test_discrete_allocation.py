@@ -3,6 +3,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from tests.seeds import seeds
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program import choice_search
@@ -91,7 +92,7 @@ def keeps(case, solution):
     return np.all(over <= 1e-12 * case._scales)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40))
 def test_the_answer_is_the_best_of_all_combinations(seed):
     case = random_problem(seed, shared=seed % 3, processes=1 + seed % 2)
     costs, over, _ = all_choices(case)
@@ -261,7 +262,7 @@ def test_nodes_that_find_nothing_are_no_proof_that_there_is_nothing(monkeypatch)
         best_choice(program, 0)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", seeds(30))
 def test_the_best_is_found_although_only_the_second_best_was_known(monkeypatch, seed):
     case = random_problem(seed, features=6, processes=1, shared=seed % 2)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.random_reducers import random_case
+from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.attribution import attribute
@@ -29,7 +30,7 @@ INTERFACES = {
 }
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40))
 def test_forces_are_those_of_the_dense_twin(seed):
     case = random_case(seed)
     model = EquivalentModel(case.reducer, orders=case.orders)
