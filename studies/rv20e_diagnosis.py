@@ -19,8 +19,8 @@ from tolalloc.bench.diagnosis.result import Diagnosis
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.chunks import one_thread
 from tolalloc.cli.document_script import run_document
-from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import limited_measure
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.study.definition import Prepared, Study, prepare

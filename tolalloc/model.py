@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 if TYPE_CHECKING:
-    from tolalloc.drawing.correlated import CorrelatedSource
+    from tolalloc.drawing.correlation import CorrelatedSource
     from tolalloc.report.document import Section
 
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tolalloc.drawing.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.rv.equivalent.columns import source_name
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +23,7 @@ DOORS = {
     "plotly": ("report/",),
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
-    "openpyxl": ("report/", "allocation/answer/"),
+    "openpyxl": ("report/", "allocation/answer/", "drawing/table_file.py"),
     "numba": ("compiled.py", "rv/equivalent/solvers/lanes.py", "study/"),
     "llvmlite": ("rv/equivalent/solvers/lanes.py",),
     "ezdxf": ("rv/teeth/",),
@@ -123,3 +124,12 @@ def test_top_level_holds_only_what_it_should():
         pytest.skip("not a git checkout")
     names = {name for name in tracked.stdout.split() if not name.startswith(".")}
     assert names <= {"pyproject.toml", "tolalloc", "studies", "tests", "docs", "README.md", "LICENSE"}
+
+
+def test_the_page_for_a_first_study_explains_every_column_as_the_list_of_fields_does():
+    rows = [line.strip() for line in (ROOT / "docs" / "first-study.md").read_text(encoding="utf-8").splitlines()]
+    for name, column in COLUMNS.items():
+        needed = "yes" if ToleranceRow.model_fields[name].is_required() else ""
+        assert f"| {HEADERS[name]} | {needed} | {column.meaning} |" in rows
+    start = rows.index("| column | needed | meaning |")
+    assert rows.index("", start) - start == 2 + len(COLUMNS)

@@ -11,8 +11,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import kstest
 
-from tolalloc.drawing.correlated import CorrelatedSource
-from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.correlation import CorrelatedSource, Correlation, Pair
 from tolalloc.drawing.correlation_file import load_correlations
 from tolalloc.drawing.distributions import Distribution
 from tolalloc.drawing.error_model import ErrorModel

@@ -18,8 +18,8 @@ from tolalloc.bench.diagnosis.readings import Noise, thinned
 from tolalloc.bench.diagnosis.result import Diagnosis
 from tolalloc.bench.diagnosis.search import SearchEffort, climb
 from tolalloc.bench.measurement.records import MeasuredCurve
-from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import limited_measure
 from tolalloc.exceptions import InputError
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.study.definition import Prepared, Study, prepare

@@ -14,8 +14,7 @@ from tolalloc.drawing.distributions import Distribution, moments
 from tolalloc.drawing.measured_parts import MeasuredParts
 from tolalloc.drawing.mixtures import Batch, smoothed_magnitude
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_cells import parsed_spectrum
-from tolalloc.drawing.zones import Feature, harmonic_range_quantile
+from tolalloc.drawing.zones import Feature, harmonic_range_quantile, parsed_spectrum
 
 SAMPLES = 100_000
 ZONE = 4e-6

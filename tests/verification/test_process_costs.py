@@ -18,8 +18,7 @@ from tolalloc.allocation.cost.points_file import load_shop_points
 from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
 from tolalloc.allocation.cost.process_costs_file import load_process_costs, today
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.drawing.table_file import DATA
-from tolalloc.drawing.table_rows import read_rows
+from tolalloc.drawing.table_file import DATA, read_rows
 from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError

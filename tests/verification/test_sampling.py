@@ -12,8 +12,7 @@ from scipy.stats import kstest, qmc
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.sampling import SamplingDesign, uniform_chunk, uniform_chunks
-from tolalloc.drawing.seeds import CHUNK, SeedTree
+from tolalloc.drawing.seeds import CHUNK, SamplingDesign, SeedTree, uniform_chunk, uniform_chunks
 from tolalloc.drawing.sources import Source
 from tolalloc.drawing.zones import Feature
 from tolalloc.model import Evaluation

@@ -12,8 +12,7 @@ import pytest
 from scipy.special import ndtri
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlated import CorrelatedSource
-from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.correlation import CorrelatedSource, Correlation, Pair
 from tolalloc.drawing.distributions import Distribution
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table

@@ -10,13 +10,11 @@ from scipy.stats import norm
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_cells import parsed_spectrum
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawing.sources import Source, limited_measure
+from tolalloc.drawing.zones import Feature, parsed_spectrum
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Evaluation
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity

@@ -11,11 +11,10 @@ import pytest
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.worst_case import worst_case
 from tolalloc.differences import DifferencedResponse
-from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
+from tolalloc.drawing.sources import Source, limited_measure
 from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError

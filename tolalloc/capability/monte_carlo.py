@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.stats import beta
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.drawing.sampling import SamplingDesign, uniform_chunks
+from tolalloc.drawing.seeds import SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
 from tolalloc.model import Evaluation, Response
 

@@ -1,14 +1,15 @@
-"""Correlations between sources: same spindle, same fixture, pins of one lot."""
+"""What varies together: correlated sources of a table, and jointly normal columns that stand on no drawing."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations, zip_longest
 
 import numpy as np
 from jaxtyping import Float
-from scipy.sparse.csgraph import connected_components
+from scipy.special import ndtri
 
 from tolalloc.drawing.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -19,7 +20,7 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """Two correlated sources.
+    """Two correlated sources of a tolerance table, made on one spindle, in one fixture, or from one lot.
 
     Parameters
     ----------
@@ -108,12 +109,12 @@ class Correlation:
 
     def blocks(self, sources: Sequence[Source]) -> tuple[tuple[str, ...], ...]:
         """Return the varying sources in sets that are independent of each other, in the order of the sources."""
-        names = [source.name for source in sources if source.zone > 0.0]
-        labels = connected_components(self.source_matrix(sources) != 0.0, directed=False)[1]
-        members: dict[int, list[str]] = {}
-        for name, label in zip(names, labels, strict=True):
-            members.setdefault(int(label), []).append(name)
-        return tuple(tuple(block) for block in members.values())
+        members = {source.name: {source.name} for source in sources if source.zone > 0.0}
+        for pair in self.among(sources):
+            joined = members[pair.one] | members[pair.other]
+            members |= dict.fromkeys(joined, joined)
+        ordered = (tuple(name for name in members if name in block) for block in members.values())
+        return tuple(dict.fromkeys(ordered))
 
     def mappings(self, sources: Sequence[Source]) -> tuple[str, ...]:
         """Return a sentence for every set of sources that depend on each other: which they are, and how strongly."""
@@ -152,3 +153,39 @@ def _require_allowed(pair: Pair, known: Mapping[str, Source]) -> None:
                 f"{one} with {other}",
                 "like columns of both sources, as two diameters, two bores or two pitches of the same orders have",
             )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CorrelatedSource:
+    """Columns that no drawing limits, common to all units: jointly normal, independent of every other source.
+
+    Parameters
+    ----------
+    name
+        What a report calls it.
+    columns
+        Names of the columns that it moves.
+    covariance
+        Covariance of the columns, singular or zero if need be [column²].
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    covariance: Float[np.ndarray, "column column"]
+
+    @cached_property
+    def factor(self) -> Float[np.ndarray, "column column"]:
+        """The symmetric root of the covariance; Cholesky's does not exist where columns are fully correlated."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return correlated columns for independent uniform numbers in (0, 1)."""
+        return np.asarray(ndtri(uniform) @ self.factor.T)
+
+    @property
+    def mapping(self) -> str:
+        """Sentence that says which distribution it has."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        spread = ", ".join(f"{value:.2g} ({name})" for name, value in zip(self.columns, deviation, strict=True))
+        return f"jointly normal, σ = {spread}; the same for all units of a reducer"

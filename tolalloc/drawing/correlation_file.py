@@ -47,11 +47,10 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
 
 def _read(path: Path) -> list[Row]:
     """Return the rows with their places, the header first."""
-    frame = read_table_file(path)
-    if len(frame) < 2:
+    rows = read_table_file(path)
+    if len(rows) < 2:
         raise InputError(f"{path}: the table has no rows below its header; a list or a matrix is needed.")
-    cells = frame.to_numpy().tolist()
-    return [(f"{path}, row {number + 1}", row) for number, row in zip(frame.index, cells, strict=True)]
+    return [(f"{path}, row {number}", list(cells)) for number, cells in rows]
 
 
 def _pairs_of_list(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, ...]:

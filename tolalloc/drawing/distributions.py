@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from math import log, sqrt
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from scipy import stats
 from scipy.special import ndtr
 
 Numbers = Float[np.ndarray, "..."]
+
+NUMBER = r"\d+(?:\.\d*)?(?:e-?\d+)?"
+"""How a table writes a number inside a cell that holds several."""
 
 INSIDE_AT_CP_1 = 0.9973
 ABOVE_ZERO, BELOW_ONE = float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
@@ -48,6 +50,24 @@ class Distribution(StrEnum):
 
 SHAPES = {Distribution.LOGNORMAL: (0.02, 1.5), Distribution.WEIBULL: (0.3, 20.0)}
 """Smallest and largest shape that is believed, for the distributions that have one [-]."""
+
+
+def require_shape(distribution: Distribution, shape: float | None) -> None:
+    """Raise unless a distribution has the shape that it needs, and no other has one.
+
+    Raises
+    ------
+    ValueError
+        What is wrong, for the record that holds both.
+    """
+    if distribution not in SHAPES:
+        if shape is not None:
+            raise ValueError(f"distribution {distribution.value} has no shape; {' and '.join(SHAPES)} have one")
+        return
+    smallest, largest = SHAPES[distribution]
+    if shape is None or not smallest <= shape <= largest:
+        stated = "none" if shape is None else f"{shape:g}"
+        raise ValueError(f"distribution {distribution.value} needs a shape from {smallest:g} to {largest:g}: {stated}")
 
 
 @runtime_checkable
@@ -87,17 +107,24 @@ class Family:
     end: float | None = None
 
     @property
+    def _scipy(self) -> Any:
+        """The distribution of scipy, whose import takes longer than everything else that reads a table."""
+        from scipy import stats
+
+        return getattr(stats, self.name)
+
+    @property
     def reach(self) -> float:
         """Value at the limit of the zone at Cp = 1 [own unit]."""
-        return float(getattr(stats, self.name).ppf(INSIDE_AT_CP_1, *self.arguments)) if self.end is None else self.end
+        return float(self._scipy.ppf(INSIDE_AT_CP_1, *self.arguments)) if self.end is None else self.end
 
     def quantile(self, probability: Numbers) -> Numbers:
         """Return the values that are not exceeded with these probabilities in (0, 1) [own unit]."""
-        return np.asarray(getattr(stats, self.name).ppf(probability, *self.arguments))
+        return np.asarray(self._scipy.ppf(probability, *self.arguments))
 
     def probability(self, value: Numbers) -> Numbers:
         """Return the probabilities of not exceeding these values [-]."""
-        return np.asarray(getattr(stats, self.name).cdf(value, *self.arguments))
+        return np.asarray(self._scipy.cdf(value, *self.arguments))
 
 
 NORMAL = Family("norm", end=3.0)

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
-from tolalloc.drawing.correlated import CorrelatedSource
-from tolalloc.drawing.correlation import Correlation
+from tolalloc.drawing.correlation import CorrelatedSource, Correlation
 from tolalloc.drawing.distributions import ABOVE_ZERO, BELOW_ONE
 from tolalloc.drawing.sources import Source
 

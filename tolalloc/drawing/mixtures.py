@@ -1,8 +1,8 @@
-"""Mixed batches and measured parts as distributions, and what a tolerance table's words for distributions stand for."""
+"""Mixed batches and measured parts as distributions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
@@ -15,9 +15,7 @@ from tolalloc.drawing.distributions import (
     BELOW_ONE,
     LEVELS,
     NORMAL,
-    RAYLEIGH,
-    Distribution,
-    Family,
+    NUMBER,
     Marginal,
     Numbers,
 )
@@ -40,6 +38,31 @@ class Batch:
     weight: float
     shift: float
     spread: float
+
+
+def parsed_batches(text: str) -> tuple[Batch, ...]:
+    """Return batches such as ``0.7:-0.3:0.8 0.3:0.5:0.6``: weight, shift and spread.
+
+    Raises
+    ------
+    ValueError
+        The text does not read like that.
+    """
+    batches = []
+    for item in text.split():
+        match = re.fullmatch(rf"({NUMBER}):(-?{NUMBER}):({NUMBER})", item)
+        if match is None:
+            raise ValueError("the batches must read like '0.7:-0.3:0.8 0.3:0.5:0.6' (weight:shift:spread)")
+        batch = Batch(weight=float(match[1]), shift=float(match[2]), spread=float(match[3]))
+        if batch.weight <= 0 or abs(batch.shift) > 2 or not 0.01 <= batch.spread <= 10:
+            raise ValueError(f"the batch {item} must have a weight above 0, shift -2 to 2, spread 0.01 to 10")
+        batches.append(batch)
+    return tuple(batches)
+
+
+def batches_text(batches: tuple[Batch, ...]) -> str:
+    """Return batches as a tolerance table writes them."""
+    return " ".join(f"{batch.weight!r}:{batch.shift!r}:{batch.spread!r}" for batch in batches)
 
 
 @dataclass(frozen=True)
@@ -162,45 +185,3 @@ def smoothed_magnitude(values: Float[np.ndarray, " part"]) -> Folded:
     """
     batches = smoothed(values, smoothing_width(values)).batches
     return Folded(Mixture(NORMAL, batches + tuple(replace(batch, shift=-batch.shift) for batch in batches)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameters:
-    """What some distributions need.
-
-    Parameters
-    ----------
-    shape
-        Shape of a lognormal or Weibull distribution [-].
-    batches
-        Batches of a mixture.
-    measured
-        Measured deviations from the middle over half the zone, or radii over the largest one [-].
-    """
-
-    shape: float
-    batches: tuple[Batch, ...]
-    measured: Float[np.ndarray, " part"]
-
-
-Kinds = dict[Distribution, Callable[[Parameters], Marginal]]
-
-DEVIATIONS: Kinds = {
-    Distribution.NORMAL: lambda _: NORMAL,
-    Distribution.UNIFORM: lambda _: Family("uniform", (-1.0, 2.0), 1.0),
-    Distribution.TRIANGULAR: lambda _: Family("triang", (0.5, -1.0, 2.0), 1.0),
-    Distribution.LOGNORMAL: lambda of: Family("lognorm", (of.shape,)),
-    Distribution.WEIBULL: lambda of: Family("weibull_min", (of.shape,)),
-    Distribution.MIXTURE: lambda of: Mixture(NORMAL, of.batches),
-    Distribution.EMPIRICAL: lambda of: smoothed(of.measured, smoothing_width(of.measured)),
-}
-"""Deviation of a size, from the middle of the zone or, one-sided, from its lower limit."""
-
-MAGNITUDES: Kinds = DEVIATIONS | {
-    Distribution.NORMAL: lambda _: RAYLEIGH,
-    Distribution.UNIFORM: lambda _: Family("uniform", (0.0, 1.0), 1.0),
-    Distribution.TRIANGULAR: lambda _: Family("triang", (0.5, 0.0, 1.0), 1.0),
-    Distribution.MIXTURE: lambda of: Mixture(RAYLEIGH, of.batches),
-    Distribution.EMPIRICAL: lambda of: smoothed_magnitude(of.measured),
-}
-"""Radius of a position, or amplitude of a wave."""

@@ -8,10 +8,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from tolalloc.drawing.distributions import Distribution
-from tolalloc.drawing.table_file import DATA
-from tolalloc.drawing.table_rows import TableRow, read_rows
-from tolalloc.drawing.tolerance_cells import require_shape
+from tolalloc.drawing.distributions import Distribution, require_shape
+from tolalloc.drawing.table_file import DATA, TableRow, read_rows
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
@@ -85,8 +83,8 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
     -----
     A process may be known to a process cost table alone. Its row states Cp, so nothing has to be looked up.
     """
-    process, feature = cells.get("process"), cells.get("feature")
-    if process is None or feature is None:
+    process, feature = cells.get("process"), cells.get("feature", Feature.SIZE)
+    if process is None:
         return dict(cells)
     capability = capabilities.get((str(process), Feature(str(feature))))
     if capability is None:

@@ -1,9 +1,10 @@
-"""One seed tree: every random number of a study hangs on the study's seed and a path of names."""
+"""One seed tree: every random number hangs on the study's seed, a path of names and the index of its chunk alone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from zlib import crc32
 
 import numpy as np
@@ -11,6 +12,9 @@ from jaxtyping import Float
 
 CHUNK = 1024
 """Samples per chunk; a chunk's numbers depend on its index alone, so executors and chunk order do not matter."""
+
+_SOBOL_BITS = 32
+"""Bits of a Sobol' number, as many as scipy can skip chunks with [-]."""
 
 
 @dataclass(frozen=True)
@@ -50,3 +54,53 @@ class SeedTree:
         """Yield uniform numbers in (0, 1) chunk by chunk."""
         for index, start in enumerate(range(0, samples, CHUNK)):
             yield self.uniform_chunk(index, columns)[: samples - start]
+
+
+class SamplingDesign(StrEnum):
+    """How the samples of a study are spread."""
+
+    MONTE_CARLO = "monte carlo"
+    LATIN_HYPERCUBE = "latin hypercube"
+    SOBOL = "sobol"
+
+
+def uniform_chunks(
+    design: SamplingDesign, seeds: SeedTree, samples: int, columns: int
+) -> Iterator[Float[np.ndarray, "sample column"]]:
+    """Yield uniform numbers in (0, 1) chunk by chunk; the last chunk is cut to the number of samples [-]."""
+    for index, start in enumerate(range(0, samples, CHUNK)):
+        yield uniform_chunk(design, seeds, index, columns)[: samples - start]
+
+
+def uniform_chunk(
+    design: SamplingDesign, seeds: SeedTree, index: int, columns: int
+) -> Float[np.ndarray, "sample column"]:
+    """Return one whole chunk of uniform numbers in (0, 1), the first one at index 0 [-].
+
+    Notes
+    -----
+    Monte Carlo: independent samples, the only ones for which an exact interval of a share (Clopper–Pearson) or of a
+    quantile (order statistics) holds. Latin hypercube: each chunk is a Latin hypercube of its own, independent of the
+    others (replicated Latin hypercubes). No permutation runs over all samples, and the spread of the chunks' means
+    gives an honest standard error of the mean of the whole chunks; a last chunk that is cut is a random part of one.
+    Sobol': consecutive points of one scrambled sequence, so that chunks depend on each other; an honest standard error
+    comes from several nodes of the seed tree, each with a scrambling of its own. A power of two of samples is balanced.
+
+    References
+    ----------
+    McKay, Beckman & Conover 1979, Technometrics 21 (Latin hypercubes); Iman & Conover 1980, Commun. Stat. A9
+    (replications); Owen 1998, J. Complexity 14 (scrambled sequences), as scipy implements them.
+    """
+    if design is SamplingDesign.LATIN_HYPERCUBE:
+        generator = seeds.generator(index)
+        stratum = generator.permuted(np.tile(np.arange(CHUNK)[:, np.newaxis], columns), axis=0)
+        return np.asarray(np.maximum((stratum + generator.random(stratum.shape)) / CHUNK, np.finfo(float).tiny))
+    if design is SamplingDesign.SOBOL:
+        from scipy.stats import qmc
+
+        sequence = qmc.Sobol(columns, bits=_SOBOL_BITS, rng=seeds.generator())
+        if index:
+            sequence.fast_forward(index * CHUNK)
+        # The middle of the smallest cell: 0 would be an infinite normal deviate.
+        return np.asarray(sequence.random(CHUNK) + 0.5**_SOBOL_BITS / 2)
+    return seeds.uniform_chunk(index, columns)

@@ -1,25 +1,30 @@
-"""Users' tables as text, or one sentence on what is wrong with the file as a whole."""
+"""Users' tables: text in, checked records out, each with its place in the file; or one sentence on what is wrong."""
 
 from __future__ import annotations
 
 import csv
 import re
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+from typing import ClassVar, TypeVar, get_args
 
-import pandas as pd
-
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.files import Record, validated
 
 DATA = Path(__file__).parent / "data"
 """Shipped tables."""
 
+NumberedRow = tuple[int, tuple[str, ...]]
+"""Row as an editor counts it, from 1, and its cells."""
 
-def read_table_file(path: Path) -> pd.DataFrame:
-    """Return the cells of a CSV (UTF-8) or XLSX file as text, the header as first row, blank rows left out.
 
-    The index counts the rows as an editor does, from 0.
+def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
+    """Return the cells of a CSV (UTF-8) or XLSX file as text, the header first, blank rows left out.
+
+    Every row is filled up to the length of the first.
 
     Raises
     ------
@@ -27,24 +32,46 @@ def read_table_file(path: Path) -> pd.DataFrame:
         The file is missing, or no complete table; a row that is longer than the first is an error.
     """
     try:
-        if path.suffix.lower() in (".xlsx", ".xlsm"):
-            frame = pd.read_excel(path, header=None, dtype=str, keep_default_na=False)
-        else:
-            frame = pd.read_csv(
-                path, header=None, dtype=str, keep_default_na=False, skip_blank_lines=False, encoding="utf-8-sig"
-            )
+        rows = _sheet(path) if path.suffix.lower() in (".xlsx", ".xlsm") else _records(path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file.") from None
-    except (OSError, zipfile.BadZipFile, ValueError) as error:  # pandas' own errors are ValueErrors
+    except (OSError, zipfile.BadZipFile, KeyError, ValueError, csv.Error) as error:
         reason = " ".join(str(error).split())
         raise InputError(
             f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? ({reason})."
         ) from None
-    text = frame.fillna("").map(lambda cell: str(cell).strip())
-    kept = text[(text != "").any(axis=1)]
-    if kept.empty:
-        raise InputError(f"{path}: the table is empty; a header and rows are needed.")
-    return kept
+    kept = [(number, cells) for number, cells in enumerate(rows, start=1) if any(cells)]
+    if not kept:
+        raise InputError(f"{path}: the table is empty, or the file truncated; a header and rows are needed.")
+    width = len(kept[0][1])
+    for number, cells in kept:
+        if any(cells[width:]):
+            raise InputError(
+                f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? (row {number} has "
+                f"{len(cells)} cells under {width} headers)."
+            )
+    return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in kept)
+
+
+def _records(path: Path) -> list[tuple[str, ...]]:
+    """Return the records of a CSV file."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return [tuple(cell.strip() for cell in row) for row in csv.reader(file, strict=True)]
+
+
+def _sheet(path: Path) -> list[tuple[str, ...]]:
+    """Return the first sheet of a workbook, whole numbers without decimals."""
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True, data_only=True)
+    try:
+        sheet = book.worksheets[0]
+        sheet.reset_dimensions()  # what a program noted there need not be true
+        rows = list(sheet.iter_rows(values_only=True))
+    finally:
+        book.close()
+    whole = ((int(cell) if isinstance(cell, float) and cell.is_integer() else cell for cell in row) for row in rows)
+    return [tuple("" if cell is None else str(cell).strip() for cell in row) for row in whole]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,3 +143,105 @@ def split_header(header: str) -> tuple[str, str]:
         return header, ""
     # Both characters for µ and both dots are typed, and look alike.
     return match[1], match[2].strip().replace("\u03bc", "µ").replace("\u22c5", "·")
+
+
+class TableRow(Record):
+    """Base of the rows; the fields are the column headers without their unit."""
+
+    units: ClassVar[Mapping[str, str]] = {}
+    """Field → unit that its header may state; numbers are never converted, so every other unit is refused."""
+
+
+Row = TypeVar("Row", bound=TableRow)
+
+
+def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Row], ...]:
+    """Return the rows of a CSV file, each behind the place that messages name.
+
+    Parameters
+    ----------
+    path
+        The file; the headers are the fields of the record, with or without a unit in brackets.
+    kind
+        Record of a row.
+    named_by
+        Field that names a row for a reader.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    """
+    table = read_text_table(path)
+    stated = [split_header(header) for header in table.headers]
+    headers = tuple(name for name, _ in stated)
+    require_columns(path, headers, kind)
+    for name, unit in stated:
+        known = kind.units.get(name, unit)
+        if unit and unit != known:
+            raise InputError.at(path, f"the unit of column {name}", unit, f"{known}; numbers are not converted")
+    rows = []
+    for number, texts in zip(table.rows, table.cells, strict=True):
+        cells = dict(zip(headers, texts, strict=True))
+        place = f"{path}, row {number} ({cells[named_by] or f'no {named_by}'})"
+        rows.append((place, validated(kind, typed_cells(kind, cells, place), place)))
+    return tuple(rows)
+
+
+def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Record]) -> None:
+    """Raise unless a record knows each column, each is there once, and none that it needs is missing.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The column.
+    """
+    for name in headers:
+        if name not in kind.model_fields:
+            raise UnknownNameError.among(path, "column", name, kind.model_fields)
+        if headers.count(name) > 1:
+            raise InputError(f"{path}: the column {name!r} is there twice; each has one.")
+    required = [name for name, field in kind.model_fields.items() if field.is_required()]
+    for name in required:
+        if name not in headers:
+            raise InputError(f"{path}: the column {name!r} is missing; needed are {', '.join(required)}.")
+
+
+def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> dict[str, object]:
+    """Return the cells of a row that are not empty, text as the type that its field asks for.
+
+    Raises
+    ------
+    InputError
+        The field and value that are not allowed.
+    """
+    stated = {name: cell.strip() if isinstance(cell, str) else cell for name, cell in row.items()}
+    return {
+        name: _typed(kind.model_fields[name].annotation, name, cell, place) if isinstance(cell, str) else cell
+        for name, cell in stated.items()
+        if cell not in ("", None)
+    }
+
+
+def _typed(annotation: object, header: str, value: str, place: str) -> object:
+    """Return the text of a cell as the type of its field."""
+    if annotation is int:
+        if not value.isdecimal():
+            raise InputError.at(place, header, value, "a whole number, 1 or more")
+        return int(value)
+    if annotation is bool:
+        answers = {"yes": True, "no": False, "true": True, "false": False}
+        if value.lower() not in answers:
+            raise InputError.at(place, header, value, "yes or no")
+        return answers[value.lower()]
+    if annotation is float or float in get_args(annotation):
+        try:
+            return float(value)
+        except ValueError:
+            raise InputError.at(place, header, value, "a number with a decimal point") from None
+    if isinstance(annotation, type) and issubclass(annotation, StrEnum):
+        if value not in list(annotation):
+            more = "; a truncated one is written as its distribution with sorted = yes" if value == "truncated" else ""
+            raise InputError.at(place, header, value, "one of " + ", ".join(annotation) + more)
+        return annotation(value)
+    return value

@@ -2,58 +2,27 @@
 
 from __future__ import annotations
 
+import csv
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
-
+from tolalloc.drawing.fields import COLUMNS, HEADERS, Cell, ToleranceRow
 from tolalloc.drawing.process_capability import load_process_capabilities, with_process
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_file import DATA, read_table_file
-from tolalloc.drawing.tolerance_cells import batches_text, spectrum_text, typed_cells
-from tolalloc.drawing.tolerance_row import ToleranceRow
-from tolalloc.drawing.zones import Feature
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.drawing.table_file import DATA, read_table_file, require_columns, typed_cells
+from tolalloc.exceptions import InputError
 from tolalloc.files import shipped_or_path, validated
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SMALLEST_KEPT = 0.01
 """Smallest share that sorting may leave of all parts [-]."""
-
-DECIMALS = 5
-"""Decimals of a micrometre that a written table has: half a zone of four decimals [-]."""
-
-HEADERS = {
-    "id": "id",
-    "part": "part",
-    "feature": "feature",
-    "nominal": "nominal [mm]",
-    "plus": "plus [unit]",
-    "minus": "minus [unit]",
-    "unit": "unit",
-    "distribution": "distribution",
-    "Cp": "Cp [-]",
-    "shift": "shift [half zone]",
-    "shape": "shape [-]",
-    "batches": "batches [weight:shift:spread]",
-    "measured": "measured",
-    "measured_zone": "measured_zone [unit]",
-    "sorted": "sorted",
-    "process": "process",
-    "group": "group",
-    "locked": "locked",
-    "min": "min [unit]",
-    "max": "max [unit]",
-    "cost": "cost [cost units]",
-    "grade": "grade",
-    "spectrum": "spectrum [order:amplitude]",
-    "each": "each [-]",
-    "over": "over [mm]",
-    "note": "note",
-}
-REQUIRED = ("id", "part", "feature", "plus", "minus", "unit", "min", "max", "cost")
 
 
 def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic") -> tuple[Source, ...]:
@@ -72,40 +41,54 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    frame = _read(path)
-    if frame.empty:
+    (_, first), *others = read_table_file(path)
+    headers = tuple(header.split(" [")[0].strip() for header in first)
+    require_columns(path, headers, ToleranceRow)
+    if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
+    rows = ((number, dict(zip(headers, cells, strict=True))) for number, cells in others)
+    return sources_of_rows(rows, capabilities, str(path), path.parent)
+
+
+def sources_of_rows(
+    rows: Iterable[tuple[int, Mapping[str, object]]], capabilities: str | Path, place: str, folder: Path
+) -> tuple[Source, ...]:
+    """Return the sources of numbered rows, whose cells are text or already of the type of their field.
+
+    Parameters
+    ----------
+    rows
+        Number of each row, and field → cell.
+    capabilities
+        As in `load_tolerance_table`.
+    place
+        Where the rows stand, for messages.
+    folder
+        Where files of measured parts are looked for.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The row, field and value that are not allowed.
+    """
     processes = load_process_capabilities(capabilities)
     sources: dict[str, Source] = {}
-    for number, row in zip(frame.index + 1, frame.to_dict("records"), strict=True):
+    for number, row in rows:
         identity = str(row.get("id", "")).strip()
-        place = f"{path}, row {number} ({identity or 'no id'})"
-        cells = typed_cells(ToleranceRow, {str(key): str(value) for key, value in row.items()}, place)
-        source = validated(ToleranceRow, with_process(cells, processes, place), place).source(path.parent)
+        where = f"{place}, row {number} ({identity or 'no id'})"
+        cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
+        source = validated(ToleranceRow, cells, where).source(folder)
         if identity in sources:
-            raise InputError(f"{place}: id is {identity!r} for the second time; each source has one row.")
+            raise InputError(f"{where}: id is {identity!r} for the second time; each source has one row.")
         if source.sorted and source.zone_mapping.inside < SMALLEST_KEPT:
             left = f"no, as it would leave less than {SMALLEST_KEPT:.0%} of all parts"
-            raise InputError.at(place, "sorted", "yes", left)
+            raise InputError.at(where, "sorted", "yes", left)
         sources[identity] = source
     return tuple(sources.values())
 
 
-def _read(path: Path) -> pd.DataFrame:
-    """Return the table as text with bare headers, or say what is wrong with it as a whole."""
-    cells = read_table_file(path)
-    frame = cells.iloc[1:].set_axis([header.split(" [")[0].strip() for header in cells.iloc[0]], axis="columns")
-    for header in frame.columns:
-        if header not in HEADERS:
-            raise UnknownNameError.among(path, "column", header, HEADERS)
-    for header in REQUIRED:
-        if header not in frame.columns:
-            raise InputError(f"{path}: the column {header!r} is missing; needed are {', '.join(REQUIRED)}.")
-    return frame
-
-
-def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.DataFrame:
-    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads.
+def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
+    """Return the cells of the sources in the order of `HEADERS`.
 
     Parameters
     ----------
@@ -115,46 +98,34 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.Dat
         Folder that the table is written to, from where its files of measured parts are named; without it they are named
         in such a way that they are found from everywhere.
     """
-    rows = []
-    for source in sources:
-        zone, middle = round(source.zone / MICROMETRE, DECIMALS), source.middle / MICROMETRE
-        plus = round(middle + zone / 2, DECIMALS) if source.feature is Feature.SIZE else zone
-        rows.append(
-            {
-                "id": source.name,
-                "part": source.part,
-                "feature": source.feature.value,
-                "nominal": source.nominal / MILLIMETRE,
-                "plus": plus,
-                "minus": round(plus - zone, DECIMALS),
-                "unit": "µm",
-                "distribution": source.distribution.value,
-                "Cp": source.cp,
-                "shift": source.shift,
-                "shape": source.shape or "",
-                "batches": batches_text(source.batches),
-                "measured": _path_from(folder, source.measured.path) if source.measured else "",
-                "measured_zone": source.measured.zone / MICROMETRE if source.measured else "",
-                "sorted": "yes" if source.sorted else "no",
-                "process": source.process,
-                "group": source.group,
-                "locked": "yes" if source.locked else "no",
-                "min": round(source.minimum / MICROMETRE, DECIMALS),
-                "max": round(source.maximum / MICROMETRE, DECIMALS),
-                "cost": round(source.cost, 12),
-                "grade": source.grade,
-                "spectrum": source.written_spectrum or spectrum_text(source.spectrum),
-                "each": source.each,
-                "over": source.over / MILLIMETRE if source.over else "",
-                "note": source.note,
-            }
-        )
-    return pd.DataFrame(rows).rename(columns=HEADERS)
+    return [[_written(column.cell(source), folder) for column in COLUMNS.values()] for source in sources]
 
 
-def _path_from(folder: Path | None, path: Path) -> str:
-    """Return the path as it is written into a table of this folder, or absolute without one."""
-    return (Path(os.path.relpath(path, folder.resolve())) if folder else path).as_posix()
+def _written(cell: Cell, folder: Path | None) -> str | int | float:
+    """Return a cell as a table shows it."""
+    if isinstance(cell, Path):
+        return (Path(os.path.relpath(cell, folder.resolve())) if folder else cell).as_posix()
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if cell is None:
+        return ""
+    return str(cell) if isinstance(cell, str) else cell
+
+
+def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.DataFrame:
+    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
+    import pandas as pd
+
+    return pd.DataFrame(table_rows(sources, folder), columns=list(HEADERS.values()))
+
+
+def table_text(sources: Sequence[Source], folder: Path | None = None) -> str:
+    """Return the sources as the CSV file that `load_tolerance_table` reads."""
+    text = StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(HEADERS.values())
+    writer.writerows(table_rows(sources, folder))
+    return text.getvalue()
 
 
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:

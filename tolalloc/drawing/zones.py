@@ -7,19 +7,21 @@ divides the spread by 1.33.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
+from math import sqrt
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from tolalloc.drawing.distributions import (
     ABOVE_ZERO,
     BELOW_ONE,
     INSIDE_AT_CP_1,
+    NUMBER,
     RAYLEIGH,
     Distribution,
     Marginal,
@@ -30,6 +32,9 @@ from tolalloc.drawing.distributions import (
 
 Spectrum = tuple[tuple[int, float], ...]
 """Order of the turn and relative amplitude, one pair per harmonic."""
+
+FEWEST_TEETH, MOST_TEETH = 4, 400
+"""Teeth between which a random spectrum is believed; their spectrum has half as many orders [-]."""
 
 
 class Feature(StrEnum):
@@ -49,6 +54,53 @@ class Feature(StrEnum):
             Feature.PITCH: "total cumulative pitch deviation, highest minus lowest over a turn",
             Feature.RUNOUT: "full indicator reading over a turn",
         }[self]
+
+
+def parsed_spectrum(text: str) -> tuple[Spectrum, int]:
+    """Return a spectrum such as ``1:9.2 2:4.3 random:1.0/40`` and the number of its random teeth, or 0.
+
+    Raises
+    ------
+    ValueError
+        The text does not read like that.
+
+    Notes
+    -----
+    Independent deviations of Z teeth with standard deviation σ are white noise: both waves of every order up to
+    (Z − 1)/2 have the variance 2σ²/Z. Of order Z/2, for an even number, the teeth see one wave only, in what phase
+    depends on where the angle is counted from; both get σ²/Z. The mean of all teeth is no deviation of pitch or
+    run-out and is left out. The random part adds to a named order in quadrature.
+    """
+    amplitudes: dict[int, float] = {}
+    teeth, random = 0, 0.0
+    for item in text.split():
+        if pair := re.fullmatch(rf"(\d+):({NUMBER})", item):
+            order, amplitude = int(pair[1]), float(pair[2])
+            if order < 1 or amplitude <= 0 or order in amplitudes:
+                raise ValueError(f"the spectrum's {item} must be an order from 1 up, each once, with more than 0 of it")
+            amplitudes[order] = amplitude
+        elif (noise := re.fullmatch(rf"random:({NUMBER})/(\d+)", item)) and not teeth:
+            random, teeth = float(noise[1]), int(noise[2])
+            if random <= 0 or not FEWEST_TEETH <= teeth <= MOST_TEETH:
+                raise ValueError(
+                    f"the spectrum's {item} must have more than 0 of it on {FEWEST_TEETH} to {MOST_TEETH} teeth"
+                )
+        else:
+            raise ValueError(
+                "the spectrum must read like '1:9.2 2:4.3 4:1.0' (order:amplitude), with at most one random part like "
+                "'random:1.0/40' (standard deviation/teeth)"
+            )
+    if teeth and max(amplitudes, default=0) > teeth // 2:
+        raise ValueError(f"the spectrum's highest order must be {teeth // 2} or less, all that {teeth} teeth see")
+    for order in range(1, teeth // 2 + 1):
+        variance = random**2 * (1.0 if 2 * order == teeth else 2.0) / teeth
+        amplitudes[order] = sqrt(amplitudes.get(order, 0.0) ** 2 + variance)
+    return tuple(sorted(amplitudes.items()) if teeth else amplitudes.items()), teeth
+
+
+def spectrum_text(spectrum: Spectrum) -> str:
+    """Return a spectrum as a tolerance table writes it."""
+    return " ".join(f"{order}:{amplitude!r}" for order, amplitude in spectrum)
 
 
 @lru_cache(maxsize=64)
@@ -71,6 +123,8 @@ def harmonic_range_quantile(spectrum: Spectrum, teeth: int = 0, base: Marginal =
     """
     if len(spectrum) == 1 and not teeth:
         return 2.0 * base.reach * spectrum[0][1]
+    from scipy.stats import qmc
+
     uniform = qmc.Sobol(2 * len(spectrum), rng=np.random.default_rng(1)).random_base2(15 if teeth else 14)
     turn = _waves_over_turn(spectrum, teeth)
     columns = ndtri(uniform) if base == RAYLEIGH else _isotropic(base, uniform)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.model import Model, Observer, Response, Setting, SettingDerivatives
 from tolalloc.rv.cycloid.clearance import linear_model_warnings

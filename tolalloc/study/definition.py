@@ -17,8 +17,7 @@ from tolalloc.allocation.guarantee import AtYield, Guarantee
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
-from tolalloc.drawing.correlated import CorrelatedSource
-from tolalloc.drawing.correlation import Correlation
+from tolalloc.drawing.correlation import CorrelatedSource, Correlation
 from tolalloc.drawing.correlation_file import load_correlations
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import Source, neglected_columns

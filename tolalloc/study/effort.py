@@ -9,7 +9,7 @@ import numpy as np
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
 from tolalloc.capability import yield_at_limit
-from tolalloc.drawing.sampling import SamplingDesign
+from tolalloc.drawing.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
 from tolalloc.sensitivity import screening, target
 from tolalloc.sensitivity.sobol import SobolEffort

@@ -11,8 +11,9 @@ import pandas as pd
 from tolalloc.allocation.answer.calculator import calculator_sheets, style_calculator
 from tolalloc.allocation.answer.results import AllocationResults
 from tolalloc.allocation.cost.process_costs_file import today
+from tolalloc.drawing.fields import HEADERS
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_table import HEADERS, table_frame
+from tolalloc.drawing.tolerance_table import table_frame
 from tolalloc.report.excel import write_sheets
 from tolalloc.units import MICROMETRE
 

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from tolalloc.allocation.cost.points import Points
-from tolalloc.drawing.table_rows import TableRow, read_rows
-from tolalloc.drawing.tolerance_row import LARGEST_ZONE, UNITS
+from tolalloc.drawing.fields import LARGEST_ZONE, UNITS
+from tolalloc.drawing.table_file import TableRow, read_rows
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 

@@ -22,9 +22,9 @@ from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel
 from tolalloc.allocation.cost.points import Points
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.drawing.fields import LARGEST_ZONE
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_rows import TableRow
-from tolalloc.drawing.tolerance_row import LARGEST_ZONE
+from tolalloc.drawing.table_file import TableRow
 from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
 

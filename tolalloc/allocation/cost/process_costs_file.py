@@ -13,8 +13,7 @@ from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.cost.points_file import ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_file import DATA
-from tolalloc.drawing.table_rows import read_rows
+from tolalloc.drawing.table_file import DATA, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
 from tolalloc.units import MICROMETRE

@@ -18,8 +18,8 @@ from tolalloc.bench.diagnosis.result import IMPLAUSIBLE, TAILS, Diagnosis, Fit
 from tolalloc.bench.diagnosis.search import SearchEffort, explain
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.limited_measure import limited_measure
 from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Observer
 from tolalloc.rv.response.kernel import KernelResponse

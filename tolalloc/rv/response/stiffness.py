@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.correlated import CorrelatedSource
+from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Evaluation, Response, unobserved
 from tolalloc.rv.reducer.design import Reducer

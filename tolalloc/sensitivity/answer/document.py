@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.drawing.sampling import SamplingDesign
+from tolalloc.drawing.seeds import SamplingDesign
 from tolalloc.report.document import Document
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK
 from tolalloc.sensitivity.answer import limit_tables

@@ -9,7 +9,7 @@ from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.sampling import SamplingDesign
+from tolalloc.drawing.seeds import SamplingDesign
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.sensitivity.classical import ClassicalEstimate
 from tolalloc.sensitivity.derivatives import DerivativeMeasures, LocalDerivatives

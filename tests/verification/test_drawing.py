@@ -1,0 +1,124 @@
+"""A drawing of any model: from files beside a study or from rows in Python, written and read again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tolalloc.drawing.correlation import Correlation, Pair
+from tolalloc.drawing.drawing import Drawing, load_drawing
+from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame, table_text
+from tolalloc.drawing.zones import Feature
+from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+
+ZONE = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3}
+HUB = {"id": "hub", "nominal": 55.29, **ZONE}
+CAGE = {"id": "cage", "part": "outer race", "nominal": 101.6, **ZONE, "locked": True, "grade": "own"}
+
+
+def test_a_row_of_an_own_model_is_one_column_in_metres(generator):
+    drawing = Drawing.of_rows([HUB, CAGE])
+    hub, cage = drawing.sources
+    assert drawing.errors.columns == ("hub", "cage")
+    assert (hub.part, hub.group, hub.feature, hub.cost) == ("hub", "hub", Feature.SIZE, 3.0)
+    assert (hub.zone, hub.minimum, hub.maximum) == pytest.approx((2e-4, 2e-5, 5e-4))
+    assert hub.nominal == pytest.approx(0.05529)
+    assert (cage.part, cage.locked, cage.grade) == ("outer race", True, "own")
+    x = drawing.errors.deviations(drawing.errors.standard_values(generator.random((20_000, 2))), drawing.errors.zones)
+    # The standard error of a deviation of n normal numbers is 1/√(2n) of it; four of them.
+    np.testing.assert_allclose(x.std(axis=0), 2e-4 / 6, rtol=4 / np.sqrt(40_000))
+
+
+def test_rows_in_python_and_in_a_file_are_the_same_drawing(tmp_path):
+    drawing = Drawing.of_rows([HUB, CAGE])
+    assert drawing.to_csv(tmp_path / "own.csv") == tmp_path / "own.csv"
+    again = load_drawing("own.csv", folder=tmp_path)
+    assert again.name == "own.csv"
+    for own, other in zip(drawing.sources, again.sources, strict=True):
+        assert (other.zone, other.minimum, other.maximum) == pytest.approx((own.zone, own.minimum, own.maximum))
+        assert (other.name, other.part, other.locked, other.grade) == (own.name, own.part, own.locked, own.grade)
+    assert table_text(again.sources) == table_text(drawing.sources) == (tmp_path / "own.csv").read_text()
+    with pytest.raises(InputError, match="the file exists; name a new one"):
+        drawing.to_csv(tmp_path / "own.csv")
+
+
+@pytest.mark.parametrize("name", ["rv20e_baseline", "rv20e_all_sources"])
+def test_a_table_is_written_as_pandas_writes_it(name, tmp_path):
+    sources = [replace(own, zone=0.83 * own.zone, cost=own.cost / 3) for own in load_tolerance_table(name)]
+    table_frame(sources).to_csv(tmp_path / "frame.csv", index=False)
+    assert table_text(sources) == (tmp_path / "frame.csv").read_text(encoding="utf-8")
+
+
+def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, monkeypatch):
+    folder = tmp_path / "study"
+    folder.mkdir()
+    (folder / "own.csv").write_text("process,feature,Cp,note\nown,size,1.5,shop\n", encoding="utf-8")
+    (folder / "like.csv").write_text("sources,correlation\nhub cage,0.5\n", encoding="utf-8")
+    pd.DataFrame([{**HUB, "process": "own"}, CAGE]).to_csv(folder / "t.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    drawing = load_drawing("t.csv", "own.csv", "like.csv", "costs.csv", folder)
+    assert drawing.sources[0].cp == 1.5
+    assert drawing.correlation.source_matrix(drawing.sources)[0, 1] == 0.5
+    assert drawing.costs == folder / "costs.csv"
+    assert load_drawing("rv20e_baseline", costs="rv20e", folder=folder).costs == "rv20e"
+    assert load_drawing(folder / "t.csv", folder / "own.csv").sources == drawing.sources
+    with pytest.raises(InputError, match="no such file; shipped tolerance table files are rv20e_all_sources"):
+        load_drawing("none.csv", folder=folder)
+
+
+def test_a_drawing_carries_correlations_and_processes_written_in_python():
+    pair = Pair(one="hub", other="cage", correlation=0.3)
+    ways = {"hub": ("turned", "ground")}
+    drawing = Drawing.of_rows([HUB, CAGE], correlations=Correlation(pairs=(pair,)), costs=ways)
+    assert drawing.errors.is_correlated
+    assert drawing.costs is ways
+    assert drawing.content == (drawing.sources, drawing.correlation)
+
+
+def test_a_notebook_shows_the_table():
+    shown = Drawing.of_rows([HUB, CAGE], place="one-way clutch")._repr_html_()
+    assert "one-way clutch: 2 sources" in shown
+    assert "nominal [mm]" in shown and "55.29" in shown
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "sentence"),
+    [
+        ({"zone": 0.2}, UnknownNameError, r"drawing, row 1 \(hub\): column 'zone' is not known"),
+        ({"unit": None}, InputError, r"drawing, row 1 \(hub\): unit is missing"),
+        ({"plus": "wide"}, InputError, r"row 1 \(hub\): plus is 'wide'; allowed is a number"),
+        ({"plus": 3.0}, InputError, "the zone plus − minus is 3100 µm and must be 0 to 2000 µm"),
+        ({"feature": "weight"}, InputError, "feature is 'weight'; allowed is one of size"),
+        ({"process": "grond"}, UnknownNameError, "process for feature size 'grond' is not known"),
+        ({"id": "cage"}, InputError, r"row 2 \(cage\): id is 'cage' for the second time"),
+        ({"id": ""}, InputError, r"row 1 \(no id\): id is missing"),
+    ],
+)
+def test_rows_in_python_are_checked_like_those_of_a_file(changes, error, sentence):
+    with pytest.raises(error, match=sentence):
+        Drawing.of_rows([{**HUB, **changes}, CAGE])
+
+
+def test_a_row_without_a_field_that_is_needed_is_refused_by_name():
+    with pytest.raises(InputError, match=r"row 1 \(hub\): the column 'cost' is missing; needed are id, plus, minus"):
+        Drawing.of_rows([{name: cell for name, cell in HUB.items() if name != "cost"}])
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        ("id,plus,minus,unit,min,max,cost\n", "the table has no rows; one row per source is needed"),
+        ("id,id,plus,minus,unit,min,max,cost\na,a,1,-1,mm,1,1,1\n", "the column 'id' is there twice"),
+        ('id,plus,minus,unit,min,max,cost\na,"1,-1,mm,1,1,1\n', "is the file truncated"),
+        ("id,plus,minus,unit,min,max,cost\na,0.1,-0.1,mm,0.1,0.3,1,9\n", "row 2 has 8 cells under 7 headers"),
+        (" \n", "the table is empty"),
+    ],
+)
+def test_files_that_are_no_tolerance_tables_are_refused_in_one_sentence(tmp_path, rows, sentence):
+    (tmp_path / "t.csv").write_text(rows, encoding="utf-8")
+    with pytest.raises(TolallocError, match=sentence) as refused:
+        load_drawing(tmp_path / "t.csv")
+    assert "\n" not in str(refused.value)
