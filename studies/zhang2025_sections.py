@@ -13,9 +13,9 @@ from published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
 from tolalloc.assembly.angular.tuning import best_precision
 from tolalloc.assembly.control import regulator
-from tolalloc.assembly.mounting.drawn_parts import drawn_parts
+from tolalloc.assembly.mounting.parts import drawn_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
-from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.assembly.mounting.stock import PartStock
 from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms
@@ -291,7 +291,7 @@ def _mounted(kernel: KernelResponse, errors: Any, units: int, sets: int) -> dict
         seeds = SEEDS.child("mounting", str(units), str(number))
         parts = drawn_parts(errors, kernel.model.reducer, units, seeds.child("parts"))
         start = time.perf_counter()
-        stock = Stock(reducer=kernel.model.reducer, parts=parts, columns=errors.columns)
+        stock = PartStock(reducer=kernel.model.reducer, parts=parts, columns=errors.columns)
         found = best_mounting(stock, kernel, seeds.child("search"))
         seconds.append(time.perf_counter() - start)
         chance = random_mounting(stock, kernel, max(found.evaluations // units, 1), seeds.child("chance"))

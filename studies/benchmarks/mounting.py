@@ -28,11 +28,10 @@ import numba
 import numpy as np
 from kernel_speed import SEED, progress
 
-from tolalloc.assembly.mounting.drawn_parts import drawn_parts
-from tolalloc.assembly.mounting.evaluation import Memory
-from tolalloc.assembly.mounting.search import best_mounting, random_mounting
+from tolalloc.assembly.mounting.parts import drawn_parts
+from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting
 from tolalloc.assembly.mounting.steps import units_from
-from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.assembly.mounting.stock import PartStock
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table
@@ -57,19 +56,19 @@ def prepared() -> tuple[ErrorModel, KernelResponse]:
     return errors, kernel
 
 
-def exact_best(stock: Stock, kernel: KernelResponse) -> float:
+def exact_best(stock: PartStock, kernel: KernelResponse) -> float:
     """Return the least mean of two units: one unit, and the best one of the parts that it leaves [arcsec]."""
     units, whole = units_from(stock, range(len(stock.parts))), frozenset(range(len(stock.parts)))
     of_parts: dict[frozenset[int], float] = {}
-    values = Memory(stock=stock, response=kernel)(units)
+    values = EvaluatedUnits(stock=stock, response=kernel)(units)
     for parts, value in zip(map(frozenset, units[:, :, 0].tolist()), values.tolist(), strict=True):
         of_parts[parts] = min(value, of_parts.get(parts, np.inf))
     return min((value + of_parts[whole - parts]) / 2 for parts, value in of_parts.items())
 
 
-def random_swaps(stock: Stock, kernel: KernelResponse, evaluations: int, seeds: SeedTree) -> float:
+def random_swaps(stock: PartStock, kernel: KernelResponse, evaluations: int, seeds: SeedTree) -> float:
     """Return the least mean that climbers find which try random swaps and turns, one at a time [arcsec]."""
-    generator, memory = seeds.generator(), Memory(stock=stock, response=kernel)
+    generator, memory = seeds.generator(), EvaluatedUnits(stock=stock, response=kernel)
     now = np.array([stock.random_mountings(generator) for _ in range(CLIMBERS)])
     best = memory(now.reshape(-1, *now.shape[2:])).reshape(CLIMBERS, -1).mean(axis=1)
     while memory.evaluations < evaluations:
@@ -89,7 +88,7 @@ def mounted_set(units: int, seeds: SeedTree, errors: ErrorModel, kernel: KernelR
     """Return the figures of one set of parts."""
     parts = drawn_parts(errors, kernel.model.reducer, units, seeds.child("parts"))
     start = time.perf_counter()
-    stock = Stock(reducer=kernel.model.reducer, parts=parts, columns=errors.columns)
+    stock = PartStock(reducer=kernel.model.reducer, parts=parts, columns=errors.columns)
     found = best_mounting(stock, kernel, seeds.child("search"))
     seconds, after = time.perf_counter() - start, float(found.after.mean())
     chance = random_mounting(stock, kernel, max(found.evaluations // units, 1), seeds.child("chance"))

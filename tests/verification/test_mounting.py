@@ -9,22 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.assembly.mounting.columns import mounted, own_name, owned_columns, unmounted
-from tolalloc.assembly.mounting.drawn_parts import drawn_parts
-from tolalloc.assembly.mounting.parts import MeasuredPart
-from tolalloc.assembly.mounting.parts_file import load_parts, own_errors
+from tolalloc.assembly.mounting.parts import MeasuredPart, drawn_parts, load_parts, own_errors
 from tolalloc.assembly.mounting.places import (
+    PartTurn,
     Place,
-    Turn,
     carrier_turn,
     disc_turns,
     housing_turn,
+    mounted,
+    own_name,
+    owned_columns,
     places_of,
     sun_turn,
+    unmounted,
 )
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.steps import units_from
-from tolalloc.assembly.mounting.stock import Stock
+from tolalloc.assembly.mounting.stock import PartStock
 from tolalloc.bench.diagnosis.half_turn import half_turn
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
@@ -66,9 +67,9 @@ def random_part(columns: tuple[str, ...], at: Place, generator: np.random.Genera
     return {name: (1e-5 if "tilt" in name else 1e-6) * generator.normal() for name in names}
 
 
-def stock_of(errors: ErrorModel, reducer: Reducer, units: int, seed: int) -> Stock:
+def stock_of(errors: ErrorModel, reducer: Reducer, units: int, seed: int) -> PartStock:
     parts = drawn_parts(errors, reducer, units, SeedTree(seed))
-    return Stock(reducer=reducer, parts=parts, columns=errors.columns)
+    return PartStock(reducer=reducer, parts=parts, columns=errors.columns)
 
 
 def fits(reducer: Reducer, disc: int, bores: int) -> bool:
@@ -169,7 +170,7 @@ def test_bores_of_a_disc_at_place_2_lie_where_the_turned_disc_has_them(
         assert np.abs(found[:, 1, crank - 1] + np.stack([off.real, off.imag], axis=-1)).max() < 1e-18
 
 
-Mounted = tuple[dict[str, float], Place, Turn]
+Mounted = tuple[dict[str, float], Place, PartTurn]
 
 
 def unit_of(columns: tuple[str, ...], parts: list[Mounted]) -> np.ndarray:
@@ -193,12 +194,12 @@ def test_a_turned_housing_only_moves_the_start_of_the_turn_where_the_sun_moves_o
     rv20e: EquivalentModel, generator: np.random.Generator
 ) -> None:
     reducer, pins, angles = rv20e.reducer, 7, 240
-    parts = [(random_part(rv20e.columns, at, generator), at, Turn()) for at in places_of(reducer)]
+    parts = [(random_part(rv20e.columns, at, generator), at, PartTurn()) for at in places_of(reducer)]
     by_name = {at.name: (own, at) for own, at, _ in parts}
     teeth = pins * reducer.first_stage.planet_teeth
 
-    def unit(**turns: Turn) -> np.ndarray:
-        return unit_of(rv20e.columns, [(own, at, turns.get(name, Turn())) for name, (own, at) in by_name.items()])
+    def unit(**turns: PartTurn) -> np.ndarray:
+        return unit_of(rv20e.columns, [(own, at, turns.get(name, PartTurn())) for name, (own, at) in by_name.items()])
 
     before = curve(rv20e, unit(sun=sun_turn(reducer, teeth)), angles)
     after = curve(rv20e, unit(housing=housing_turn(reducer, pins)), angles)
@@ -219,9 +220,9 @@ def test_counting_from_another_of_three_cranks_is_no_other_mounting(generator: n
     target = {"crank1": "crank2", "crank2": "crank3", "crank3": "crank1"}
     same = unit_of(
         model.columns,
-        [(own[name], places[target.get(name, name)], turns.get(name, Turn())) for name in places],
+        [(own[name], places[target.get(name, name)], turns.get(name, PartTurn())) for name in places],
     )
-    other = unit_of(model.columns, [(own[name], at, turns.get(name, Turn())) for name, at in places.items()])
+    other = unit_of(model.columns, [(own[name], at, turns.get(name, PartTurn())) for name, at in places.items()])
     before = curve(model, first, angles)
     assert np.abs(curve(model, same, angles) - np.roll(before, -angles // 3)).max() < ROUNDING
     assert np.abs(curve(model, other, angles) - np.roll(before, -angles // 3)).max() > 0.01
@@ -248,8 +249,8 @@ def test_a_unit_turned_by_half_a_turn_is_its_parts_turned_and_exchanged(
         [
             (own["housing"], places["housing"], housing_turn(reducer, reducer.cycloid_stage.pin_count // 2)),
             (own["carrier"], places["carrier"], carrier_turn(reducer, 1)),
-            (half_turned(own["crank1"]), places["crank2"], Turn()),
-            (half_turned(own["crank2"]), places["crank1"], Turn()),
+            (half_turned(own["crank1"]), places["crank2"], PartTurn()),
+            (half_turned(own["crank2"]), places["crank1"], PartTurn()),
             (own["disc1"], places["disc2"], places["disc2"].turns[0]),
             (own["disc2"], places["disc1"], places["disc1"].turns[0]),
         ],
@@ -283,7 +284,7 @@ def test_one_unit_is_mounted_in_the_best_of_all_ways(errors: ErrorModel, kernel:
     # Two turns of the carrier, two orders of the cranks and of the discs; a sun without errors may stand anyhow.
     assert found.evaluations == sum(seen) == every.peak_to_peaks.size == 8
     assert every.every
-    assert found.after[0] == every.best < every.median < every.worst
+    assert found.after[0] == every.best < np.median(every.means) < every.worst
     assert found.before[0] in every.peak_to_peaks
     assert kernel(stock.errors(found.mountings)).values[0, 0] == found.after[0]
 
@@ -293,7 +294,7 @@ def test_the_sun_is_tried_in_all_teeth_only_if_it_has_errors(errors: ErrorModel,
     parts = drawn_parts(errors, rv20e.reducer, 1, SeedTree(0))
     for value, expected in ((0.0, 8), (1e-6, 80)):
         sun = MeasuredPart(name="sun", kind="sun", errors={"eccentricity.x": value})
-        stock = Stock(reducer=rv20e.reducer, parts=(*parts, sun), columns=columns)
+        stock = PartStock(reducer=rv20e.reducer, parts=(*parts, sun), columns=columns)
         units = stock.errors(units_from(stock, range(len(stock.parts))))
         assert len(units) == len(np.unique(units, axis=0)) == expected
 
@@ -326,7 +327,6 @@ def test_several_units_gain_more_than_by_chance_and_every_part_is_used_once(
     assert list(found.history) == sorted(set(found.history), reverse=True)
     assert found.history[-1] == found.after.mean()
     assert sorted(found.mountings[:, :, 0].ravel()) == list(range(len(stock.parts)))
-    assert {fitting.part for fitting in found.fittings} == {part.name for part in stock.parts}
     assert np.array_equal(kernel(stock.errors(found.mountings)).values[:, 0], found.after)
     chance = random_mounting(stock, kernel, found.evaluations // stock.units, SeedTree(0).child("chance"))
     assert found.after.mean() < chance.best < chance.mean < chance.worst
@@ -415,16 +415,31 @@ def test_a_wrong_parts_file_is_refused_in_one_sentence(
     assert str(tmp_path) in str(raised.value)
 
 
+def test_parts_of_three_cranks_name_the_place_that_a_disc_is_made_for(tmp_path: Path) -> None:
+    reducer = replace(load_reducer("rv20e"), name="own", crank_count=3)
+    text = HEADER + ONE_UNIT + "K 3, crank, mesh.deviation, 1, µm\n"
+    sentence = "row 5: kind is 'disc'; allowed is disc1 or disc2: made for one place of this reducer, a disc fits no"
+    with pytest.raises(InputError, match=sentence):
+        load_parts(written(tmp_path, text), reducer)
+    text = text.replace("D 1, disc", "D 1, disc1").replace("D 2, disc", "D 2, disc2")
+    assert [part.kind for part in load_parts(written(tmp_path, text), reducer)][-3:] == ["disc1", "disc2", "crank"]
+
+
+def test_the_example_file_holds_two_units() -> None:
+    parts = load_parts(Path("studies/rv20e_two_units.parts.csv"), load_reducer("rv20e"))
+    assert len(parts) == 12
+
+
 def test_parts_that_make_no_unit_are_refused(errors: ErrorModel, kernel: KernelResponse) -> None:
     reducer = kernel.model.reducer
     parts = drawn_parts(errors, reducer, 1, SeedTree(0))
     for wrong, sentence in (((), "number of parts is 0"), ((*parts, *parts), "of the name housing of unit 1 is 2")):
         with pytest.raises(InputError, match=sentence):
-            Stock(reducer=reducer, parts=wrong, columns=errors.columns)
+            PartStock(reducer=reducer, parts=wrong, columns=errors.columns)
     foreign = replace(parts[1], errors={"bore9.position.x": 1e-6})
     with pytest.raises(UnknownNameError, match=r"carrier\.bore"):
-        Stock(reducer=reducer, parts=(parts[0], foreign, *parts[2:]), columns=errors.columns)
-    stock = Stock(reducer=reducer, parts=parts, columns=errors.columns)
+        PartStock(reducer=reducer, parts=(parts[0], foreign, *parts[2:]), columns=errors.columns)
+    stock = PartStock(reducer=reducer, parts=parts, columns=errors.columns)
     with pytest.raises(InputError, match="number of starts is 0"):
         best_mounting(stock, kernel, SeedTree(0), starts=0)
     with pytest.raises(InputError, match="number of mountings is 0"):

@@ -1,4 +1,4 @@
-"""Places of a reducer, the parts that fit there, and the ways to turn them, all from its numbers of teeth.
+"""Places of a reducer, the parts that fit there, the ways to turn them, and the columns that their errors become.
 
 What is left out: turning a disc or a crank over, the tooth of the spline on which a planet sits on its crank, turning
 the rings of a bearing in their seats, and exchanging single pins.
@@ -6,14 +6,20 @@ the rings of a bearing in their seats, and exchanging single pins.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import gcd, pi
+from math import cos, gcd, pi, sin
 from typing import NamedTuple
 
 from tolalloc.rv.reducer.design import Reducer
 
+_WAVE = re.compile(r"(.*)\.(cos|sin)(\d+)")
+_MEMBER = re.compile(r"(each_(?:pin|tooth)\.\w+)\.(\d+)(.*)")
+_BORE = re.compile(r"\bbore(\d+)\b")
 
-class Shift(NamedTuple):
+
+class RingShift(NamedTuple):
     """Turn by whole members of a ring of like ones: bores, teeth or pins.
 
     Parameters
@@ -35,11 +41,11 @@ class Shift(NamedTuple):
         return (number - 1 + self.by) % self.of + 1 if number <= self.of else number
 
 
-_NONE = Shift()
+_NONE = RingShift()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turn:
+class PartTurn:
     """How a part stands turned at its place against its own frame.
 
     Parameters
@@ -56,14 +62,14 @@ class Turn:
 
     number: int = 0
     direction: float = 0.0
-    bores: Shift = _NONE
-    ring: Shift = _NONE
+    bores: RingShift = _NONE
+    ring: RingShift = _NONE
 
     @property
-    def back(self) -> Turn:
+    def back(self) -> PartTurn:
         """The turn that undoes this one."""
         bores, ring = (shift._replace(by=-shift.by) for shift in (self.bores, self.ring))
-        return Turn(number=-self.number, direction=-self.direction, bores=bores, ring=ring)
+        return PartTurn(number=-self.number, direction=-self.direction, bores=bores, ring=ring)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,28 +91,28 @@ class Place:
     name: str
     kind: str
     owned: tuple[tuple[str, str], ...]
-    turns: tuple[Turn, ...]
+    turns: tuple[PartTurn, ...]
 
 
-def housing_turn(reducer: Reducer, pins: int) -> Turn:
+def housing_turn(reducer: Reducer, pins: int) -> PartTurn:
     """Return the housing turned by so many pins, with all that stands fixed in it."""
-    shift = Shift(pins, reducer.cycloid_stage.pin_count)
-    return Turn(number=pins, direction=shift.angle, ring=shift)
+    shift = RingShift(pins, reducer.cycloid_stage.pin_count)
+    return PartTurn(number=pins, direction=shift.angle, ring=shift)
 
 
-def carrier_turn(reducer: Reducer, bores: int) -> Turn:
+def carrier_turn(reducer: Reducer, bores: int) -> PartTurn:
     """Return the carrier turned by so many crank positions."""
-    shift = Shift(bores, reducer.crank_count)
-    return Turn(number=bores, direction=shift.angle, bores=shift)
+    shift = RingShift(bores, reducer.crank_count)
+    return PartTurn(number=bores, direction=shift.angle, bores=shift)
 
 
-def sun_turn(reducer: Reducer, teeth: int) -> Turn:
+def sun_turn(reducer: Reducer, teeth: int) -> PartTurn:
     """Return the sun meshed so many teeth on."""
-    shift = Shift(teeth, reducer.first_stage.sun_teeth)
-    return Turn(number=teeth, direction=shift.angle, ring=shift)
+    shift = RingShift(teeth, reducer.first_stage.sun_teeth)
+    return PartTurn(number=teeth, direction=shift.angle, ring=shift)
 
 
-def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[Turn, ...]:
+def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[PartTurn, ...]:
     """Return the turns in which a disc made for one place fits another, places counted from 0.
 
     Notes
@@ -119,8 +125,8 @@ def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[Turn, ...]:
     for bores in range(cranks):
         moved, left = divmod(teeth * bores * discs + (disc - made_for) * cranks, cranks * discs)
         if left == 0:
-            shift = Shift(bores, cranks)
-            turns.append(Turn(number=bores, direction=shift.angle, bores=shift, ring=Shift(moved, teeth)))
+            shift = RingShift(bores, cranks)
+            turns.append(PartTurn(number=bores, direction=shift.angle, bores=shift, ring=RingShift(moved, teeth)))
     return tuple(turns)
 
 
@@ -169,7 +175,7 @@ def _crank_place(crank: int, families: int) -> Place:
         name=f"crank{number}",
         kind="crank" if families == 1 else f"crank{crank % families + 1}",
         owned=((f"planet{number}.", "planet."), (f"mesh{number}.", "mesh."), (f"crank{number}.", "")),
-        turns=(Turn(),),
+        turns=(PartTurn(),),
     )
 
 
@@ -185,3 +191,69 @@ def _disc_places(reducer: Reducer) -> tuple[Place, ...]:
         )
         for disc, first in zip(discs, made_for, strict=True)
     )
+
+
+def own_name(column: str, place: Place) -> str | None:
+    """Return the own name of the error that a column of the model stands for at a place, none if it is not there."""
+    return next((own + column[len(model) :] for model, own in place.owned if column.startswith(model)), None)
+
+
+def model_name(error: str, place: Place) -> str:
+    """Return the column of the model that an error in its own name is at a place."""
+    return next(model + error[len(own) :] for model, own in place.owned if error.startswith(own))
+
+
+def owned_columns(columns: Iterable[str], places: Iterable[Place]) -> tuple[str, ...]:
+    """Return the columns that some part at one of the places has."""
+    taken = tuple(places)
+    return tuple(name for name in columns if any(own_name(name, place) is not None for place in taken))
+
+
+def _terms(error: str, turn: PartTurn) -> tuple[tuple[str, float], ...]:
+    """Return the errors that an error becomes by a turn, and its share in each [-].
+
+    Notes
+    -----
+    A wave f(θ) becomes f(θ − turn), and its two amplitudes turn as a vector does, by its order times the angle. The
+    place of a single pin is counted radially and tangentially, so it keeps its components.
+    """
+    name = _BORE.sub(lambda bore: f"bore{turn.bores.moved(int(bore[1]))}", error)
+    if member := _MEMBER.fullmatch(name):
+        return ((f"{member[1]}.{turn.ring.moved(int(member[2]))}{member[3]}", 1.0),)
+    if wave := _WAVE.fullmatch(name):
+        angle, order = int(wave[3]) * turn.ring.angle, wave[3]
+        ahead, behind = f"{wave[1]}.cos{order}", f"{wave[1]}.sin{order}"
+    elif name.endswith((".x", ".y")):
+        angle, ahead, behind = turn.direction, f"{name[:-1]}x", f"{name[:-1]}y"
+    else:
+        return ((name, 1.0),)
+    if angle == 0.0:
+        return ((name, 1.0),)
+    return (
+        ((ahead, cos(angle)), (behind, sin(angle))) if name == ahead else ((ahead, -sin(angle)), (behind, cos(angle)))
+    )
+
+
+def turned(errors: Mapping[str, float], turn: PartTurn) -> dict[str, float]:
+    """Return the errors of a turned part, still in its own names [m, angles rad]."""
+    found: dict[str, float] = {}
+    for error, value in errors.items():
+        for name, share in _terms(error, turn):
+            found[name] = found.get(name, 0.0) + share * value
+    return found
+
+
+def mounted(errors: Mapping[str, float], place: Place, turn: PartTurn) -> dict[str, float]:
+    """Return the columns of the model that a part's own errors give [m, angles rad].
+
+    Notes
+    -----
+    Exact: the columns are linear in the errors, and a unit is the sum over its parts.
+    """
+    return {model_name(error, place): value for error, value in turned(errors, turn).items()}
+
+
+def unmounted(deviations: Mapping[str, float], place: Place, turn: PartTurn) -> dict[str, float]:
+    """Return the own errors of the part that gives these columns; those of other places are passed over."""
+    named = ((own_name(column, place), value) for column, value in deviations.items())
+    return turned({name: value for name, value in named if name is not None}, turn.back)

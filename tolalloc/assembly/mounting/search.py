@@ -8,13 +8,14 @@ of different units is exchanged. A step is taken only if it lowers the mean over
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Float
 
-from tolalloc.assembly.mounting.evaluation import Memory
-from tolalloc.assembly.mounting.results import MountingResult, RandomMountings
+from tolalloc.assembly.mounting.answer import MountingResult, RandomMountings
 from tolalloc.assembly.mounting.steps import Asking, Peaks, assigned, exchanged, turned, units_from
-from tolalloc.assembly.mounting.stock import Mountings, Stock
+from tolalloc.assembly.mounting.stock import Mountings, PartStock
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.model import Response
@@ -26,8 +27,49 @@ Found = tuple[Mountings, Peaks, tuple[float, ...]]
 """A mounting, its peak-to-peaks, and the means on the way to it [arcsec]."""
 
 
+@dataclass(kw_only=True)
+class EvaluatedUnits:
+    """Units that were evaluated, and how many failed.
+
+    Parameters
+    ----------
+    stock
+        The parts.
+    response
+        What is to be small, first output, such as `tolalloc.rv.response.kernel.KernelResponse`.
+    evaluations, failures
+        Units evaluated, and those of them without an answer [-].
+    """
+
+    stock: PartStock
+    response: Response
+    evaluations: int = 0
+    failures: int = 0
+    _known: dict[bytes, float] = field(default_factory=dict)
+
+    def __call__(self, mountings: Mountings) -> Float[np.ndarray, " unit"]:
+        """Return the first output of every unit, infinite where it failed, so that nothing chooses it [arcsec]."""
+        keys = [unit.tobytes() for unit in mountings]
+        new = {key: at for at, key in enumerate(keys) if key not in self._known}
+        if new:
+            evaluation = self.response(self.stock.errors(mountings[list(new.values())]))
+            values = np.where(evaluation.good, evaluation.values[:, 0], np.inf)
+            self._known.update(zip(new, values.tolist(), strict=True))
+            self.evaluations += len(new)
+            self.failures += int(np.count_nonzero(~evaluation.good))
+        return np.array([self._known[key] for key in keys])
+
+    def require_few_failures(self, largest_failed_share: float) -> None:
+        """Raise a `SolveError` if more than a share of the units has no answer."""
+        if self.failures > largest_failed_share * self.evaluations:
+            raise SolveError(
+                f"Mounting: {self.failures} of {self.evaluations} units have no equilibrium that can be trusted; "
+                f"allowed is a share of {largest_failed_share:g}."
+            )
+
+
 def best_mounting(
-    stock: Stock,
+    stock: PartStock,
     response: Response,
     seeds: SeedTree,
     starts: int = 4,
@@ -37,10 +79,6 @@ def best_mounting(
 
     Parameters
     ----------
-    stock
-        The parts.
-    response
-        What is to be small, `tolalloc.rv.response.kernel.KernelResponse`.
     seeds
         Node of the seed tree, for all starts but the first, which takes the parts as they come.
     starts
@@ -57,7 +95,7 @@ def best_mounting(
     """
     if starts < 1:
         raise InputError.at("mounting", "number of starts", starts, "1 or more")
-    memory = Memory(stock=stock, response=response)
+    memory = EvaluatedUnits(stock=stock, response=response)
     first = stock.as_they_come
     before = memory(first)
     if stock.units == 1:
@@ -84,22 +122,9 @@ def best_mounting(
 
 
 def random_mounting(
-    stock: Stock, response: Response, count: int, seeds: SeedTree, largest_failed_share: float = 0.01
+    stock: PartStock, response: Response, count: int, seeds: SeedTree, largest_failed_share: float = 0.01
 ) -> RandomMountings:
     """Return what random mountings of the same parts do; for one unit, all mountings, each once.
-
-    Parameters
-    ----------
-    stock
-        The parts.
-    response
-        What is to be small.
-    count
-        Number of random mountings of several units [-].
-    seeds
-        Node of the seed tree.
-    largest_failed_share
-        Largest share of units without an answer [-].
 
     Raises
     ------
@@ -115,7 +140,7 @@ def random_mounting(
         mountings = units_from(stock, range(len(stock.parts)))
     else:
         mountings = np.concatenate([stock.random_mountings(generator) for _ in range(count)])
-    memory = Memory(stock=stock, response=response)
+    memory = EvaluatedUnits(stock=stock, response=response)
     values = memory(mountings)
     memory.require_few_failures(largest_failed_share)
     return RandomMountings(
@@ -123,7 +148,7 @@ def random_mounting(
     )
 
 
-def _together(memory: Memory, searches: Sequence[Asking[Found]]) -> list[Found]:
+def _together(memory: EvaluatedUnits, searches: Sequence[Asking[Found]]) -> list[Found]:
     """Return what the searches find, each as if it were alone; many units at a time keep all cores busy."""
     found: dict[int, Found] = {}
     asked = {number: next(search) for number, search in enumerate(searches)}
@@ -139,7 +164,7 @@ def _together(memory: Memory, searches: Sequence[Asking[Found]]) -> list[Found]:
     return [found[number] for number in range(len(searches))]
 
 
-def _improved(stock: Stock, mountings: Mountings) -> Asking[Found]:
+def _improved(stock: PartStock, mountings: Mountings) -> Asking[Found]:
     """Return a mounting that no step improves."""
     peaks = yield mountings
     history = [float(peaks.mean())]

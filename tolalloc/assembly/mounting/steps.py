@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 
-from tolalloc.assembly.mounting.stock import Mountings, Stock
+from tolalloc.assembly.mounting.stock import Mountings, PartStock
 
 _Answer = TypeVar("_Answer")
 
@@ -21,16 +21,14 @@ Peaks = Float[np.ndarray, " _unit"]
 Trial = tuple[Mountings, Peaks]
 Asking = Generator[Mountings, Peaks, _Answer]
 """A search that asks for the peak-to-peaks of units, so that those of all starts are computed at once."""
-Step = Callable[[Stock, Mountings, Peaks], Asking[Trial]]
+MountingStep = Callable[[PartStock, Mountings, Peaks], Asking[Trial]]
 
 
-def units_from(stock: Stock, parts: Sequence[int], turns: Sequence[Sequence[int]] | None = None) -> Mountings:
+def units_from(stock: PartStock, parts: Sequence[int], turns: Sequence[Sequence[int]] | None = None) -> Mountings:
     """Return every unit that can be mounted from some of the parts; from those of one unit, all its mountings.
 
     Parameters
     ----------
-    stock
-        All parts.
     parts
         Numbers of the parts to choose from [-].
     turns
@@ -46,10 +44,10 @@ def units_from(stock: Stock, parts: Sequence[int], turns: Sequence[Sequence[int]
     return units.reshape(-1, len(stock.places), 2)
 
 
-def assigned(at: int) -> Step:
+def assigned(at: int) -> MountingStep:
     """Return the step that assigns the parts at one place now to the units anew, each in its best turn."""
 
-    def step(stock: Stock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
+    def step(stock: PartStock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
         units, turns = len(mountings), stock.turns[at]
         trials = np.broadcast_to(mountings[:, np.newaxis, np.newaxis], (units, units, turns, *mountings.shape[1:]))
         trials = trials.copy()
@@ -63,7 +61,7 @@ def assigned(at: int) -> Step:
     return step
 
 
-def turned(stock: Stock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
+def turned(stock: PartStock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
     """Return every unit in the best of all mountings of the parts that it has, its sun meshed as it is.
 
     Notes
@@ -76,13 +74,13 @@ def turned(stock: Stock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
     return ways[best], values[best]
 
 
-def _turns_but_the_suns(stock: Stock, unit: Int[np.ndarray, "place 2"]) -> list[Sequence[int]]:
+def _turns_but_the_suns(stock: PartStock, unit: Int[np.ndarray, "place 2"]) -> list[Sequence[int]]:
     """Return the turns to choose from at every place of a unit, at the sun's the present one alone [-]."""
     counted = zip(stock.places, stock.turns, unit[:, 1].tolist(), strict=True)
     return [[now] if place.kind == "sun" else range(count) for place, count, now in counted]
 
 
-def exchanged(stock: Stock, mountings: Mountings, peaks: Peaks) -> Asking[Trial]:
+def exchanged(stock: PartStock, mountings: Mountings, peaks: Peaks) -> Asking[Trial]:
     """Return the best exchange of two parts of one kind between two units, each then in its best turn."""
     trials, pairs = [], []
     for one, other in combinations(range(len(mountings)), 2):
@@ -101,7 +99,7 @@ def exchanged(stock: Stock, mountings: Mountings, peaks: Peaks) -> Asking[Trial]
     return found, after
 
 
-def _with(stock: Stock, unit: Int[np.ndarray, "place 2"], at: int, part: int) -> Mountings:
+def _with(stock: PartStock, unit: Int[np.ndarray, "place 2"], at: int, part: int) -> Mountings:
     """Return a unit with another part at a place, in all turns."""
     turns = stock.turns[at]
     trials = np.repeat(unit[np.newaxis], turns, axis=0)

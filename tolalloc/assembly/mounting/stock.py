@@ -2,58 +2,24 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.assembly.mounting.columns import mounted
-from tolalloc.assembly.mounting.parts import MeasuredPart
-from tolalloc.assembly.mounting.places import Place, Turn, places_of
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.assembly.mounting.parts import MeasuredPart, count_units
+from tolalloc.assembly.mounting.places import PartTurn, Place, mounted, places_of
+from tolalloc.exceptions import UnknownNameError
 from tolalloc.rv.reducer.design import Reducer
 
 Mountings = Int[np.ndarray, "_unit _place 2"]
 """For every unit and place, the number of the part that stands there and of its turn."""
 
 
-def count_units(parts: Sequence[MeasuredPart], places: Sequence[Place], origin: Path | str) -> int:
-    """Return how many units the parts make [-].
-
-    Raises
-    ------
-    UnknownNameError
-        A part of a kind that fits nowhere.
-    InputError
-        There is no part, two have one name, or they make no whole number of units.
-
-    Notes
-    -----
-    A kind of which there is no part at all counts as exact.
-    """
-    needed, there = Counter(place.kind for place in places), Counter(part.kind for part in parts)
-    for part in parts:
-        if part.kind not in needed:
-            raise UnknownNameError.among(f"{origin}, part {part.name}", "kind", part.kind, needed)
-    for name, count in Counter(part.name for part in parts).items():
-        if count > 1:
-            raise InputError.at(origin, "number of parts of the name " + name, count, "1")
-    if not parts:
-        raise InputError.at(origin, "number of parts", 0, "those of one unit or more")
-    units = {kind: there[kind] / needed[kind] for kind in there}
-    if len(set(units.values())) > 1 or any(count % needed[kind] for kind, count in there.items()):
-        counts = ", ".join(f"{there[kind]} {kind}" for kind in sorted(there))
-        each = ", ".join(f"{needed[kind]} {kind}" for kind in sorted(there))
-        raise InputError.at(origin, "number of parts", counts, f"{each} for every unit")
-    return int(next(iter(units.values())))
-
-
 @dataclass(frozen=True, kw_only=True)
-class Stock:
+class PartStock:
     """Parts that make whole units.
 
     Parameters
@@ -96,7 +62,7 @@ class Stock:
         """Return the numbers of the parts that fit a place [-]."""
         return tuple(at for at, part in enumerate(self.parts) if part.kind == place.kind)
 
-    def _rows(self, part: MeasuredPart, place: Place, turns: Sequence[Turn]) -> Float[np.ndarray, "turn column"]:
+    def _rows(self, part: MeasuredPart, place: Place, turns: Sequence[PartTurn]) -> Float[np.ndarray, "turn column"]:
         """Return what a part adds to the columns in each turn [m, angles rad]."""
         where = {name: at for at, name in enumerate(self.columns)}
         rows = np.zeros((len(turns), len(self.columns)))
