@@ -47,7 +47,14 @@ class Fault:
         if self.places(root) != 1:
             raise SystemExit(f"{self.file}: {self.old!r} stands there {self.places(root)} times instead of once.")
         path = root / self.file
-        path.write_text(path.read_text(encoding="utf-8").replace(self.old, self.new), encoding="utf-8")
+        rewrite(path, path.read_text(encoding="utf-8").replace(self.old, self.new))
+
+
+def rewrite(path: Path, text: str) -> None:
+    """Write a source file, and drop its bytecode: another text of the same length and second would not be noticed."""
+    path.write_text(text, encoding="utf-8")
+    for kept in path.parent.glob(f"__pycache__/{path.stem}.*.pyc"):
+        kept.unlink()
 
 
 def load_faults() -> tuple[Fault, ...]:
@@ -68,8 +75,7 @@ def copied_tree(folder: Path) -> Path:
 
 def first_failure(root: Path, arguments: list[str]) -> str | None:
     """Return the first test that fails in the copy, or None where all pass."""
-    # Kept bytecode could be that of the text before, which may have the same length and second.
-    environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(root)}
     command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--tb=no", "-rfE", *arguments]
     result = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
     if result.returncode in (0, NOTHING_COLLECTED):
@@ -105,10 +111,10 @@ def main() -> None:
         root = copied_tree(Path(name))
         for fault in chosen:
             began, path = time.monotonic(), root / fault.file
-            sound = path.read_bytes()
+            sound = path.read_text(encoding="utf-8")
             fault.plant(root)
             found = caught_by(root, fault, options.full, options.hinted)
-            path.write_bytes(sound)
+            rewrite(path, sound)
             caught += found is not None
             took = f"{time.monotonic() - began:6.0f} s"
             print(f"{'caught' if found else 'MISSED':<7} {took}  {fault.name:<72} {found or ''}", flush=True)

@@ -170,6 +170,7 @@ def test_every_header_of_the_tables_has_a_unit(allocated):
         assert missing == [] or path.stem == "tolerances", (path.stem, missing)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path):
     script = script_with(tmp_path)
     answers, kept = [], tmp_path / "kept.npz"

@@ -135,6 +135,7 @@ def test_every_header_states_a_unit_where_there_is_one(run_folder):
     assert all("[" in header for header in pd.read_csv(run_folder / "pareto.csv").columns)
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_bits(run_folder, tmp_path):
     result = tolalloc("run", STUDY, "--quick", "--out", tmp_path / "again")
     assert result.returncode == 0, result.stderr

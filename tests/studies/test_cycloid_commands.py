@@ -131,6 +131,7 @@ def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
     assert "exact distances were taken" in exact["warnings"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "study",
     [

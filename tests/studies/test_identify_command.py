@@ -299,6 +299,7 @@ def test_a_torque_that_loops_alone_cannot_show_is_said_without_infinities(curves
     assert "torque" in result.stdout + result.stderr
 
 
+@pytest.mark.slow
 def test_the_study_of_liu2020(tmp_path):
     """In quick mode, about a minute: printed pairs, three seeds of every method, ten repetitions."""
     folder = tmp_path / "run"

@@ -177,6 +177,7 @@ def scaled(results, workbook, position, factor):
     return design
 
 
+@pytest.mark.slow
 def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
     results, folder = drawn
     workbook = Workbook(folder / "drawing.xlsx")
@@ -190,6 +191,7 @@ def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
         assert workbook.value("zones", f"G{row}") == "yes"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.93, 1.1])
 def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
     results, folder = drawn
@@ -208,6 +210,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
         assert workbook.value("zones", f"G{2 + position}") == ("yes" if inside else "no")
 
 
+@pytest.mark.slow
 def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     results, folder = drawn
     sheets = load_workbook(folder / "drawing.xlsx")
@@ -228,6 +231,7 @@ def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     assert "yellow" in zones.cell(3 + len(results.drawn.groups), 1).value
 
 
+@pytest.mark.slow
 def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
     results, folder = drawn
     read = load_tolerance_table(folder / "allocation.csv")
@@ -249,6 +253,7 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
         assert {own.grade for own in read if own.zone} == set(results.graded.labels)
 
 
+@pytest.mark.slow
 def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
     write_drawing(priced, tmp_path)
     read = load_tolerance_table(tmp_path / "allocation.csv")
@@ -274,6 +279,7 @@ def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
                 assert float(own.total(np.array(drawn.zone))) == pytest.approx(drawn.cost - chosen.change, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_table_without_a_process_cost_table_keeps_its_own_processes(graded, tmp_path):
     kept = {"pin.diameter": "ground", "housing.pitch": "turned hard"}
     sources = tuple(replace(own, process=kept.get(own.name, "")) for own in graded.space.errors.sources)
@@ -294,6 +300,7 @@ def test_a_zone_at_its_largest_is_not_refused_for_its_last_decimal(middle, wides
     assert read.middle == pytest.approx(drawn.middle, abs=0.51e-5 * UM)
 
 
+@pytest.mark.slow
 def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
     _, folder = drawn
     script = folder / "again.py"
@@ -305,6 +312,7 @@ def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
     assert answered.exit_code == 0, answered.output
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_drawing_add_up(drawn):
     results, _ = drawn
     short, full = drawing_table(results), full_drawing_table(results)

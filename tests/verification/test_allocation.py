@@ -131,6 +131,7 @@ def test_the_error_of_an_order_statistic_is_that_of_many_samples():
     assert np.mean([side.doubt for side in sides]) == pytest.approx(true, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lean", [0.0, 0.25])
 def test_a_cpk_just_at_its_target_is_shown_in_five_percent_of_samples(lean):
     """2,000 samples of 800 units: the share has a standard error of 0.5 %; four of them, and 1 % for the expansion."""
@@ -210,6 +211,7 @@ def test_members_without_a_common_process_are_refused(prepared):
         replace(prepared.space, processes=known)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_quantile_agrees_with_common_random_numbers(prepared):
     """Mean + κσ of the same 1,152 units at zones and clearances moved by 2 %, against the exact gradient.
 
@@ -247,6 +249,7 @@ def three(prepared):
     return verifier, verifier.verify(prepared.space.uniform(0.5, prepared.reducer.modification), "three")
 
 
+@pytest.mark.slow
 def test_the_joint_yield_is_that_of_all_limits(three):
     _, found = three
     kept = (found.outputs[PEAK_TO_PEAK] <= 60) & (found.outputs[LOST_MOTION] <= 0.45)
@@ -256,6 +259,7 @@ def test_the_joint_yield_is_that_of_all_limits(three):
     assert [side.sign for side in found.sides] == [1, 1, 1, -1]
 
 
+@pytest.mark.slow
 def test_a_clearance_moves_the_radial_clearance_one_to_one(three):
     _, found = three
     upper, lower = found.sides[2:]
@@ -263,6 +267,7 @@ def test_a_clearance_moves_the_radial_clearance_one_to_one(three):
     np.testing.assert_allclose(lower.stack.slopes, [0.0, -1.0], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_requirement_more_changes_no_number_of_the_peak_to_peak(three, prepared):
     verifier, found = three
     alone = replace(verifier, requirements=verifier.requirements[:1]).verify(found.design, "three")
@@ -270,6 +275,7 @@ def test_a_requirement_more_changes_no_number_of_the_peak_to_peak(three, prepare
     assert alone.sides[0].value == found.sides[0].value
 
 
+@pytest.mark.slow
 def test_a_step_keeps_every_local_model_and_the_region(three):
     verifier, found = three
     stacks = aimed(found, [found])
@@ -280,6 +286,7 @@ def test_a_step_keeps_every_local_model_and_the_region(three):
     assert step[-1] > found.design[-1]  # 8 µm are too few for a radial clearance above 2 µm
 
 
+@pytest.mark.slow
 def test_processes_change_only_where_that_clearly_pays(three, prepared):
     _, found = three
     stacks = aimed(found, [found])
@@ -292,6 +299,7 @@ def test_processes_change_only_where_that_clearly_pays(three, prepared):
         assert programs.of(chosen).solve(stacks).cost <= kept.cost
 
 
+@pytest.mark.slow
 def test_locked_clearances_stay(three, prepared):
     _, found = three
     flank, radial = (found.design[-2:] * 1e-6).tolist()
