@@ -161,10 +161,8 @@ class CorrelatedSource:
 
     Parameters
     ----------
-    name
-        What a report calls it.
-    columns
-        Names of the columns that it moves.
+    name, columns
+        What a report calls it, and the columns that it moves.
     covariance
         Covariance of the columns, singular or zero if need be [column²].
     """

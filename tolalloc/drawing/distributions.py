@@ -139,10 +139,8 @@ class Placed:
 
     Parameters
     ----------
-    base
-        What is moved and scaled.
-    offset, scale
-        Where its 0 comes to lie, and the length of its unit [half zone].
+    base, offset, scale
+        What is moved and scaled, where its 0 comes to lie, and the length of its unit [half zone].
     """
 
     base: Marginal
@@ -169,10 +167,8 @@ class Sorted:
 
     Parameters
     ----------
-    base
-        Distribution before sorting.
-    low, high
-        The limits [unit of the base].
+    base, low, high
+        Distribution before sorting, and the limits [unit of the base].
     """
 
     base: Marginal

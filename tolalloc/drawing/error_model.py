@@ -141,14 +141,7 @@ class ErrorModel:
     def mixed(
         self, uniform: Float[np.ndarray, "*sample column"], factor: Float[np.ndarray, "*#sample source source"]
     ) -> Float[np.ndarray, "*sample column"]:
-        """Return independent uniform numbers in (0, 1) made dependent by roots of the correlation.
-
-        Parameters
-        ----------
-        uniform
-            Independent uniform numbers [-].
-        factor
-            For every sample or for all, F with F·Fᵀ the `source_correlation` [-].
+        """Return independent uniform numbers in (0, 1) made dependent by F, with F·Fᵀ the `source_correlation` [-].
 
         Notes
         -----

@@ -38,14 +38,12 @@ class Column:
 
     Parameters
     ----------
-    meaning
-        What stands there, as ``docs/first-study.md`` explains it.
-    unit
-        Stands in the header behind the name, if there is one.
+    meaning, unit
+        What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name.
     attribute
         Field of the source that is this cell; empty where several cells make it together.
     scale
-        What a number of the cell is multiplied by for the source, if by anything.
+        What a number of the cell is multiplied by for the source, if by anything [SI unit per unit].
     write
         Returns the cell of a source, where it is not its attribute.
     """

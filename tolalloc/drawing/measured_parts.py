@@ -176,17 +176,10 @@ def _fitted(
 
 
 def load_measured_parts(path: Path, feature: Feature, zone: float, middle: float) -> MeasuredParts:
-    """Return the parts of a CSV file.
+    """Return the parts of a CSV file, which were made to a zone of this width and middle [m].
 
-    Parameters
-    ----------
-    path
-        File with a column ``deviation [µm]`` for a size, and ``x [µm]`` and ``y [µm]`` or ``radius [µm]`` for a
-        position; all from the nominal place.
-    feature
-        Size or position.
-    zone, middle
-        Width and middle of the zone that the parts were made to [m].
+    It has a column ``deviation [µm]`` for a size, and ``x [µm]`` and ``y [µm]`` or ``radius [µm]`` for a position; all
+    from the nominal place.
 
     Raises
     ------

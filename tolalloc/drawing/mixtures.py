@@ -69,17 +69,11 @@ def batches_text(batches: tuple[Batch, ...]) -> str:
 class Mixture:
     """Parts from several batches, each with a mean and a spread of its own, of one common distribution.
 
-    Parameters
-    ----------
-    base
-        Distribution of every batch: normal for sizes, Rayleigh for the radius of a position.
-    batches
-        The batches.
-
     Notes
     -----
-    The quantile has no closed form: it is interpolated between the probabilities of fixed values. The values are the
-    quantiles of the batches, so that a narrow batch is resolved as well as a wide one, and a grid over all of them.
+    The base is normal for sizes, Rayleigh for the radius of a position. The quantile has no closed form: it is
+    interpolated between the probabilities of fixed values. The values are the quantiles of the batches, so that a
+    narrow batch is resolved as well as a wide one, and a grid over all of them.
     """
 
     base: Marginal
@@ -114,13 +108,7 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Folded:
-    """Magnitude of a number that is distributed symmetrically around 0.
-
-    Parameters
-    ----------
-    symmetric
-        The number's distribution.
-    """
+    """Magnitude of a number that is distributed symmetrically around 0."""
 
     symmetric: Marginal
 
@@ -140,14 +128,7 @@ class Folded:
 
 
 def smoothed(values: Float[np.ndarray, " part"], width: float) -> Mixture:
-    """Return the distribution of measured values, each widened to a small normal one.
-
-    Parameters
-    ----------
-    values
-        One per part [half zone].
-    width
-        σ that each value gets, before all are drawn together again [half zone].
+    """Return the distribution of measured values, each widened to a normal one of this σ [half zone].
 
     Notes
     -----

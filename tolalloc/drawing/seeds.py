@@ -23,10 +23,8 @@ class SeedTree:
 
     Parameters
     ----------
-    seed
-        Seed of the study; 0 is a seed like every other [-].
-    path
-        Names from the root to this node.
+    seed, path
+        Seed of the study, where 0 is a seed like every other [-]; names from the root to this node.
     """
 
     seed: int

@@ -80,14 +80,10 @@ class TextTable:
 
     Parameters
     ----------
-    path
-        Where it was read.
-    headers
-        First line that is not a comment.
-    rows
-        Line of each row as counted in the file [-].
-    cells
-        Cells row by row, as many as there are headers.
+    path, headers
+        Where it was read, and the first line that is not a comment.
+    rows, cells
+        Line of each row as counted in the file [-], and its cells, as many as there are headers.
     """
 
     path: Path
@@ -156,16 +152,9 @@ Row = TypeVar("Row", bound=TableRow)
 
 
 def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Row], ...]:
-    """Return the rows of a CSV file, each behind the place that messages name.
+    """Return the rows of a CSV file, each behind the place that messages name: file, row, and the field `named_by`.
 
-    Parameters
-    ----------
-    path
-        The file; the headers are the fields of the record, with or without a unit in brackets.
-    kind
-        Record of a row.
-    named_by
-        Field that names a row for a reader.
+    The headers are the fields of the record, with or without a unit in brackets.
 
     Raises
     ------

@@ -26,14 +26,7 @@ SMALLEST_KEPT = 0.01
 
 
 def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic") -> tuple[Source, ...]:
-    """Return the sources of a tolerance table by shipped name or from the user's CSV or XLSX file.
-
-    Parameters
-    ----------
-    name
-        Shipped name, or path of the table.
-    capabilities
-        Shipped name, or path of the process capability library that the table's processes are looked up in.
+    """Return the sources of a tolerance table and its processes, each by shipped name or from the user's file.
 
     Raises
     ------
@@ -55,16 +48,7 @@ def sources_of_rows(
 ) -> tuple[Source, ...]:
     """Return the sources of numbered rows, whose cells are text or already of the type of their field.
 
-    Parameters
-    ----------
-    rows
-        Number of each row, and field → cell.
-    capabilities
-        As in `load_tolerance_table`.
-    place
-        Where the rows stand, for messages.
-    folder
-        Where files of measured parts are looked for.
+    The place is what messages name; files of measured parts are looked for in the folder.
 
     Raises
     ------
@@ -90,13 +74,8 @@ def sources_of_rows(
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
     """Return the cells of the sources in the order of `HEADERS`.
 
-    Parameters
-    ----------
-    sources
-        The rows.
-    folder
-        Folder that the table is written to, from where its files of measured parts are named; without it they are named
-        in such a way that they are found from everywhere.
+    Files of measured parts are named from the folder that the table is written to; without one in such a way that they
+    are found from everywhere.
     """
     return [[_written(column.cell(source), folder) for column in COLUMNS.values()] for source in sources]
 
@@ -153,17 +132,7 @@ def require_small_zones(sources: Sequence[Source], largest: float, place: str | 
 def with_zones(
     sources: Sequence[Source], zones: Sequence[float], costs: Mapping[str, float] | None = None
 ) -> tuple[Source, ...]:
-    """Return the sources at other zones [m], each at its cost.
-
-    Parameters
-    ----------
-    sources
-        The rows of the tolerance table.
-    zones
-        Their zones, in the same order [m].
-    costs
-        Source → what its zone costs; without one it falls as 1/zone [cost units].
-    """
+    """Return the sources at other zones [m], each at the cost given for its name or else as 1/zone [cost units]."""
     known = costs or {}
     return tuple(
         source

@@ -107,19 +107,12 @@ def spectrum_text(spectrum: Spectrum) -> str:
 def harmonic_range_quantile(spectrum: Spectrum, teeth: int = 0, base: Marginal = RAYLEIGH) -> float:
     """Return the 99.73 % quantile of the range over a turn of random harmonics of this spectrum.
 
-    Parameters
-    ----------
-    spectrum
-        Order → relative amplitude; an order's wave is this times a random amplitude, at any phase [-].
-    teeth
-        Number of teeth on which the range is taken; 0: over the whole turn [-].
-    base
-        Distribution of the random amplitude of every order.
-
     Notes
     -----
-    One order has a closed form; several are integrated over a fixed Sobol sequence, of 2¹⁴ points or, where the range
-    is taken over few teeth, 2¹⁵. Its standard error is below a hundredth of the quantile.
+    An order's wave is its relative amplitude times a random one of the base, at any phase; the range is taken over the
+    whole turn, or at the teeth if there are any. One order has a closed form; several are integrated over a fixed
+    Sobol sequence, of 2¹⁴ points or, where the range is taken over few teeth, 2¹⁵. Its standard error is below a
+    hundredth of the quantile.
     """
     if len(spectrum) == 1 and not teeth:
         return 2.0 * base.reach * spectrum[0][1]
@@ -250,13 +243,7 @@ class ZoneMapping:
         return _isotropic(self.marginal, uniform) * np.repeat(self.amplitudes / (self.extent * self.cp), 2)
 
     def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases.
-
-        Parameters
-        ----------
-        uniform
-            Independent uniform numbers, as many as the source has columns [-].
-        """
+        """Return deviations per unit of zone whose limited measure is exactly the zone, at random phases."""
         if self.feature is Feature.SIZE:
             return np.where(uniform < 0.5, -0.5, 0.5)
         if self.feature is Feature.POSITION:
