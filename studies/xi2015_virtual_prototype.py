@@ -18,11 +18,9 @@ from tolalloc.rv.multibody.engine import engine
 from tolalloc.rv.multibody.prototype import with_rigid_bearings
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer.figures import error_figure, run_figures
-from tolalloc.rv.simulation.answer.results import SimulationResults
-from tolalloc.rv.simulation.answer.sentences import warnings
-from tolalloc.rv.simulation.answer.tables import range_text, rest_row, steady_row
+from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
 from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation, with_ideal_gears
+from tolalloc.rv.simulation.figures import error_figure, run_figures
 from tolalloc.rv.simulation.run import simulate
 from tolalloc.units import ARCSECOND, RPM
 
@@ -31,9 +29,9 @@ IMPLIED = 3.67e7
 STEEL, RIGID_STEEL = "steel line contact, 12 mm", "the same, rigid joints"
 SOFT = f"{IMPLIED:.3g} N/m at every pin, rigid joints"
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"
-LOAD, SPEED = 572.0, 525.0
-OTHERS = ((LOAD, SPEED / 2), (LOAD / 2, SPEED), (LOAD / 4, SPEED))
-"""Loads and input speeds at which the prototype is asked again [N·m, rpm]."""
+TORQUE, SPEED = -572.0, 525.0
+OTHERS = ((TORQUE, SPEED / 2), (TORQUE / 2, SPEED), (TORQUE / 4, SPEED))
+"""Torques on the carrier and input speeds at which the prototype is asked again [N·m, rpm]."""
 
 
 def readings() -> dict[str, Reducer]:
@@ -49,10 +47,10 @@ def readings() -> dict[str, Reducer]:
     }
 
 
-def run(reducer: Reducer, name: str, quick: bool, load: float = LOAD, speed: float = SPEED) -> SimulationResults:
+def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> SimulationAnswer:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
-    asked = SimulationStudy(reducer="rv40e", engine=name, torque_nm=load, speed_rpm=speed, **times)
+    asked = SimulationStudy(reducer="rv40e", engine=name, torque_nm=torque, speed_rpm=speed, **times)
     with UnitProgress("ms") as progress:
         return simulate(replace(prepare_simulation(asked), reducer=reducer), progress)
 
@@ -66,11 +64,11 @@ def missing() -> str:
     return ""
 
 
-def difference_section(results: list[SimulationResults]) -> Section:
+def difference_section(results: list[SimulationAnswer]) -> Section:
     """Return how the prototype departs from the static model under other loads and speeds."""
     table = pd.DataFrame(
         {
-            "load [N·m]": [each.load for each in results],
+            "torque on the carrier [N·m]": [each.torque for each in results],
             "input speed [rpm]": [each.speed / RPM for each in results],
             "static transmission error, mean [arcsec]": [
                 float(each.at_rest.transmission_error.mean() / ARCSECOND) for each in results
@@ -90,7 +88,7 @@ def difference_section(results: list[SimulationResults]) -> Section:
     )
 
 
-def answer(found: dict[str, dict[str, SimulationResults]], lacking: str) -> tuple[str, ...]:
+def answer(found: dict[str, dict[str, SimulationAnswer]], lacking: str) -> tuple[str, ...]:
     """Return what the engines agree on and what they do not."""
     models = {name: by_engine[MODEL] for name, by_engine in found.items()}
     first = models[STEEL]
@@ -127,7 +125,7 @@ def build(quick: bool) -> Document:
     rows = [
         {"pin contact": name, **row}
         for name, by_engine in found.items()
-        for row in (rest_row(by_engine[MODEL]), *(steady_row(each) for each in by_engine.values()))
+        for row in (by_engine[MODEL].rest_row, *(each.steady_row for each in by_engine.values()))
     ]
     table, shown = pd.DataFrame(rows), MODEL if lacking else PROTOTYPE
     differences: tuple[Section, ...] = ()
@@ -138,11 +136,11 @@ def build(quick: bool) -> Document:
         f"{name}, {each.engine}: {text}"
         for name, by_engine in found.items()
         for each in by_engine.values()
-        for text in warnings(each)
+        for text in each.warnings
     )
     return Document(
         title="RV-40E of xi2015 in motion: static model, model with masses, virtual prototype",
-        subtitle=f"525 rpm at the input, {LOAD:g} N·m against the rotation, no errors"
+        subtitle=f"525 rpm at the input, {TORQUE:g} N·m on the carrier, no errors"
         + (", a run of 0.8 s instead of 2 s." if quick else "."),
         answer=answer(found, lacking),
         warnings=tuple(cautions),

@@ -27,7 +27,7 @@ from tolalloc.cli.console import UnitProgress
 from tolalloc.compiled import use_threads
 from tolalloc.rv.dynamics.properties import Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
-from tolalloc.rv.simulation.answer.results import SimulationResults
+from tolalloc.rv.simulation.answer import SimulationAnswer
 from tolalloc.rv.simulation.definition import (
     INTEGRATORS,
     PreparedSimulation,
@@ -52,13 +52,13 @@ def prepared(engine: str, step: float) -> PreparedSimulation:
     return replace(asked, reducer=with_ideal_gears(asked.reducer))
 
 
-def run(engine: str, step: float) -> SimulationResults:
+def run(engine: str, step: float) -> SimulationAnswer:
     """Return what an engine says at a time step."""
     with UnitProgress("ms") as shown:
         return simulate(prepared(engine, step), shown)
 
 
-def last_turn(results: SimulationResults) -> tuple[np.ndarray, np.ndarray]:
+def last_turn(results: SimulationAnswer) -> tuple[np.ndarray, np.ndarray]:
     """Return times and transmission error of the last part [s, arcsec]."""
     time = results.series.time
     last = time > 0.3

@@ -21,7 +21,7 @@ INSTALLED = pytest.mark.skipif(find_spec("exudyn") is None, reason="the optional
 
 def test_a_run_is_reported_with_its_series(tmp_path):
     folder = tmp_path / "report"
-    said = tolalloc("simulate", *SHORT, "--torque", "572", "--out", folder)
+    said = tolalloc("simulate", "--reducer", "rv40e", *SHORT, "--torque", "-572", "--out", folder)
     assert said.returncode == 0, said.stderr
     words = " ".join(said.stdout.split())
     assert "ratio of 81.0000" in words
@@ -54,15 +54,15 @@ def test_a_run_is_reported_with_its_series(tmp_path):
 
 def test_the_compliance_decides_how_many_pins_carry():
     options = ("--pin-stiffness", "3.67e7", "--json")
-    answer = json.loads(tolalloc("simulate", *SHORT, *options).stdout)
+    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e", *SHORT, *options).stdout)
     assert answer["at rest"]["pins in contact, disc 1 [-]"] == "16…17"
-    assert answer["load on the carrier [N·m]"] == 572
+    assert answer["torque on the carrier [N·m]"] == -572
     assert answer["lowest natural frequency [Hz]"] > 0
 
 
 @INSTALLED
 def test_the_prototype_turns_with_the_same_ratio():
-    answer = json.loads(tolalloc("simulate", *SHORT, "--engine", "exudyn", "--json").stdout)
+    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e", *SHORT, "--engine", "exudyn", "--json").stdout)
     assert answer["in motion"]["ratio [-]"] == pytest.approx(81, rel=1e-5)
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
         answer["at rest"]["mean transmission error [arcsec]"], abs=1.5
@@ -87,7 +87,7 @@ neglected = ["*"]
 def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     path = tmp_path / "bored.toml"
     path.write_text(UNIT, encoding="utf-8")
-    run = ("simulate", *SHORT, "--unit", path, "--engine", "exudyn", "--json")
+    run = ("simulate", "--reducer", "rv40e", *SHORT, "--unit", path, "--engine", "exudyn", "--json")
     answer = json.loads(tolalloc(*run).stdout)
     assert answer["at rest"]["mean transmission error [arcsec]"] < -40  # the wider gap
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
@@ -101,11 +101,14 @@ def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     [
         (("--engine", "newmrk"), ("engine 'newmrk' is not known", "newmark")),
         (("--duration", "1.6"), ("--duration is 1.6; allowed is 1.737 s or more",)),
-        (("--torque", "0"), ("--torque is 0.0; allowed is above 0 to 5720 N·m",)),
+        (("--torque", "0"), ("--torque is 0.0; allowed is -5720 N·m to below 0",)),
+        (("--torque", "572"), ("--torque is 572.0", "a load that drives it is not simulated")),
+        (("--out", "report"), ("--reducer is missing", "rv20e, rv40e, rv80e")),
     ],
 )
 def test_a_wrong_option_is_refused(options, words):
-    refused(tolalloc("simulate", *options), *words)
+    named = () if "--out" in options else ("--reducer", "rv40e")
+    refused(tolalloc("simulate", *named, *options), *words)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +119,7 @@ def test_a_wrong_option_is_refused(options, words):
         ({"step": 3.0}, "--step is 3.0; allowed is 1e-05 s to the duration of 2 s"),
         ({"step": 0.45}, "--step is 0.45; allowed is up to 0.00148 s, 4 steps per pin pass"),
         ({"step": 1e-7}, "--step is 1e-07"),
-        ({"torque_nm": 6000.0}, "--torque is 6000.0"),
+        ({"torque_nm": -6000.0}, "--torque is -6000.0"),
         ({"damping": -1.0}, "--damping is -1.0; allowed is 0 or a positive number"),
         ({"pin_stiffness": float("nan")}, "--pin-stiffness is nan"),
         ({"reducer": "rv41e"}, "'rv41e' is not known"),

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tolalloc.report.answer import Header
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer.document import simulation_document
-from tolalloc.rv.simulation.answer.figures import error_figure, line
-from tolalloc.rv.simulation.answer.results import AtRest, SimulationResults, TimeSeries
-from tolalloc.rv.simulation.answer.sentences import answer, warnings
-from tolalloc.rv.simulation.answer.tables import range_text, series_table, steady_table
+from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
+from tolalloc.rv.simulation.figures import error_figure, line
+from tolalloc.rv.simulation.series import AtRest, TimeSeries
 from tolalloc.units import ARCSECOND, RPM
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
@@ -20,7 +19,7 @@ TIMES = 5001
 PASS = 525 / 60 / RATIO * 39 * 40
 
 
-def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: float = 0.0) -> SimulationResults:
+def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: float = 0.0) -> SimulationAnswer:
     """Steady throughout; the transmission error is a pin pass of 0.2″ with a little added by motion."""
     time = STEP * np.arange(TIMES)
     wave, ones = 0.1 * np.sin(2 * np.pi * PASS * time) * ARCSECOND, np.ones(TIMES)
@@ -42,19 +41,18 @@ def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: f
         output_torque=-LOAD * ones,
         pin_forces=pins,
     )
-    return SimulationResults(
+    return SimulationAnswer(
+        header=Header(name="exact", model="RV-40E", assumptions=("steel",)),
         reducer=load_reducer("rv40e"),
         engine="newmark",
-        unit="exact",
         speed=SPEED,
-        load=LOAD,
+        torque=-LOAD,
         series=series,
         steady=slice(2501, TIMES),
         crank_turns=1,
         at_rest=AtRest(steps=np.arange(2501, TIMES), transmission_error=wave[2501:], pin_forces=at_rest, seconds=0.1),
         natural_frequency=4500.0,
         seconds=1.0,
-        assumptions=("steel",),
     )
 
 
@@ -72,7 +70,7 @@ def test_numbers_of_the_steady_part():
 
 
 def test_the_answer_says_what_is_found_and_why():
-    said = " ".join(answer(results(lost=0.02, added=0.05, spike=25.0)))
+    said = " ".join(results(lost=0.02, added=0.05, spike=25.0).sentences)
     for words in (
         "6.4815 rpm, a ratio of 81.0000",
         "98.000 % leave",
@@ -85,44 +83,45 @@ def test_the_answer_says_what_is_found_and_why():
     ):
         assert words in said
     for frequency, what in ((200.0, "near 1 times the pin pass"), (8.0, "near order 78 and order 80")):
-        assert what in " ".join(answer(replace(results(), natural_frequency=frequency)))
-    assert "of constant stiffness" in " ".join(answer(replace(results(), natural_frequency=None)))
-    assert "not motion alone" in " ".join(answer(replace(results(), engine="exudyn")))
+        assert what in " ".join(replace(results(), natural_frequency=frequency).sentences)
+    assert "of constant stiffness" in " ".join(replace(results(), natural_frequency=None).sentences)
+    assert "not motion alone" in " ".join(replace(results(), engine="exudyn").sentences)
 
 
 def test_vibrations_of_the_step_are_not_taken_for_the_reducers():
-    assert warnings(results()) == ()
-    assert "Do not use the transmission error" in warnings(results(wobble=0.02))[0]
+    assert results().warnings == ()
+    assert "Do not use the transmission error" in results(wobble=0.02).warnings[0]
     calm = results()
     turning = replace(calm.series, output_acceleration=(-1.0) ** np.arange(TIMES))
-    assert "Do not use the output acceleration" in warnings(replace(calm, series=turning))[0]
+    assert "Do not use the output acceleration" in replace(calm, series=turning).warnings[0]
 
 
 @pytest.mark.parametrize("lost", [0.01, -0.01])
 def test_power_that_does_not_close_is_said(lost):
-    assert "are not steady" in warnings(results(lost=lost))[0]
+    assert "are not steady" in results(lost=lost).warnings[0]
 
 
 def test_a_deviation_that_decays_is_said():
     calm = results()
     decaying = 5 * ARCSECOND * np.exp(-np.arange(TIMES) / 1000) * np.cos(0.02 * np.arange(TIMES))
     series = replace(calm.series, transmission_error=calm.series.transmission_error + decaying)
-    assert any("are not steady" in warning for warning in warnings(replace(calm, series=series)))
+    assert any("are not steady" in warning for warning in replace(calm, series=series).warnings)
 
 
 def test_a_short_stretch_is_said_for_a_unit_with_errors():
-    found = warnings(replace(results(), unit="table4"))
+    calm = results()
+    found = replace(calm, header=replace(calm.header, name="table4")).warnings
     assert len(found) == 1
     assert "9.3 s" in found[0]
 
 
 def test_tables_have_every_step_and_both_sides():
     found = results()
-    series = series_table(found)
+    series = found.series_table
     assert len(series) == TIMES
     assert all("[" in name for name in series)
     assert series["transmission error [arcsec]"].abs().max() == pytest.approx(0.1, rel=1e-3)
-    steady = steady_table(found).set_index("quantity")
+    steady = found.steady_table.set_index("quantity")
     assert steady.loc["largest pin force [N]"].tolist() == [1000.0, 1000.0]
     assert steady.loc["ratio [-]", "at rest"] == ""
     assert (range_text(4, 4), range_text(4, 5)) == ("4", "4…5")
@@ -145,8 +144,8 @@ def test_figures_show_as_many_pin_passes_as_asked():
 
 
 def test_the_document_names_its_load_and_engine():
-    document = simulation_document(results())
+    document = results().document
     assert "525 rpm" in document.subtitle
-    assert "572 N·m" in document.subtitle
+    assert "-572 N·m" in document.subtitle
     assert document.summary["in motion"]["engine"] == "newmark"
     assert [figure.name for figure in document.sections[1].figures][-1] == "contacts"

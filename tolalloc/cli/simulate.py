@@ -6,16 +6,24 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    UnitProgress,
+    announce_compilation,
+    print_json,
+    print_table,
+    tell,
+    write_report,
+)
+from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 
 def simulate(
-    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv40e",
+    reducer: ReducerOption = None,
     unit: Annotated[str, typer.Option(help="Shipped unit (exact, table4 of an RV-20E) or TOML file.")] = "exact",
     speed: Annotated[float, typer.Option(help="Input speed that is reached [rpm].")] = 525.0,
-    torque: Annotated[
-        float | None, typer.Option(help="Load against the carrier's rotation [N·m]; the rated one unless given.")
-    ] = None,
+    torque: RatedTorqueOption = None,
     engine: Annotated[
         str,
         typer.Option(help="generalised-alpha or newmark (equivalent model), exudyn (exact profile, optional extra)."),
@@ -43,16 +51,12 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
-    # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.cli.document_script import written
     from tolalloc.report.folder import require_usable
-    from tolalloc.rv.simulation.answer.document import simulation_document
-    from tolalloc.rv.simulation.answer.tables import series_table, steady_table
     from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation
     from tolalloc.rv.simulation.run import simulate as simulated
 
     asked = SimulationStudy(
-        reducer=reducer,
+        reducer=named_reducer(reducer, out),
         unit=unit,
         speed_rpm=speed,
         torque_nm=torque,
@@ -70,12 +74,10 @@ def simulate(
         require_usable(out)
     announce_compilation()
     with UnitProgress("ms") as progress:
-        results = simulated(prepared, progress)
-    document = simulation_document(results)
-    if out:
-        written(out, lambda: document, lambda folder: series_table(results).to_csv(folder / "series.csv", index=False))
+        answer = simulated(prepared, progress)
+    write_report(answer, out)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    print_table(steady_table(results), f"{results.reducer.name}: steady part")
-    say(document)
+    print_table(answer.steady_table, f"{answer.header.model}: steady part")
+    tell(answer)

@@ -35,6 +35,8 @@ PROTOTYPE_RADIUS = 0.5
 """Spectral radius of the prototype's integrator; at 0.9 stiff bearings and part errors lock it into alternation [-]."""
 FEWEST_STEPS = 4
 """Time steps per pin pass below which a run says nothing [-]."""
+LARGEST_TORQUE = 10.0
+"""Largest torque over the rated one [-]."""
 LOAD_TIME = 0.5
 """Time in which the load rises after the speed has, over the time of the speed: 1.0 to 1.5 s in xi2015 [-]."""
 
@@ -52,7 +54,7 @@ class SimulationStudy:
     speed_rpm
         Input speed that is reached [rpm].
     torque_nm
-        Torque that resists the carrier's rotation; the rated one unless given [N·m].
+        Torque on the carrier, negative as it resists the rotation; minus the rated one unless given [N·m].
     engine
         One of `ENGINES`.
     duration
@@ -126,14 +128,14 @@ class PreparedSimulation:
         Design with the pin contacts that were asked for.
     unit
         Its errors.
-    load
-        Torque that resists the carrier's rotation [N·m].
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
     """
 
     asked: SimulationStudy
     reducer: Reducer
     unit: BuiltUnit
-    load: float
+    torque: float
 
     @property
     def speed(self) -> float:
@@ -172,7 +174,7 @@ class PreparedSimulation:
         """Nominal motion and load."""
         asked = self.asked
         speed = SpeedProfile((0.0, asked.ramp), (0.0, self.speed), "step")
-        torque = SpeedProfile((asked.ramp, self.loaded), (0.0, -self.load), "step")
+        torque = SpeedProfile((asked.ramp, self.loaded), (0.0, self.torque), "step")
         return motion_of(self.reducer, speed, torque, asked.duration, round(asked.duration / asked.step))
 
     @cached_property
@@ -209,11 +211,12 @@ def prepare_simulation(asked: SimulationStudy) -> PreparedSimulation:
             reducer.stiffness, pin_contact=asked.pin_stiffness, pin_contact_law="constant", pin_bending=inf
         )
         reducer = replace(reducer, stiffness=constant)
-    load, largest = reducer.load.rated_torque if asked.torque_nm is None else asked.torque_nm, 10.0
-    if not 0.0 < load <= largest * reducer.load.rated_torque:
-        allowed = f"above 0 to {largest * reducer.load.rated_torque:g} N·m"
-        raise InputError.at("tolalloc simulate", "--torque", load, allowed)
-    prepared = PreparedSimulation(asked=asked, reducer=reducer, unit=unit, load=load)
+    torque = -reducer.load.rated_torque if asked.torque_nm is None else asked.torque_nm
+    if not -LARGEST_TORQUE * reducer.load.rated_torque <= torque < 0.0:
+        lowest = f"{-LARGEST_TORQUE * reducer.load.rated_torque:g}"
+        allowed = f"{lowest} N·m to below 0, which resists the rotation; a load that drives it is not simulated"
+        raise InputError.at("tolalloc simulate", "--torque", torque, allowed)
+    prepared = PreparedSimulation(asked=asked, reducer=reducer, unit=unit, torque=torque)
     if prepared.crank_turns < 1:
         least = prepared.loaded + prepared.crank_turn
         allowed = f"{least:.4g} s or more, which the ramps of speed and load and one crank turn take"

@@ -9,6 +9,7 @@ import numpy as np
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.progress import Progress
+from tolalloc.report.answer import Header
 from tolalloc.rv.dynamics.modes import modes
 from tolalloc.rv.dynamics.motion import Motion
 from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping
@@ -17,8 +18,10 @@ from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.rv.simulation.answer.results import AtRest, SimulationResults, TimeSeries
+from tolalloc.rv.simulation.answer import SimulationAnswer
 from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
+from tolalloc.rv.simulation.series import AtRest, TimeSeries
+from tolalloc.units import RPM
 
 MOST_ANGLES = 5000
 """Angles at which the static model is asked beside the simulation [-]."""
@@ -26,15 +29,10 @@ MODE_ANGLES = 200
 """Angles at which natural frequencies are looked for [-]."""
 
 
-def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResults:
+def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationAnswer:
     """Return what a reducer does over time, and the static model at the same angles.
 
-    Parameters
-    ----------
-    prepared
-        The simulation.
-    progress
-        Told the simulated milliseconds.
+    The simulated milliseconds are told as progress.
 
     Raises
     ------
@@ -51,19 +49,27 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
     steady = slice(motion.time.size - count, motion.time.size)
     progress.begin("at rest")
     at_rest = _at_rest(prepared, motion, steady)
-    return SimulationResults(
+    return SimulationAnswer(
+        header=Header(
+            name=prepared.unit.name,
+            model=prepared.reducer.name,
+            conditions={
+                "input speed [rpm]": prepared.speed / RPM,
+                "torque on the carrier [N·m]": prepared.torque,
+                "engine": asked.engine,
+            },
+            assumptions=_assumptions(prepared),
+        ),
         reducer=prepared.reducer,
         engine=asked.engine,
-        unit=prepared.unit.name,
         speed=prepared.speed,
-        load=prepared.load,
+        torque=prepared.torque,
         series=series,
         steady=steady,
         crank_turns=prepared.crank_turns,
         at_rest=at_rest,
         natural_frequency=_natural_frequency(prepared, motion, steady),
         seconds=seconds,
-        assumptions=_assumptions(prepared),
     )
 
 
@@ -118,7 +124,7 @@ def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[flo
         ),
         Drive(
             speed=TimeCourse.step(prepared.speed, 0.0, asked.ramp),
-            torque=TimeCourse.step(-prepared.load, asked.ramp, prepared.loaded),
+            torque=TimeCourse.step(prepared.torque, asked.ramp, prepared.loaded),
         ),
         TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=PROTOTYPE_RADIUS),
         PrototypeDamping(bearings=asked.damping, output=prepared.mass_damping * inertia.carrier_moment),
@@ -156,7 +162,7 @@ def _at_rest(prepared: PreparedSimulation, motion: Motion, steady: slice) -> AtR
     steps = np.arange(motion.time.size)[steady]
     steps = steps[:: -(-steps.size // MOST_ANGLES)]
     start = time.perf_counter()
-    found = prepared.model.equilibria(prepared.errors, -prepared.load, motion.carrier_angle[steps])
+    found = prepared.model.equilibria(prepared.errors, prepared.torque, motion.carrier_angle[steps])
     pins, worst = forces(found).pins[0], Status(int(found.status.max()))
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {prepared.unit.name}: no equilibrium at rest at some angle: {worst.sentence}.")
@@ -175,7 +181,7 @@ def _natural_frequency(prepared: PreparedSimulation, motion: Motion, steady: sli
         found = modes(
             prepared.model,
             prepared.errors[0],
-            -prepared.load,
+            prepared.torque,
             prepared.inertia,
             angle[:: -(-angle.size // MODE_ANGLES)],
         )

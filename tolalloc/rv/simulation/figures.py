@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.simulation.answer.results import SimulationResults
+from tolalloc.rv.simulation.answer import SimulationAnswer
 from tolalloc.units import RPM
 
 _POINTS = 2000
@@ -21,15 +21,7 @@ def _thinned(values: Shaped[np.ndarray, " time"]) -> Int[np.ndarray, " shown"]:
 
 
 def line(label: str, x: Float[np.ndarray, " time"], y: Shaped[np.ndarray, " time"]) -> Series:
-    """Return a line thin enough for a page.
-
-    Parameters
-    ----------
-    label
-        Name in the legend.
-    x, y
-        Data.
-    """
+    """Return a line thin enough for a page."""
     shown = _thinned(y)
     return Series(label=label, kind="line", x=x[shown].tolist(), y=y[shown].tolist())
 
@@ -38,7 +30,7 @@ def _over_time(name: str, title: str, label: str, *lines: Series) -> Figure:
     return Figure(name=name, title=title, x_label="time [s]", y_label=label, series=lines)
 
 
-def run_figures(results: SimulationResults) -> tuple[Figure, ...]:
+def run_figures(results: SimulationAnswer) -> tuple[Figure, ...]:
     """Return the whole run over time: input and output speed, their accelerations, contacts of each disc."""
     series, contacts = results.series, results.series.pins_in_contact
     time, who = series.time, results.engine
@@ -67,16 +59,8 @@ def run_figures(results: SimulationResults) -> tuple[Figure, ...]:
     )
 
 
-def error_figure(found: dict[str, SimulationResults], passes: float = np.inf) -> Figure:
-    """Return the transmission error over the last of the steady part, of several engines and at rest.
-
-    Parameters
-    ----------
-    found
-        Label → results on the same reducer, speed and load.
-    passes
-        How many pin passes are shown [-].
-    """
+def error_figure(found: dict[str, SimulationAnswer], passes: float = np.inf) -> Figure:
+    """Return the transmission error over the last pin passes of the steady part, of several engines and at rest."""
     first = next(iter(found.values()))
     stage = first.reducer.cycloid_stage
     shown = passes * 360.0 / (stage.disc_teeth * stage.pin_count)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.rv.simulation.answer.results import SimulationResults
-from tolalloc.rv.simulation.answer.tables import range_text
+from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
 from tolalloc.units import ARCSECOND, DEGREE, RPM
 
 COARSE = 20
@@ -24,7 +23,7 @@ TURNING_BACK = -0.45
 """Correlation of successive changes below which a quantity turns back at every step; −0.5 has noise [-]."""
 
 
-def answer(results: SimulationResults) -> tuple[str, ...]:
+def sentences(results: SimulationAnswer) -> tuple[str, ...]:
     """Return the answer in a few sentences."""
     moving, resting = results.largest_force
     spans, spans_at_rest = (span / ARCSECOND for span in results.peak_to_peak)
@@ -45,7 +44,7 @@ def answer(results: SimulationResults) -> tuple[str, ...]:
     )
 
 
-def _contact(results: SimulationResults) -> str:
+def _contact(results: SimulationAnswer) -> str:
     """Return what the pin contacts are."""
     stiffness = results.reducer.stiffness
     if stiffness.pin_contact_law == "logarithmic":
@@ -57,7 +56,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _cause(results: SimulationResults) -> str:
+def _cause(results: SimulationAnswer) -> str:
     """Return what the difference comes from."""
     excited = f"The discs pass a pin {results.pin_pass:.1f} times per second"
     if results.natural_frequency is None:
@@ -77,7 +76,7 @@ def _cause(results: SimulationResults) -> str:
     return f"{nearest}. Both have the same gaps and springs, so what they differ by is motion alone."
 
 
-def _excitations(results: SimulationResults) -> dict[str, float]:
+def _excitations(results: SimulationAnswer) -> dict[str, float]:
     """Return how often per second the strong orders of the output turn come by [Hz]."""
     stage, turn = results.reducer.cycloid_stage, results.speed / (2 * np.pi) / results.reducer.ratio
     orders = {1, stage.disc_teeth, stage.pin_count, 2 * stage.disc_teeth, 2 * stage.pin_count}
@@ -85,7 +84,7 @@ def _excitations(results: SimulationResults) -> dict[str, float]:
     return found | {f"{times} times the pin pass": times * results.pin_pass for times in (1, 2, 3)}
 
 
-def unsettled(results: SimulationResults) -> bool:
+def unsettled(results: SimulationAnswer) -> bool:
     """Return whether what motion adds still decays, or power does not close."""
     first, second = np.array_split(results.difference, 2)
     one, other = (np.ptp(half) for half in (first, second))
@@ -93,7 +92,7 @@ def unsettled(results: SimulationResults) -> bool:
     return bool(decays) or abs(results.output_power / results.input_power - 1) > UNCLOSED
 
 
-def ringing(results: SimulationResults) -> str:
+def ringing(results: SimulationAnswer) -> str:
     """Return what vibrates too fast for the time step; empty if nothing does."""
     error = results.series.transmission_error[results.steady]
     change = np.diff(results.series.output_acceleration[results.steady])
@@ -102,7 +101,7 @@ def ringing(results: SimulationResults) -> str:
     return "the output acceleration" if (change[1:] * change[:-1]).sum() < TURNING_BACK * (change**2).sum() else ""
 
 
-def warnings(results: SimulationResults) -> tuple[str, ...]:
+def warnings(results: SimulationAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on it."""
     found, step = [], f"{results.step:.3g} s"
     if what := ringing(results):
@@ -118,7 +117,7 @@ def warnings(results: SimulationResults) -> tuple[str, ...]:
         )
     if (passes := 1 / (results.pin_pass * results.step)) < COARSE:
         found.append(f"A step of {step} is {1 / passes:.2g} of a pin pass; waves of the pin contacts are cut off.")
-    if results.span < 2 * np.pi and results.unit != "exact":
+    if results.span < 2 * np.pi and results.header.name != "exact":
         turn = 2 * np.pi / results.output_speed
         found.append(
             f"The steady part spans {results.span / DEGREE:.1f}° of the carrier; a peak-to-peak with errors "

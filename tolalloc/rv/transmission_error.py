@@ -1,0 +1,332 @@
+"""What one built unit does over one output turn: transmission error, orders, forces, lost motion, and their sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import SolveError
+from tolalloc.report.answer import Answer, Header
+from tolalloc.report.document import Section
+from tolalloc.rv.cycloid.clearance import linear_model_warnings
+from tolalloc.rv.equivalent.answers import Equilibria, Extremes
+from tolalloc.rv.equivalent.attribution import Attribution, attribute
+from tolalloc.rv.equivalent.hysteresis import (
+    LOOP_ANGLES,
+    LOOP_ASSUMPTION,
+    HysteresisLoop,
+    both_directions,
+    hysteresis_loop,
+)
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
+from tolalloc.rv.equivalent.status import Status, count_statuses
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.unit_file import BuiltUnit
+from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolalloc.report.figure import Figure
+
+_SHOWN = 8
+"""Main orders that are named [-]."""
+_DRAWN = 120
+"""Orders that are drawn [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransmissionErrorAnswer(Answer):
+    """One unit under one torque.
+
+    Parameters
+    ----------
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
+    equilibria
+        At equally spaced angles of one output turn.
+    extremes
+        Largest and smallest transmission error, refined.
+    loop
+        Hysteresis loop of this unit and of the perfect reducer.
+    reversed_by
+        What reversing the rotation adds to the curve [rad].
+    attribution
+        Which source makes how much; none unless asked for.
+    equally_spaced
+        Equally spaced angles of the search [-].
+    cautions
+        What the model itself must warn of.
+    """
+
+    kind: ClassVar[str] = "transmission error"
+    torque: float
+    equilibria: Equilibria
+    extremes: Extremes
+    loop: HysteresisLoop
+    reversed_by: Float[np.ndarray, " angle"]
+    attribution: Attribution | None
+    equally_spaced: int
+    cautions: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return f"{self.header.model}, unit {self.header.name}, {self.torque:g} N·m on the carrier"
+
+    @cached_property
+    def orders(self) -> Orders:
+        """Orders of the transmission error."""
+        return order_spectrum(self.equilibria.transmission_error)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+        found = self.summary
+        strongest = ", ".join(f"{wave['order']} ({wave['amplitude_arcsec']:.3g}″)" for wave in found["main_orders"][:3])
+        return (
+            f"The transmission error spans {found['peak_to_peak_arcsec']:.2f}″ over one output turn, from "
+            f"{found['smallest_arcsec']:.2f}″ at {found['smallest_at_deg']:.2f}° to {found['largest_arcsec']:.2f}″ at "
+            f"{found['largest_at_deg']:.2f}°; its strongest orders are {strongest}.",
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return self.cautions
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their paragraphs, figures and tables."""
+        shares: tuple[Section, ...] = ()
+        if self.attribution is not None:
+            words = (
+                "Curve: peak-to-peak of what the source adds. Orders: component along the whole wave, minus cancels; "
+                "columns sum to the amplitude."
+            )
+            table = (("attribution", self.attribution_table),)
+            shares = (Section(heading="What each source adds", paragraphs=(words,), tables=table),)
+        return (
+            Section(
+                heading="One output turn",
+                figures=(self.curve_figure, self.order_figure),
+                tables=(("one turn", self.turn_table),),
+            ),
+            *shares,
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units of measurement in the names."""
+        extremes, solved, reversed_by = self.extremes, Solved.of(self.equilibria), self.reversed_by
+        found = {
+            "reducer": self.header.model,
+            "unit": self.header.name,
+            "torque_nm": self.torque,
+            "peak_to_peak_arcsec": float(extremes.peak_to_peak[0] / ARCSECOND),
+            "remaining_error_arcsec": float(extremes.remaining[0] / ARCSECOND),
+            "largest_arcsec": float(extremes.largest[0] / ARCSECOND),
+            "largest_at_deg": float(extremes.carrier_angle[0, 0] / DEGREE),
+            "smallest_arcsec": float(extremes.smallest[0] / ARCSECOND),
+            "smallest_at_deg": float(extremes.carrier_angle[0, 1] / DEGREE),
+            "main_orders": [
+                {"order": order, "amplitude_arcsec": amplitude / ARCSECOND, "phase_deg": phase / DEGREE}
+                for order, amplitude, phase in self.orders.main(_SHOWN)
+            ],
+            "outputs": [
+                {"name": output.name, "unit": output.unit, "value": float(output.value(solved)[0])}
+                for output in OUTPUTS
+            ],
+            "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
+            "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),
+            "torsional_stiffness_nm_per_arcmin": _pair(self.loop.torsional_stiffness, 1 / ARCMINUTE),
+            "reversal_arcsec": {
+                "mean": float(reversed_by.mean() / ARCSECOND),
+                "peak_to_peak": float(np.ptp(reversed_by) / ARCSECOND),
+            },
+            "angles": {"equally_spaced": self.equally_spaced, "solved_in_all": int(extremes.solves[0])},
+            "largest_residual_of_largest_force": float(extremes.residual[0]),
+            "statuses": dict(self.header.statuses),
+            "warnings": list(self.warnings),
+            "assumptions": list(self.assumptions),
+        }
+        if self.attribution is not None:
+            found["attribution"] = _attributed(self.attribution)
+        return found
+
+    @cached_property
+    def turn_table(self) -> pd.DataFrame:
+        """The whole turn, one quantity per row."""
+        import pandas as pd
+
+        found = self.summary
+        waves = (
+            (
+                f"order {wave['order']} of the output turn, amplitude [arcsec] and phase",
+                f"{wave['amplitude_arcsec']:.2f} ∠ {wave['phase_deg']:.0f}°",
+            )
+            for wave in found["main_orders"]
+        )
+        loops = (
+            (f"{label}, {whose.replace('_', ' ')} [{unit}]", "not found" if value is None else _short(value))
+            for label, field, unit in (
+                ("lost motion at ±3 % of rated torque", "lost_motion_arcmin", "arcmin"),
+                ("backlash", "backlash_arcmin", "arcmin"),
+                ("torsional stiffness", "torsional_stiffness_nm_per_arcmin", "N·m/arcmin"),
+            )
+            for whose, value in found[field].items()
+        )
+        rows = [
+            ("peak-to-peak over one output turn [arcsec]", f"{found['peak_to_peak_arcsec']:.2f}"),
+            ("finer angles may add [arcsec]", f"{found['remaining_error_arcsec']:.3f}"),
+            (f"largest, at {found['largest_at_deg']:.2f}° [arcsec]", f"{found['largest_arcsec']:.2f}"),
+            (f"smallest, at {found['smallest_at_deg']:.2f}° [arcsec]", f"{found['smallest_arcsec']:.2f}"),
+            *waves,
+            *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in found["outputs"]),
+            *loops,
+            ("reversing the direction adds, mean [arcsec]", f"{found['reversal_arcsec']['mean']:.2f}"),
+            ("reversing the direction adds, peak-to-peak [arcsec]", f"{found['reversal_arcsec']['peak_to_peak']:.2f}"),
+            *((f"angles: {outcome} [-]", str(count)) for outcome, count in found["statuses"].items() if count),
+            ("largest unbalanced force over largest force [-]", f"{found['largest_residual_of_largest_force']:.1e}"),
+        ]
+        return pd.DataFrame(rows, columns=["quantity", "value"])
+
+    @cached_property
+    def attribution_table(self) -> pd.DataFrame:
+        """What each source adds to the curve and to the main orders, and what they make together."""
+        import pandas as pd
+
+        found = self.summary["attribution"]
+        names = [f"order {order} [arcsec]" for order in found["orders"]]
+        rows = [
+            {
+                "source": item["source"],
+                "curve [arcsec]": item["peak_to_peak_arcsec"],
+                **dict(zip(names, item["share_arcsec"], strict=True)),
+            }
+            for item in found["sources"]
+        ]
+        together = {"source": "together", **dict(zip(names, found["amplitude_arcsec"], strict=True))}
+        return pd.DataFrame([*rows, together])
+
+    @cached_property
+    def curve_figure(self) -> Figure:
+        """The curve and its refined extremes."""
+        from tolalloc.report.figure import Figure, Series
+
+        found, extremes = self.equilibria, self.extremes
+        return Figure(
+            name="transmission_error",
+            title=f"Transmission error over one output turn: {extremes.peak_to_peak[0] / ARCSECOND:.1f}″ peak-to-peak",
+            x_label="carrier angle [°]",
+            y_label="transmission error [arcsec]",
+            series=(
+                Series(
+                    label=f"{found.carrier_angle.size} equally spaced angles",
+                    kind="line",
+                    x=list(found.carrier_angle / DEGREE),
+                    y=list(found.transmission_error[0] / ARCSECOND),
+                ),
+                Series(
+                    label="extremes, refined",
+                    kind="points",
+                    x=[float(angle) for angle in extremes.carrier_angle[0] / DEGREE],
+                    y=[float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)],
+                ),
+            ),
+        )
+
+    @cached_property
+    def order_figure(self) -> Figure:
+        """The amplitude of the first orders."""
+        from tolalloc.report.figure import Figure, Series
+
+        shown = slice(0, _DRAWN)
+        amplitude = self.orders.amplitude[0, shown] / ARCSECOND
+        return Figure(
+            name="orders",
+            title="Orders of the transmission error",
+            x_label="order of the output turn [-]",
+            y_label="amplitude [arcsec]",
+            series=(Series(label="amplitude", kind="stems", x=list(self.orders.order[shown]), y=list(amplitude)),),
+        )
+
+
+def transmission_error(
+    reducer: Reducer, unit: BuiltUnit, torque: float, *, attributed: bool = False
+) -> TransmissionErrorAnswer:
+    """Return what a unit does over one output turn.
+
+    Parameters
+    ----------
+    reducer
+        Nominal design.
+    unit
+        Its errors.
+    torque
+        Torque on the carrier; negative resists the rotation [N·m].
+    attributed
+        Whether to say which source makes how much of each order.
+
+    Raises
+    ------
+    SolveError
+        An angle without equilibrium.
+    """
+    model = EquivalentModel(reducer, orders=unit.orders or HARMONICS)
+    errors = unit.errors(model.columns, reducer.modification.deviations)
+    equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
+    worst = Status(max(extremes.status[0], equilibria.status.max()))
+    if worst is not Status.CONVERGED:
+        raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
+    return TransmissionErrorAnswer(
+        header=Header(
+            name=unit.name,
+            model=reducer.name,
+            conditions={"torque on the carrier [N·m]": torque},
+            assumptions=(*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION),
+            statuses=dict(count_statuses(equilibria.status)),
+        ),
+        torque=torque,
+        equilibria=equilibria,
+        extremes=extremes,
+        loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
+        reversed_by=both_directions(model, errors, torque).difference[0],
+        attribution=attribute(model, errors, torque) if attributed else None,
+        equally_spaced=model.search.coarse,
+        cautions=tuple(linear_model_warnings(reducer.cycloid_stage, reducer.modification)),
+    )
+
+
+def _pair(values: Float[np.ndarray, " 2"], unit_of_measurement: float) -> dict[str, float | None]:
+    """Return a number of this unit and of the perfect reducer; none where an angle has no answer."""
+    this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values)
+    return {"this_unit": this, "perfect_reducer": perfect}
+
+
+def _attributed(found: Attribution) -> dict[str, Any]:
+    """Return which source makes how much of each main order, the source that moves the curve most first."""
+    main, span = np.argsort(-found.amplitude)[:_SHOWN], np.ptp(found.contribution, axis=1)
+    return {
+        "orders": [int(order) for order in found.order[main]],
+        "amplitude_arcsec": [float(value / ARCSECOND) for value in found.amplitude[main]],
+        "sources": [
+            {
+                "source": found.sources[at],
+                "peak_to_peak_arcsec": float(span[at] / ARCSECOND),
+                "share_arcsec": [float(value / ARCSECOND) for value in found.share[at, main]],
+            }
+            for at in np.argsort(-span)
+        ],
+    }
+
+
+def _short(value: float) -> str:
+    """Return a number with four significant digits and no exponent for what users meet."""
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
