@@ -1,20 +1,24 @@
-"""One turn of the RV-20E of liu2020's Table 4, as pictures: `python studies/rv20e_one_turn.py [FOLDER]`."""
+"""One turn of the RV-20E of liu2020's Table 4: what its errors do to the curve, the pins and the lost motion.
+
+python studies/rv20e_one_turn.py [--out FOLDER]
+"""
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
+from tolalloc.cli.document_script import run_document
+from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.plots import save_png
 from tolalloc.rv.equivalent.attribution import attribute
 from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.rv.transmission_error import transmission_error
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 TORQUE = -1.0
@@ -23,28 +27,6 @@ TORQUE = -1.0
 def exact(model: EquivalentModel) -> np.ndarray:
     """Return the unit without errors."""
     return load_unit("exact").errors(model.columns, model.reducer.modification.deviations)
-
-
-def curve(model: EquivalentModel, unit: np.ndarray) -> Figure:
-    """Draw the transmission error and its extremes."""
-    found, extremes = model.equilibria(unit, TORQUE), model.extremes(unit, TORQUE)
-    at = [float(angle) for angle in extremes.carrier_angle[0] / DEGREE]
-    values = [float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)]
-    return Figure(
-        name="one_turn",
-        title=f"Transmission error over one output turn: {extremes.peak_to_peak[0] / ARCSECOND:.1f}″ peak-to-peak",
-        x_label="carrier angle [°]",
-        y_label="transmission error [arcsec]",
-        series=(
-            Series(
-                label=f"{found.carrier_angle.size} equally spaced angles",
-                kind="line",
-                x=list(found.carrier_angle / DEGREE),
-                y=list(found.transmission_error[0] / ARCSECOND),
-            ),
-            Series(label="extremes, refined", kind="points", x=at, y=values),
-        ),
-    )
 
 
 def kink(model: EquivalentModel, unit: np.ndarray) -> Figure:
@@ -166,23 +148,35 @@ def sources(model: EquivalentModel, unit: np.ndarray) -> Figure:
     )
 
 
-def main() -> None:
-    """Draw everything."""
-    parser = argparse.ArgumentParser(description="One turn of the RV-20E of liu2020's Table 4, as pictures.")
-    parser.add_argument("folder", nargs="?", type=Path, default="runs/rv20e_one_turn", help="default: %(default)s")
-    folder = parser.parse_args().folder
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        parser.error(f"{folder}: the folder cannot be made ({error.strerror}).")
-    reducer = load_reducer("rv20e")
+def build(quick: bool) -> Document:  # noqa: ARG001 (one turn has nothing to shorten)
+    """Return the report."""
+    reducer, table4 = load_reducer("rv20e"), load_unit("table4")
     model = EquivalentModel(reducer)
-    unit = load_unit("table4").errors(model.columns, reducer.modification.deviations)
-    for draw in (curve, kink, contact, pin_forces, loop, directions, sources):
-        figure = draw(model, unit)
-        save_png(figure, folder / f"{figure.name}.png")
-        print(folder / f"{figure.name}.png")
+    unit = table4.errors(model.columns, reducer.modification.deviations)
+    answer = transmission_error(reducer, table4, TORQUE, attributed=True)
+    turn = replace(answer.curve_figure, name="one_turn")
+    return Document(
+        title="One turn of the RV-20E of liu2020's Table 4",
+        subtitle=f"{TORQUE:g} N·m on the carrier unless said otherwise",
+        answer=answer.sentences,
+        warnings=answer.warnings,
+        sections=(
+            Section(
+                heading="Transmission error",
+                figures=(turn, kink(model, unit), directions(model, unit)),
+                tables=(("one turn", answer.turn_table),),
+            ),
+            Section(heading="Contact", figures=(contact(model, unit), pin_forces(model, unit), loop(model, unit))),
+            Section(
+                heading="What makes it",
+                figures=(sources(model, unit),),
+                tables=(("attribution", answer.attribution_table),),
+            ),
+        ),
+        assumptions=answer.assumptions,
+        summary=answer.summary,
+    )
 
 
 if __name__ == "__main__":
-    main()
+    run_document("rv20e_one_turn", build)

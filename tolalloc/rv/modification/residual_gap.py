@@ -49,13 +49,7 @@ class ResidualGap(ModificationProblem):
         return np.array([formula_gap(self.stage, unit, angle).mean() for unit in units])
 
     def objective(self, amounts: Amounts) -> Float[np.ndarray, " n"]:
-        """Return the mean gap [m].
-
-        Parameters
-        ----------
-        amounts
-            Pairs of amounts [m].
-        """
+        """Return the mean gap [m]."""
         return np.asarray(amounts @ self._per_amount)
 
 
@@ -66,20 +60,9 @@ def residual_gap(
     interval: tuple[float, float] = (25 * DEGREE, 100 * DEGREE),
     intervals: int = 100,
 ) -> ResidualGap:
-    """Return the problem with both amounts between 0 and a largest one.
+    """Return the problem with both amounts between 0 and a largest one, which is assumed.
 
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    radial_clearance
-        Smallest clearance j at tip and root [m].
-    largest
-        Largest amount, assumed [m].
-    interval
-        Work interval; its default is that of song2019, li2018 prints none [rad].
-    intervals
-        Number n, assumed [-].
+    The default of the work interval is that of song2019; li2018 prints neither it nor the number of intervals.
     """
     return ResidualGap(
         name="residual gap",
@@ -94,14 +77,7 @@ def residual_gap(
 
 
 def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
-    """Return the optimum of `ResidualGap`, Δr_rp = j/(1 − q) and Δr_p = j·q/(1 − q).
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    radial_clearance
-        Smallest clearance j at tip and root [m].
+    """Return the optimum of `ResidualGap` with a radial clearance j, Δr_rp = j/(1 − q) and Δr_p = j·q/(1 − q).
 
     Notes
     -----

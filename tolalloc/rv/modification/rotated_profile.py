@@ -76,13 +76,7 @@ class RotatedProfileFit(ModificationProblem):
         return np.asarray(points[:, 0] + 1j * points[:, 1])
 
     def objective(self, amounts: Amounts) -> Float[np.ndarray, " n"]:
-        """Return the mean distance of the two profiles [m].
-
-        Parameters
-        ----------
-        amounts
-            Pairs of amounts [m].
-        """
+        """Return the mean distance of the two profiles [m]."""
         angle = self._nearest(amounts) if self.metric == "nearest" else self._angles
         path, slope, _ = _path(self.stage, amounts, angle)
         normal = -1j * slope / np.abs(slope)
@@ -136,24 +130,7 @@ def rotated_profile_fit(
     radial_clearance: float = 0.0,
     require_gap: bool = False,
 ) -> RotatedProfileFit:
-    """Return the problem in song2019's box: Δr_rp from 0 to 1 mm and Δr_p from 0 to ±1 mm.
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    shift_sign
-        1 for its positive and −1 for its negative shift [-].
-    metric
-        Distance of the two profiles.
-    rotation
-        δ of the profile to come close to [rad].
-    points
-        Number m of points [-].
-    radial_clearance
-        Smallest clearance at tip and root [m].
-    require_gap
-        Whether no pin may interfere after closing at φ0; song2019 does not ask for it.
+    """Return the problem in song2019's box: Δr_rp from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm.
 
     Notes
     -----

@@ -50,14 +50,7 @@ WRITERS = {".csv": _write_csv, ".dxf": _write_dxf}
 
 
 def require_profile_file(path: Path, per_tooth: int) -> None:
-    """Raise unless a profile of so many points per tooth can be written there.
-
-    Parameters
-    ----------
-    path
-        New file, ``.csv`` or ``.dxf``.
-    per_tooth
-        Points of one tooth [-].
+    """Raise unless a profile of so many points per tooth can be written to a new ``.csv`` or ``.dxf`` file.
 
     Raises
     ------
@@ -71,16 +64,7 @@ def require_profile_file(path: Path, per_tooth: int) -> None:
 
 
 def write_profile(profile: ToothProfile, per_tooth: int, path: Path) -> ProfilePoints:
-    """Write the profile of a whole disc in millimetres and return its points.
-
-    Parameters
-    ----------
-    profile
-        Sound profile.
-    per_tooth
-        Points of one tooth [-].
-    path
-        New file, ``.csv`` or ``.dxf``.
+    """Write the sound profile of a whole disc in millimetres and return its points.
 
     Raises
     ------
