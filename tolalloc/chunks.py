@@ -8,8 +8,6 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.compiled import use_threads
-
 Answer = TypeVar("Answer")
 
 Mapper = Callable[..., Iterable[Any]]
@@ -42,4 +40,6 @@ def map_chunks(
 
 def one_thread() -> None:
     """Make a worker process use one thread: pass it as the initializer of the pool, one process per core."""
+    from tolalloc.compiled import use_threads
+
     use_threads(1)

@@ -52,14 +52,14 @@ def kernel_state(case: Case, torque: float) -> State:
     groups = spring_groups(reducer, angle, case.orders)
     played = [np.any(group.displacement != 0, axis=(0, 1)) for group in groups if group.contact == "play"]
     discs = np.arange(coordinates.disc(0), coordinates.carrier)
-    kept = np.concatenate([discs, np.setdiff1d(np.flatnonzero(np.any(played, axis=0)), discs)]).astype(int)
-    rest = np.setdiff1d(np.arange(coordinates.count), kept)
+    retained = np.concatenate([discs, np.setdiff1d(np.flatnonzero(np.any(played, axis=0)), discs)]).astype(int)
+    rest = np.setdiff1d(np.arange(coordinates.count), retained)
 
     kernel = EquivalentModel(reducer, orders=case.orders)
     found = kernel.equilibria(np.array([[unit[name] for name in kernel.columns]]), torque, angle)
     assert found.status[0, 0] == Status.CONVERGED, f"no equilibrium found at {torque} N·m"
     dense, q = dense_model(reducer, unit, torque, float(angle[0]), case.orders), np.zeros(coordinates.count)
-    q[kept] = found.kept[0, 0] / lever[kept]
+    q[retained] = found.retained[0, 0] / lever[retained]
     if rest.size:  # only bilateral springs touch these, so one linear solve is exact
         q[rest] = np.linalg.solve(dense.hessian(q)[np.ix_(rest, rest)], -dense.gradient(q)[rest])
     return State(dense, q, float(found.transmission_error[0, 0]))

@@ -13,7 +13,8 @@ from tests.random_reducers import Case, random_case, variations
 from tests.random_units import random_units
 from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
-from tolalloc.rv.cycloid.solvers.contact_law import LOGARITHMIC, pin_force
+from tolalloc.rv.cycloid.solvers import LOGARITHMIC
+from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates

@@ -11,7 +11,8 @@ from tests.random_reducers import random_reducer
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
 from tolalloc.rv.cycloid.mesh import normals
-from tolalloc.rv.cycloid.solvers.contact_law import LINEAR, pin_force
+from tolalloc.rv.cycloid.solvers import LINEAR
+from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
 from tolalloc.rv.equivalent.line_load import LineContact, contact_pattern, line_contact, peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel

@@ -12,7 +12,7 @@ from tolalloc.chunks import Mapper
 from tolalloc.drawing.sources import ANGULAR
 from tolalloc.exceptions import InputError
 from tolalloc.model import Evaluation, Observer
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel

@@ -47,7 +47,7 @@ def contact(
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
     from tolalloc.exceptions import InputError, UnknownNameError
-    from tolalloc.rv.cycloid.solvers.contact_law import LAWS
+    from tolalloc.rv.cycloid.solvers import LAWS
     from tolalloc.rv.reducer.files import load_reducer
     from tolalloc.rv.teeth.answer import contact_answer
 

@@ -99,7 +99,7 @@ def assess(
     torque
         Torque on the carrier, either sign [N·m].
     law
-        Contact law of the pins, one of `tolalloc.rv.cycloid.solvers.contact_law.LAWS`.
+        Contact law of the pins, one of `tolalloc.rv.cycloid.solvers.LAWS`.
     exact
         Whether to take exact distances; by default where the modification is too large for the linear formula.
     phases

@@ -8,11 +8,9 @@ from math import pi
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import brentq, minimize_scalar
 
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.mesh import Angles, normals
-from tolalloc.rv.cycloid.solvers.distance import FIELDS, design_clearances, pin_clearances
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import DEGREE, MICROMETRE
@@ -74,6 +72,8 @@ def exact_clearance(
     profiles: Sequence[ToothProfile], pin_angle: Float[np.ndarray, " pin"], rotation: Rotation = 0.0
 ) -> Float[np.ndarray, "profile pin"]:
     """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m]."""
+    from tolalloc.rv.cycloid.solvers.distance import FIELDS, design_clearances, pin_clearances
+
     designs, clearance = np.empty((len(profiles), FIELDS)), np.empty((len(profiles), pin_angle.size))
     for row, profile in zip(designs, profiles, strict=True):
         stage, ground = profile.stage, profile.ground
@@ -154,6 +154,8 @@ class Clearance:
 
 def _narrowest(gap: Gap, rotation: float, angles: Angles = FLANK) -> tuple[float, float]:
     """Return the angle of the pin with the smallest clearance on a rotated disc, and that clearance [rad, m]."""
+    from scipy.optimize import minimize_scalar
+
     gaps = gap(angles, rotation)
     at = int(np.argmin(gaps))
     found = minimize_scalar(
@@ -175,6 +177,8 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
     InputError
         A pin overlaps the tooth before any load.
     """
+    from scipy.optimize import brentq
+
     stage, modification = profile.stage, profile.modification
     exact = is_large(stage, modification) if exact is None else exact
     gap = gap_of(profile, exact)

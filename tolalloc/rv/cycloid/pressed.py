@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import brentq
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.cycloid.clearance import Gap, gap_of
 from tolalloc.rv.cycloid.contact_stiffness import ContactStiffness, contact_stiffness
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, loaded
 from tolalloc.rv.cycloid.mesh import flank_angle, normals
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR, pin_forces
+from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
+from tolalloc.rv.cycloid.solvers.contact_law import pin_forces
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import MICROMETRE
 
@@ -135,6 +135,8 @@ class _Press:
 
     def balanced(self) -> float:
         """Return the deflection at which the torques balance [m]."""
+        from scipy.optimize import brentq
+
         deepest, deflection = self.discs.reducer.cycloid_stage.pin_radius, MICROMETRE
         while self.surplus(deflection) < 0:
             if deflection >= deepest:

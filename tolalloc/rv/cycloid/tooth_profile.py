@@ -8,7 +8,6 @@ from math import acos, pi
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import brentq
 
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.mesh import Angles, normals, path_curvature
@@ -64,6 +63,7 @@ class ToothProfile:
         """φ where a flank meets its mirror image at root and at tip: 0 and π unless a rotation turns it [rad]."""
         if self.modification.rotation == 0.0:
             return 0.0, pi
+        from scipy.optimize import brentq
 
         def beyond(angle: float, middle: float) -> float:
             x, y = self.points(np.array([angle]))[0]

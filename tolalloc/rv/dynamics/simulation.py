@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, UInt8, UInt16
 
 from tolalloc.rv.dynamics.motion import Motion
 from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator
-from tolalloc.rv.dynamics.solvers.stepping import Parts, Record, Scheme, State, advance
+from tolalloc.rv.dynamics.solvers.stepping import Parts, Scheme, State, StepRecord, advance
 from tolalloc.rv.dynamics.tables import Steps
 from tolalloc.rv.equivalent.model import EquivalentModel
 
@@ -77,12 +77,12 @@ class Simulated:
     observed: Observed
 
 
-def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -> Record:
+def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -> StepRecord:
     reducer, times, size = steps.reducer, steps.motion.time.size, steps.coordinates.count
     slot = np.full(times, -1)
     slot[observe] = np.arange(observe.size)
     curve, whole = (samples, times), (samples, observe.size, size)
-    return Record(
+    return StepRecord(
         rotation=np.empty(curve),
         speed=np.empty(curve),
         acceleration=np.empty(curve),
@@ -139,7 +139,9 @@ def simulate(
     nothing = np.zeros((4, samples, coordinates.count))
     state = State(nothing[0], nothing[1], nothing[2], nothing[3], np.zeros(samples, np.uint8))
     scale, given = steps.scale, np.ascontiguousarray(errors)
-    parts = Parts(steps.mass, steps.kept, rotation, float(scale[rotation]), steps.played_meshes, steps.sun_base_radius)
+    parts = Parts(
+        steps.mass, steps.retained, rotation, float(scale[rotation]), steps.played_meshes, steps.sun_base_radius
+    )
     scheme = Scheme(integrator.alpha_m, integrator.alpha_f, integrator.beta, integrator.gamma, motion.step)
     for first, angles, tables in steps.parts():
         advance(first, angles, tables, parts, scheme, columns.layout, columns.map, model.design, given, state, record)

@@ -16,7 +16,7 @@ from tolalloc.rv.equivalent.condensation import (
     CondensedAngles,
     bilateral_groups,
     condense,
-    kept_coordinates,
+    retained_coordinates,
     rotation_scale,
 )
 from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
@@ -33,10 +33,10 @@ class StepTables(NamedTuple):
     ----------
     stiffness, damping
         Of the interfaces without play; of these and the masses [N/m, N·s/m].
-    by_kept
-        Change of all coordinates per change of the kept ones [m/m].
+    by_retained
+        Change of all coordinates per change of the retained ones [m/m].
     flexibility
-        Change of all coordinates per force at fixed kept ones [m/N].
+        Change of all coordinates per force at fixed retained ones [m/N].
     rates
         What a displacement beyond the predicted one adds to algorithmic acceleration, velocity and acceleration
         [1/s², 1/s, 1/s²]; zero at the start, which is a static equilibrium.
@@ -51,7 +51,7 @@ class StepTables(NamedTuple):
 
     stiffness: Float[np.ndarray, "step coordinate coordinate"]
     damping: Float[np.ndarray, "step coordinate coordinate"]
-    by_kept: Float[np.ndarray, "step coordinate kept"]
+    by_retained: Float[np.ndarray, "step coordinate retained"]
     flexibility: Float[np.ndarray, "step coordinate coordinate"]
     rates: Float[np.ndarray, "step 3"]
     acceleration: Float[np.ndarray, "step coordinate"]
@@ -117,9 +117,9 @@ class Steps:
         return np.asarray(self.inertia.diagonal(self.coordinates) * self.scale**2)
 
     @cached_property
-    def kept(self) -> Int[np.ndarray, " kept"]:
+    def retained(self) -> Int[np.ndarray, " retained"]:
         """Which coordinates pins and play touch, the discs' first [-]."""
-        return kept_coordinates(self.reducer, self.coordinates, bilateral_groups(self._positions(slice(0, 1))))
+        return retained_coordinates(self.reducer, self.coordinates, bilateral_groups(self._positions(slice(0, 1))))
 
     @property
     def played_meshes(self) -> int:
@@ -136,7 +136,7 @@ class Steps:
         """Yield the first step and the tables of each part of the steps; memory holds one part at a time.
 
         The condensed tables are as the contact solver takes them, with inertia and damping in ``stiffness`` [N/m] and
-        with the ``load`` on all coordinates instead of the kept ones [N/m, last N/(N·m)].
+        with the ``load`` on all coordinates instead of the retained ones [N/m, last N/(N·m)].
         """
         for first in range(0, self.motion.time.size, _STEPS_AT_ONCE):
             yield first, *self._tables(slice(first, min(first + _STEPS_AT_ONCE, self.motion.time.size)))
@@ -176,15 +176,15 @@ class Steps:
         rates = np.tile(self.integrator.rates(motion.step), (count, 1))
         if steps.start == 0:
             rates[0] = 0.0
-        kept, rest = self.kept, np.setdiff1d(np.arange(size), self.kept)
+        retained, rest = self.retained, np.setdiff1d(np.arange(size), self.retained)
         stiffness = springs.stiffness + rates[:, 1, None, None] * springs.damping
         stiffness += rates[:, 2, None, None] * np.diag(self.mass)
-        by_kept, flexibility = np.zeros((count, size, kept.size)), np.zeros((count, size, size))
+        by_retained, flexibility = np.zeros((count, size, retained.size)), np.zeros((count, size, size))
         inverse = np.linalg.inv(stiffness[:, rest[:, np.newaxis], rest])
-        by_kept[:, kept] = np.eye(kept.size)
-        by_kept[:, rest] = -inverse @ stiffness[:, rest[:, np.newaxis], kept]
+        by_retained[:, retained] = np.eye(retained.size)
+        by_retained[:, rest] = -inverse @ stiffness[:, rest[:, np.newaxis], retained]
         flexibility[:, rest[:, np.newaxis], rest] = inverse
-        condensed = stiffness[:, kept] @ by_kept
+        condensed = stiffness[:, retained] @ by_retained
         part = Motion(**{name: values[steps] for name, values in vars(motion).items()})
         angles = condense(self.reducer, self.model.orders, at.carrier_angle)._replace(
             stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
@@ -193,7 +193,7 @@ class Steps:
         return angles, StepTables(
             stiffness=springs.stiffness,
             damping=springs.damping,
-            by_kept=by_kept,
+            by_retained=by_retained,
             flexibility=flexibility,
             rates=rates,
             acceleration=nominal_acceleration(at, part) / self.scale,

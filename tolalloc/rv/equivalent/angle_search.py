@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.rv.equivalent.solvers.extremes import Halving
+from tolalloc.rv.equivalent.solvers.records import Halving
 
 _MARGIN = 2
 """Nodes beyond the coarse angles before and behind the turn that the cubic interpolation needs."""

@@ -26,7 +26,7 @@ class Equilibria:
         Torque on the carrier; θc [N·m, rad].
     transmission_error
         Carrier rotation beyond θc, output side [rad].
-    kept
+    retained
         Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m].
     status
         Values of `tolalloc.rv.equivalent.status.Status` [-].
@@ -43,7 +43,7 @@ class Equilibria:
     torque: float
     carrier_angle: Float[np.ndarray, " angle"]
     transmission_error: Float[np.ndarray, "sample angle"]
-    kept: Float[np.ndarray, "sample angle coordinate"]
+    retained: Float[np.ndarray, "sample angle coordinate"]
     status: UInt8[np.ndarray, "sample angle"]
     residual: Float[np.ndarray, "sample angle"]
     pins_in_contact: UInt16[np.ndarray, "sample angle"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import waves

@@ -10,13 +10,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import csr_array
 
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.pins import Terms, pin_terms, tilt_terms, tooth_terms, wave_terms
 from tolalloc.rv.equivalent.springs import SpringGroup
 from tolalloc.rv.reducer.design import Reducer
@@ -92,8 +91,10 @@ class Columns:
     rows_of_stiffness: dict[str, slice]
 
     @cached_property
-    def matrix(self) -> csr_array:
-        """The map as a sparse matrix, [value, column]."""
+    def matrix(self) -> Any:
+        """The map as a sparse matrix, `scipy.sparse.csr_array` of [value, column]."""
+        from scipy.sparse import csr_array
+
         shape = (self.layout.end, len(self.names))
         return csr_array((self.map.factor, (self.map.value, self.map.column)), shape=shape)
 

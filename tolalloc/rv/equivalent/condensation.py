@@ -31,23 +31,23 @@ _ANGLES_AT_ONCE = 512
 
 
 class CondensedAngles(NamedTuple):
-    """What the contact solvers need at each angle. Kept coordinates are lengths, the discs' (x, y, r_d·θ) first.
+    """What the contact solvers need at each angle. Retained coordinates are lengths, the discs' (x, y, r_d·θ) first.
 
     Parameters
     ----------
     stiffness
-        Condensed stiffness of the kept coordinates, one zero eigenvalue [N/m].
+        Condensed stiffness of the retained coordinates, one zero eigenvalue [N/m].
     load
         Force on them per value of the spring rows and, last, per torque [N/m, last N/(N·m)].
-    carrier_by_kept
-        Carrier rotation per kept coordinate [rad/m].
+    carrier_by_retained
+        Carrier rotation per retained coordinate [rad/m].
     carrier_by_load
-        Carrier rotation at fixed kept coordinates per value and, last, per torque [rad/m, last rad/(N·m)].
-    row_by_kept, row_by_load
-        Compression of every bilateral row per kept coordinate; per value and torque [m/m, last m/(N·m)].
+        Carrier rotation at fixed retained coordinates per value and, last, per torque [rad/m, last rad/(N·m)].
+    row_by_retained, row_by_load
+        Compression of every bilateral row per retained coordinate; per value and torque [m/m, last m/(N·m)].
     row_stiffness
         Stiffness of the bilateral rows [N/m].
-    play_by_kept, play_by_load
+    play_by_retained, play_by_load
         Compression x, y of every element with play, as for the rows [m/m].
     play_stiffness
         Stiffness of the elements with play [N/m].
@@ -64,14 +64,14 @@ class CondensedAngles(NamedTuple):
         Cosine and sine of the carrier angle [-].
     """
 
-    stiffness: Float[np.ndarray, "angle kept kept"]
-    load: Float[np.ndarray, "angle load kept"]
-    carrier_by_kept: Float[np.ndarray, "angle kept"]
+    stiffness: Float[np.ndarray, "angle retained retained"]
+    load: Float[np.ndarray, "angle load retained"]
+    carrier_by_retained: Float[np.ndarray, "angle retained"]
     carrier_by_load: Float[np.ndarray, "angle load"]
-    row_by_kept: Float[np.ndarray, "angle row kept"]
+    row_by_retained: Float[np.ndarray, "angle row retained"]
     row_by_load: Float[np.ndarray, "angle row load"]
     row_stiffness: Float[np.ndarray, "angle row"]
-    play_by_kept: Float[np.ndarray, "angle element 2 kept"]
+    play_by_retained: Float[np.ndarray, "angle element 2 retained"]
     play_by_load: Float[np.ndarray, "angle element 2 load"]
     play_stiffness: Float[np.ndarray, "angle element"]
     contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]
@@ -111,7 +111,9 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     return scale
 
 
-def kept_coordinates(reducer: Reducer, coordinates: Coordinates, groups: list[SpringGroup]) -> Int[np.ndarray, " kept"]:
+def retained_coordinates(
+    reducer: Reducer, coordinates: Coordinates, groups: list[SpringGroup]
+) -> Int[np.ndarray, " retained"]:
     """Return the coordinates that pins or elements with play touch, the discs' first."""
     disc = np.arange(coordinates.disc(0), coordinates.disc(reducer.disc_count))
     touched = [np.any(group.displacement != 0.0, axis=(0, 1)) for group in groups if group.contact == "play"]
@@ -174,28 +176,28 @@ def _condense_some(at: Positions) -> CondensedAngles:
     stiffness, load = weighted @ row, -(weighted @ error)
     rotation = coordinates.carrier + 2
     load[:, rotation, -1] = scale[rotation]
-    kept = kept_coordinates(reducer, coordinates, groups)
-    rest = np.setdiff1d(np.arange(size), kept)
-    # Displacement of all coordinates per kept coordinate and per load, the kept ones fixed.
-    by_kept, by_load = np.zeros((angles, size, kept.size)), np.zeros((angles, size, loads))
-    by_kept[:, kept] = np.eye(kept.size)
+    retained = retained_coordinates(reducer, coordinates, groups)
+    rest = np.setdiff1d(np.arange(size), retained)
+    # Displacement of all coordinates per retained coordinate and per load, the retained ones fixed.
+    by_retained, by_load = np.zeros((angles, size, retained.size)), np.zeros((angles, size, loads))
+    by_retained[:, retained] = np.eye(retained.size)
     solved = np.linalg.solve(
         stiffness[:, rest[:, np.newaxis], rest],
-        np.concatenate([-stiffness[:, rest[:, np.newaxis], kept], load[:, rest]], axis=2),
+        np.concatenate([-stiffness[:, rest[:, np.newaxis], retained], load[:, rest]], axis=2),
     )
-    by_kept[:, rest], by_load[:, rest] = solved[..., : kept.size], solved[..., kept.size :]
-    condensed = stiffness[:, kept] @ by_kept
+    by_retained[:, rest], by_load[:, rest] = solved[..., : retained.size], solved[..., retained.size :]
+    condensed = stiffness[:, retained] @ by_retained
     moved, disturbed, play_stiffness = _elements(groups, scale, angles, loads)
     lever = np.array([1.0, 1.0, 1 / reducer.cycloid_stage.disc_pitch_radius])[:, np.newaxis]
     return CondensedAngles(
         stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
-        load=np.swapaxes(load[:, kept] - stiffness[:, kept] @ by_load, 1, 2),
-        carrier_by_kept=by_kept[:, rotation] * scale[rotation],
+        load=np.swapaxes(load[:, retained] - stiffness[:, retained] @ by_load, 1, 2),
+        carrier_by_retained=by_retained[:, rotation] * scale[rotation],
         carrier_by_load=by_load[:, rotation] * scale[rotation],
-        row_by_kept=row @ by_kept,
+        row_by_retained=row @ by_retained,
         row_by_load=row @ by_load + error,
         row_stiffness=row_stiffness,
-        play_by_kept=moved @ by_kept[:, np.newaxis],
+        play_by_retained=moved @ by_retained[:, np.newaxis],
         play_by_load=moved @ by_load[:, np.newaxis] + disturbed,
         play_stiffness=play_stiffness,
         contact_by_disc=contact.by_disc * lever,

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
+from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel

@@ -16,14 +16,14 @@ from tolalloc.rv.equivalent.answers import Derivatives, Equilibria, Extremes
 from tolalloc.rv.equivalent.columns import Columns
 from tolalloc.rv.equivalent.condensation import CondensedAngles, condense, error_columns
 from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.equivalent.solvers.adjoint import (
-    Derivative,
-    solve_peak_to_peak_derivatives,
-    solve_rotation_derivatives,
+from tolalloc.rv.equivalent.solvers.records import (
+    CONVERGED,
+    SolvedDerivatives,
+    SolvedExtremes,
+    SolvedTurn,
+    SolverDesign,
+    design_of,
 )
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED
-from tolalloc.rv.equivalent.solvers.extremes import Found, solve_extremes
-from tolalloc.rv.equivalent.solvers.turn import Design, Turn, design_of, solve_curves, tile_size
 from tolalloc.rv.reducer.design import Reducer
 
 
@@ -31,7 +31,8 @@ from tolalloc.rv.reducer.design import Reducer
 class EquivalentModel:
     """Equivalent spring model of one reducer, liu2020 equations (1)–(14).
 
-    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed.
+    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed. The compiled solvers
+    are imported where they solve, because many commands only ask for the names of the columns.
 
     Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
     rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
@@ -76,7 +77,7 @@ class EquivalentModel:
         return self.error_columns.names
 
     @property
-    def design(self) -> Design:
+    def design(self) -> SolverDesign:
         """The reducer as the solvers take it."""
         return design_of(self.reducer)
 
@@ -112,9 +113,11 @@ class EquivalentModel:
         carrier_angle: Float[np.ndarray, " angle"] | None = None,
     ) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles."""
+        from tolalloc.rv.equivalent.solvers.turn import solve_curves, tile_size
+
         angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
         shape = (errors.shape[0], angle.size)
-        turn = Turn(
+        turn = SolvedTurn(
             np.empty(shape),
             np.empty((*shape, tables.load.shape[2])),
             np.empty(shape, np.uint8),
@@ -131,7 +134,7 @@ class EquivalentModel:
             torque=torque,
             carrier_angle=angle,
             transmission_error=turn.rotation,
-            kept=turn.kept,
+            retained=turn.retained,
             status=turn.status,
             residual=turn.residual,
             pins_in_contact=turn.touching,
@@ -139,8 +142,11 @@ class EquivalentModel:
 
     def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
         """Return the refined extremes of every sample over one output turn."""
+        from tolalloc.rv.equivalent.solvers.extremes import solve_extremes
+        from tolalloc.rv.equivalent.solvers.turn import tile_size
+
         samples, halving = errors.shape[0], self.search.halving
-        found = Found(
+        found = SolvedExtremes(
             np.empty((samples, 2)),
             np.empty((samples, 2)),
             np.empty(samples),
@@ -169,6 +175,8 @@ class EquivalentModel:
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
         is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
         """
+        from tolalloc.rv.equivalent.solvers.adjoint import solve_peak_to_peak_derivatives
+
         extremes, halving = self.extremes(errors, torque), self.search.halving
         derivative = self._derivative(errors.shape[0])
         derivative.status[:] = extremes.status
@@ -190,6 +198,8 @@ class EquivalentModel:
 
         They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
         """
+        from tolalloc.rv.equivalent.solvers.adjoint import solve_rotation_derivatives
+
         if carrier_angle is None:
             halving, tables = self.search.halving, self._tables
             position = halving.first + halving.stride * np.arange(float(halving.coarse))
@@ -205,9 +215,9 @@ class EquivalentModel:
         """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""
         return self.tables_at(carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)])
 
-    def _derivative(self, items: int) -> Derivative:
+    def _derivative(self, items: int) -> SolvedDerivatives:
         rows = max(rows.stop for rows in self.error_columns.rows_of_stiffness.values())
-        return Derivative(
+        return SolvedDerivatives(
             np.empty(items),
             np.empty((items, self.error_columns.layout.end)),
             np.empty((items, rows)),
@@ -215,7 +225,7 @@ class EquivalentModel:
             np.empty(items, np.uint8),
         )
 
-    def _derivatives(self, derivative: Derivative) -> Derivatives:
+    def _derivatives(self, derivative: SolvedDerivatives) -> Derivatives:
         """Return the derivatives by columns and by named stiffnesses."""
         columns = self.error_columns
         stiffness = self.reducer.stiffness

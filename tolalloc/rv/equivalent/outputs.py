@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from tolalloc.rv.equivalent.answers import Equilibria
-from tolalloc.rv.equivalent.solvers.forces import Forced, solve_forces
-from tolalloc.rv.equivalent.solvers.turn import design_of
+from tolalloc.rv.equivalent.solvers.records import SolvedForces, design_of
 from tolalloc.units import ARCSECOND
 
 SINGLE = ("gear_mesh",)
@@ -56,6 +55,8 @@ def forces(equilibria: Equilibria) -> Forces:
     Stiffness times compression of every row, theory page equation (5); pins by their law, equations (30) and (31),
     elements with play by equation (28).
     """
+    from tolalloc.rv.equivalent.solvers.turn import solve_forces
+
     tables, columns = equilibria.tables, equilibria.columns
     shape = equilibria.status.shape
     pins = np.empty((*shape, tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]))
@@ -69,8 +70,8 @@ def forces(equilibria: Equilibria) -> Forces:
         np.ascontiguousarray(equilibria.errors),
         equilibria.torque,
         equilibria.status,
-        equilibria.kept,
-        Forced(pins, rows, elements),
+        equilibria.retained,
+        SolvedForces(pins, rows, elements),
     )
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Integer
 
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_CONVERGED, NOT_FINITE, NOT_RESISTED
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_FINITE, NOT_RESISTED
 
 
 class Status(IntEnum):

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.contact_stiffness import contact_stiffness
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS
+from tolalloc.rv.cycloid.solvers import LAWS
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh

@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.compiled import jit
-
-LINEAR, LOGARITHMIC = 0, 1
-LAWS = {"constant": LINEAR, "table2": LINEAR, "logarithmic": LOGARITHMIC}
-"""Law of each `Stiffness.pin_contact_law`; the linear ones differ in their stiffness along the tooth only."""
+from tolalloc.rv.cycloid.solvers import LINEAR
 
 _STIFFEST = 2.0  # ln(cλ/F) at which the logarithmic law goes on straight: a force that no part carries
 

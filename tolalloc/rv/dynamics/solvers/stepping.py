@@ -15,13 +15,14 @@ from jaxtyping import Float, Int, UInt8, UInt16
 
 from tolalloc.compiled import jit, parallel_jit, prange
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE, equilibrium
+from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import Problem, along, compress, make_work, play_force
 from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sample_constants, values_of
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 
 
 class Scheme(NamedTuple):
-    """The integrator with its step, as `tolalloc.rv.dynamics.integrator.Integrator` has them [-, s]."""
+    """The integrator with its step, as `tolalloc.rv.dynamics.properties.Integrator` has them [-, s]."""
 
     alpha_m: float
     alpha_f: float
@@ -37,7 +38,7 @@ class Parts(NamedTuple):
     ----------
     mass
         Of every coordinate [kg].
-    kept
+    retained
         Which coordinates pins and play touch [-].
     carrier
         Which coordinate is the carrier's rotation [-].
@@ -50,7 +51,7 @@ class Parts(NamedTuple):
     """
 
     mass: Float[np.ndarray, " coordinate"]
-    kept: Int[np.ndarray, " kept"]
+    retained: Int[np.ndarray, " retained"]
     carrier: int
     carrier_scale: float
     played_meshes: int
@@ -67,7 +68,7 @@ class State(NamedTuple):
     status: UInt8[np.ndarray, " sample"]
 
 
-class Record(NamedTuple):
+class StepRecord(NamedTuple):
     """What the steps leave, filled in by `advance`.
 
     Parameters
@@ -127,13 +128,13 @@ def _unbalance(at, tables, mass, x, v, acceleration, force):
 
 @jit
 def _problem(at, angles, tables, parts, layout, face_width, values, x, force, own, moved):
-    """Return the step's problem in the displacement of the kept coordinates beyond the predicted ones x."""
-    by_kept = tables.by_kept[at]
-    for m in range(parts.kept.size):
-        own.force[m], moved.position[m] = 0.0, x[parts.kept[m]]
+    """Return the step's problem in the displacement of the retained coordinates beyond the predicted ones x."""
+    by_retained = tables.by_retained[at]
+    for m in range(parts.retained.size):
+        own.force[m], moved.position[m] = 0.0, x[parts.retained[m]]
         for i in range(x.size):
-            own.force[m] += by_kept[i, m] * force[i]
-    along(angles.contact_by_disc[at], angles.play_by_kept[at], moved.position, moved.compression, moved.play)
+            own.force[m] += by_retained[i, m] * force[i]
+    along(angles.contact_by_disc[at], angles.play_by_retained[at], moved.position, moved.compression, moved.play)
     own.undisturbed[:] += moved.compression
     own.play_offset[:] += moved.play
     problem = Problem(
@@ -145,7 +146,7 @@ def _problem(at, angles, tables, parts, layout, face_width, values, x, force, ow
         angles.contact_stiffness[at],
         angles.contact_log_length[at],
         own.half_tilt,
-        angles.play_by_kept[at],
+        angles.play_by_retained[at],
         own.play_offset,
         angles.play_stiffness[at],
         own.clearance,
@@ -155,21 +156,21 @@ def _problem(at, angles, tables, parts, layout, face_width, values, x, force, ow
 
 
 class Moved(NamedTuple):
-    """Work space: predicted kept coordinates [m] and what they compress [m]."""
+    """Work space: predicted retained coordinates [m] and what they compress [m]."""
 
-    position: Float[np.ndarray, " kept"]
+    position: Float[np.ndarray, " retained"]
     compression: Float[np.ndarray, " contact"]
     play: Float[np.ndarray, "element 2"]
 
 
 @jit
 def _correct(at, tables, q, force, x, v, acceleration, algorithmic):
-    """Add to the predicted state the displacement q of the kept coordinates and what follows from it."""
+    """Add to the predicted state the displacement q of the retained coordinates and what follows from it."""
     rates = tables.rates[at]
     for i in range(x.size):
         change = 0.0
         for m in range(q.size):
-            change += tables.by_kept[at, i, m] * q[m]
+            change += tables.by_retained[at, i, m] * q[m]
         for j in range(x.size):
             change += tables.flexibility[at, i, j] * force[j]
         x[i] += change
@@ -219,24 +220,24 @@ def _advance_sample(s, first, angles, tables, parts, scheme, layout, mapped, des
         state.status[s] = NOT_FINITE
     own, pins = make_problem(design.law, angles), layout.pins
     contacts, elements = angles.contact_stiffness.shape[1], angles.play_stiffness.shape[1]
-    work = make_work(parts.kept.size, contacts, elements)
-    moved = Moved(np.empty(parts.kept.size), np.empty(contacts), np.empty((elements, 2)))
+    work = make_work(parts.retained.size, contacts, elements)
+    moved = Moved(np.empty(parts.retained.size), np.empty(contacts), np.empty((elements, 2)))
     x, v = state.coordinate[s], state.velocity[s]
     acceleration, algorithmic = state.acceleration[s], state.algorithmic[s]
-    q, force, carrier = np.empty(parts.kept.size), np.empty(x.size), parts.carrier
+    q, force, carrier = np.empty(parts.retained.size), np.empty(x.size), parts.carrier
     for at in range(tables.torque.size):
         time, ratio = first + at, 0.0
         if state.status[s] == CONVERGED:
             values[0, layout.torque] = tables.torque[at]
             for m in range(q.size):
-                q[m] = x[parts.kept[m]]  # where the step is looked for first: where the last one ended
+                q[m] = x[parts.retained[m]]  # where the step is looked for first: where the last one ended
             if time > 0:
                 _predict(scheme, x, v, acceleration, algorithmic)
             else:  # at the start springs and torque are in balance, so all parts but stay behind the nominal motion
                 acceleration[:] = -tables.acceleration[0]
                 algorithmic[:] = acceleration
             for m in range(q.size):
-                q[m] -= x[parts.kept[m]]
+                q[m] -= x[parts.retained[m]]
             fill_loads(at, angles, layout, values[0], force, own.undisturbed, own.play_offset)
             _unbalance(at, tables, parts.mass, x, v, acceleration, force)
             problem = _problem(at, angles, tables, parts, layout, design.face_width, values[0], x, force, own, moved)

@@ -10,49 +10,23 @@ other's slope. Where the extreme is smooth both slopes vanish alike and the mean
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from jaxtyping import Float, UInt8
 
 from tolalloc.compiled import jit, parallel_jit, prange
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE, solve_tangent
+from tolalloc.rv.equivalent.solvers.contact_solver import solve_tangent
 from tolalloc.rv.equivalent.solvers.energy import assemble, compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import interpolation, make_memory, solve_between
 from tolalloc.rv.equivalent.solvers.problem import values_of
-
-
-class Derivative(NamedTuple):
-    """Derivatives, filled in by the solvers.
-
-    Parameters
-    ----------
-    rotation
-        What is derived: the carrier rotation, for a peak-to-peak the weighted branches together [rad].
-    by_value
-        By every value of `tolalloc.rv.equivalent.columns.Layout` [rad/m, rad/(N·m), rad/rad].
-    by_row
-        By the stiffness of every bilateral row, then of every element with play [rad/(N/m)].
-    by_pin
-        By the relative change of all pin contact stiffnesses together [rad].
-    status
-        Worst outcome of the equilibria [-].
-    """
-
-    rotation: Float[np.ndarray, " sample"]
-    by_value: Float[np.ndarray, "sample value"]
-    by_row: Float[np.ndarray, "sample row"]
-    by_pin: Float[np.ndarray, " sample"]
-    status: UInt8[np.ndarray, " sample"]
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 
 
 @jit
-def _adjoint(problem, work, carrier_by_kept, q, adjoint):
+def _adjoint(problem, work, carrier_by_retained, q, adjoint):
     """Solve tangent·λ = carrier row at the equilibrium q; the compressions stay in the work space."""
     compress(problem, q, work.compression, work.play)
     assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
-    solve_tangent(work.tangent, -carrier_by_kept, adjoint)
+    solve_tangent(work.tangent, -carrier_by_retained, adjoint)
 
 
 @jit
@@ -124,13 +98,13 @@ def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_pla
             value += play_pull[e, 1] * tables.play_by_load[at, e, 1, m]
         out[m] += weight * value
     for r in range(rows):
-        # A row's adjoint compression: through the kept coordinates and, at the torque's place, through the others.
+        # A row's adjoint compression: through the retained coordinates and, at the torque's place, through the others.
         compression, lever = 0.0, tables.row_by_load[at, r, layout.torque]
         for m in range(layout.torque + 1):
             compression += tables.row_by_load[at, r, m] * values[m]
         for i in range(q.size):
-            compression += tables.row_by_kept[at, r, i] * q[i]
-            lever += tables.row_by_kept[at, r, i] * adjoint[i]
+            compression += tables.row_by_retained[at, r, i] * q[i]
+            lever += tables.row_by_retained[at, r, i] * adjoint[i]
         by_row[r] -= weight * lever * compression
     for e in range(elements):
         by_row[rows + e] += weight * own_play[e]
@@ -139,13 +113,13 @@ def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_pla
 @jit
 def _add_derivative(position, factor, tables, layout, design, values, memory, derivative, s):
     """Add factor times the derivatives of the carrier rotation at one position; return the equilibrium's status."""
-    problem, work, _, carrier_by_kept = memory
+    problem, work, _, carrier_by_retained = memory
     q, adjoint = np.zeros(work.step.size), np.empty(work.step.size)
     rotation, status, _, _ = solve_between(position, tables, layout, design.face_width, values, q, memory)
     if status != CONVERGED:
         return status
     derivative.rotation[s] += factor * rotation
-    _adjoint(problem, work, carrier_by_kept, q, adjoint)
+    _adjoint(problem, work, carrier_by_retained, q, adjoint)
     weight_of_pin, tilt_by_pin = np.empty(problem.contact.size), np.empty(problem.contact.size)
     derivative.by_pin[s] += factor * _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin)
     elements = problem.clearance.size
@@ -154,8 +128,8 @@ def _add_derivative(position, factor, tables, layout, design, values, memory, de
         x, y, stiffness, free = work.play[e, 0], work.play[e, 1], problem.play_stiffness[e], problem.clearance[e]
         ax, ay = 0.0, 0.0
         for i in range(q.size):
-            ax += problem.play_by_kept[e, 0, i] * adjoint[i]
-            ay += problem.play_by_kept[e, 1, i] * adjoint[i]
+            ax += problem.play_by_retained[e, 0, i] * adjoint[i]
+            ay += problem.play_by_retained[e, 1, i] * adjoint[i]
         fx, fy, xx, xy, yy = play_force(stiffness, free, x, y)
         play_pull[e, 0], play_pull[e, 1] = -(xx * ax + xy * ay), -(xy * ax + yy * ay)
         own_play[e] = -(fx * ax + fy * ay) / stiffness

@@ -14,10 +14,10 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.compiled import jit
-from tolalloc.rv.cycloid.solvers.contact_law import LINEAR, pin_force
+from tolalloc.rv.cycloid.solvers import LINEAR
+from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import Problem, along, assemble, compress, play_force
-
-CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_RESISTED
 
 TOLERANCE = 1e-11  # of the largest force
 _PROMISED = 1e-9  # the same where a bearing that just touches keeps the steps from settling
@@ -152,7 +152,7 @@ def _newton(problem, q, work):
             least, least_touching = ratio, touching
             work.best[:] = q
         replaced = solve_tangent(work.tangent, work.gradient, work.step)
-        along(problem.by_disc, problem.play_by_kept, work.step, work.rate, work.play_rate)
+        along(problem.by_disc, problem.play_by_retained, work.step, work.rate, work.play_rate)
         changed = work.play.shape[0] > 0 or problem.law != LINEAR
         for c in range(work.compression.size):
             changed |= (work.compression[c] > 0.0) != (work.compression[c] + work.rate[c] > 0.0)
@@ -182,7 +182,7 @@ def _softened(problem, factor):
         problem.contact,
         problem.log_length,
         problem.half_tilt,
-        problem.play_by_kept,
+        problem.play_by_retained,
         problem.play_offset,
         factor * problem.play_stiffness,
         problem.clearance,

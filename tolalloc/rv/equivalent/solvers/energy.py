@@ -12,33 +12,33 @@ from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 
 
 class Problem(NamedTuple):
-    """One sample at one angle, in the kept coordinates; the discs' come first.
+    """One sample at one angle, in the retained coordinates; the discs' come first.
 
     Parameters
     ----------
     law
-        `tolalloc.rv.cycloid.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
+        One of `tolalloc.rv.cycloid.solvers.LAWS` [-].
     stiffness, force
         S [N/m] and f [N].
     by_disc, undisturbed
         D [m/m] and compression h at undisplaced discs [m].
     contact, log_length, half_tilt
         Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m].
-    play_by_kept, play_offset
+    play_by_retained, play_offset
         Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m].
     play_stiffness, clearance
         Stiffness [N/m] and clearance [m] of every element with play.
     """
 
     law: int
-    stiffness: Float[np.ndarray, "kept kept"]
-    force: Float[np.ndarray, " kept"]
+    stiffness: Float[np.ndarray, "retained retained"]
+    force: Float[np.ndarray, " retained"]
     by_disc: Float[np.ndarray, "disc 3 pin"]
     undisturbed: Float[np.ndarray, " contact"]
     contact: Float[np.ndarray, " contact"]
     log_length: Float[np.ndarray, " contact"]
     half_tilt: Float[np.ndarray, " contact"]
-    play_by_kept: Float[np.ndarray, "element 2 kept"]
+    play_by_retained: Float[np.ndarray, "element 2 retained"]
     play_offset: Float[np.ndarray, "element 2"]
     play_stiffness: Float[np.ndarray, " element"]
     clearance: Float[np.ndarray, " element"]
@@ -51,46 +51,46 @@ class Work(NamedTuple):
     rate: Float[np.ndarray, " contact"]
     play: Float[np.ndarray, "element 2"]
     play_rate: Float[np.ndarray, "element 2"]
-    gradient: Float[np.ndarray, " kept"]
-    step: Float[np.ndarray, " kept"]
-    tangent: Float[np.ndarray, "kept kept"]
-    best: Float[np.ndarray, " kept"]
+    gradient: Float[np.ndarray, " retained"]
+    step: Float[np.ndarray, " retained"]
+    tangent: Float[np.ndarray, "retained retained"]
+    best: Float[np.ndarray, " retained"]
 
 
 @jit
-def make_work(kept, contacts, elements):
+def make_work(retained, contacts, elements):
     """Return a new work space."""
     return Work(
         np.empty(contacts),
         np.empty(contacts),
         np.empty((elements, 2)),
         np.empty((elements, 2)),
-        np.empty(kept),
-        np.empty(kept),
-        np.empty((kept, kept)),
-        np.empty(kept),
+        np.empty(retained),
+        np.empty(retained),
+        np.empty((retained, retained)),
+        np.empty(retained),
     )
 
 
 @jit
-def along(by_disc, play_by_kept, vector, compression, play):
+def along(by_disc, play_by_retained, vector, compression, play):
     """Set the compressions of pins and elements that a displacement gives."""
     discs, _, pins = by_disc.shape
     for d in range(discs):
         x, y, turn = vector[3 * d], vector[3 * d + 1], vector[3 * d + 2]
         for k in range(pins):
             compression[d * pins + k] = by_disc[d, 0, k] * x + by_disc[d, 1, k] * y + by_disc[d, 2, k] * turn
-    for e in range(play_by_kept.shape[0]):
+    for e in range(play_by_retained.shape[0]):
         for i in range(2):
             play[e, i] = 0.0
             for j in range(vector.size):
-                play[e, i] += play_by_kept[e, i, j] * vector[j]
+                play[e, i] += play_by_retained[e, i, j] * vector[j]
 
 
 @jit
 def compress(problem, q, compression, play):
     """Set the compressions of pins and elements with play at the coordinates q."""
-    along(problem.by_disc, problem.play_by_kept, q, compression, play)
+    along(problem.by_disc, problem.play_by_retained, q, compression, play)
     for k in range(compression.size):
         compression[k] += problem.undisturbed[k]
     for e in range(play.shape[0]):
@@ -143,9 +143,9 @@ def assemble(problem, compression, play, q, gradient, tangent):
         fx, fy, xx, xy, yy = play_force(problem.play_stiffness[e], problem.clearance[e], play[e, 0], play[e, 1])
         largest = max(largest, np.sqrt(fx * fx + fy * fy))
         for i in range(size):
-            ax, ay = problem.play_by_kept[e, 0, i], problem.play_by_kept[e, 1, i]
+            ax, ay = problem.play_by_retained[e, 0, i], problem.play_by_retained[e, 1, i]
             gradient[i] += fx * ax + fy * ay
             for j in range(i + 1):
-                bx, by = problem.play_by_kept[e, 0, j], problem.play_by_kept[e, 1, j]
+                bx, by = problem.play_by_retained[e, 0, j], problem.play_by_retained[e, 1, j]
                 tangent[i, j] += ax * (xx * bx + xy * by) + ay * (xy * bx + yy * by)
     return largest, cancelling, touching

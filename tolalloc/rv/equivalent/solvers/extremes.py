@@ -6,65 +6,13 @@ halving the step around the candidates and not by a parabola.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from jaxtyping import Float, Int, UInt8
 
 from tolalloc.compiled import jit, parallel_jit, prange
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory, solve_anywhere
 from tolalloc.rv.equivalent.solvers.problem import values_of
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile
-
-
-class Halving(NamedTuple):
-    """How the extremes are searched among the nodes of the tables.
-
-    Parameters
-    ----------
-    first
-        Node of the turn's first angle; as many nodes stand before it and behind the turn [-].
-    stride
-        Nodes per coarse angle [-].
-    coarse
-        Coarse angles of the turn [-].
-    levels
-        Halvings of the coarse step [-].
-    safety
-        A candidate is followed while this many times its flank's rise could make it the extreme [-].
-    """
-
-    first: int
-    stride: int
-    coarse: int
-    levels: int
-    safety: float
-
-
-class Found(NamedTuple):
-    """Extremes of samples, filled in by `solve_extremes`.
-
-    Parameters
-    ----------
-    extreme
-        Largest and smallest carrier rotation [rad].
-    position
-        Where they are, counted in nodes [-].
-    left_over
-        What finer angles may add to their difference [rad].
-    solves
-        Equilibria solved [-].
-    status, residual
-        Worst outcome, and largest residual over the largest force [-].
-    """
-
-    extreme: Float[np.ndarray, "sample 2"]
-    position: Float[np.ndarray, "sample 2"]
-    left_over: Float[np.ndarray, " sample"]
-    solves: Int[np.ndarray, " sample"]
-    status: UInt8[np.ndarray, " sample"]
-    residual: Float[np.ndarray, " sample"]
 
 
 @jit
@@ -74,22 +22,22 @@ def _gain(left, centre, right):
 
 
 @jit
-def _refine(sign, rotation, kept, halving, tables, layout, design, values, memory):
+def _refine(sign, rotation, retained, halving, tables, layout, design, values, memory):
     """Return the largest sign·rotation, its position, the error that may be left, solves, and the worst outcome.
 
-    ``rotation`` and ``kept`` begin and end one coarse angle outside the turn, so that every angle has two neighbours
-    of its own, also where the ratio leaves the curve not periodic.
+    ``rotation`` and ``retained`` begin and end one coarse angle outside the turn, so that every angle has two
+    neighbours of its own, also where the ratio leaves the curve not periodic.
     """
     inside = sign * rotation[1:-1]
     best_at = inside.argmax()
     best, position = inside[best_at], halving.first + best_at * float(halving.stride)
     left_over, solves, worst_status, worst_residual = 0.0, 0, CONVERGED, 0.0
-    sides, here, at_side = np.empty(2), np.empty(kept.shape[1]), np.empty((2, kept.shape[1]))
+    sides, here, at_side = np.empty(2), np.empty(retained.shape[1]), np.empty((2, retained.shape[1]))
     peaks = np.flatnonzero((inside >= sign * rotation[:-2]) & (inside >= sign * rotation[2:]))
     for i in peaks[np.argsort(-inside[peaks])]:
         left, centre, right = sign * rotation[i], inside[i], sign * rotation[i + 2]
         at, step = halving.first + i * float(halving.stride), float(halving.stride)
-        here[:] = kept[i + 1]
+        here[:] = retained[i + 1]
         for _ in range(halving.levels):
             if centre + halving.safety * _gain(left, centre, right) <= best and centre < best:
                 break
@@ -135,7 +83,7 @@ def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, er
         for side in range(2):
             sign = 1.0 - 2.0 * side
             best, at, left, count, worst_status, worst_residual = _refine(
-                sign, turn.rotation[own], turn.kept[own], halving, tables, layout, design, values[own], memory
+                sign, turn.rotation[own], turn.retained[own], halving, tables, layout, design, values[own], memory
             )
             found.extreme[s, side], found.position[s, side] = sign * best, at
             found.left_over[s] += left

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.compiled import jit
-from tolalloc.rv.cycloid.solvers.contact_law import LINEAR
+from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import make_work
 from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sample_constants, solve_at_node
@@ -29,18 +29,18 @@ class Nodes(NamedTuple):
 
     first: Int[np.ndarray, "2"]
     rotation: Float[np.ndarray, "2 4"]
-    force: Float[np.ndarray, "2 4 kept"]
+    force: Float[np.ndarray, "2 4 retained"]
     undisturbed: Float[np.ndarray, "2 4 contact"]
     play_offset: Float[np.ndarray, "2 4 element 2"]
 
 
 @jit
-def make_nodes(kept, contacts, elements):
+def make_nodes(retained, contacts, elements):
     """Return two empty slots."""
     return Nodes(
         np.full(2, -1),
         np.empty((2, 4)),
-        np.empty((2, 4, kept)),
+        np.empty((2, 4, retained)),
         np.empty((2, 4, contacts)),
         np.empty((2, 4, elements, 2)),
     )
@@ -68,7 +68,7 @@ def blend(table, weights, out):
 
 
 @jit
-def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_kept):
+def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained):
     """Fill ``own`` with the problem between nodes, all tables interpolated; return the rotation at fixed discs."""
     first, weights = interpolation(position)
     slot = first % 2
@@ -92,10 +92,10 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
     blend(tables.contact_stiffness[here], weights, own.contact)
     if own.law != LINEAR:
         blend(tables.contact_log_length[here], weights, own.log_length)
-    blend(tables.play_by_kept[here], weights, own.play_by_kept)
+    blend(tables.play_by_retained[here], weights, own.play_by_retained)
     blend(nodes.play_offset[slot], weights, own.play_offset)
     blend(tables.play_stiffness[here], weights, own.play_stiffness)
-    blend(tables.carrier_by_kept[here], weights, carrier_by_kept)
+    blend(tables.carrier_by_retained[here], weights, carrier_by_retained)
     turn = np.empty(2)
     blend(tables.turn[here], weights, turn)
     sample_constants(own, turn, face_width, layout, values)
@@ -108,11 +108,11 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
 @jit
 def solve_between(position, tables, layout, face_width, values, q, memory):
     """Solve one sample between nodes from the guess q; return rotation, status, residual, pins in contact."""
-    own, work, nodes, carrier_by_kept = memory
-    rotation = problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_kept)
+    own, work, nodes, carrier_by_retained = memory
+    rotation = problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained)
     status, ratio, touching = equilibrium(own, q, work)
     for i in range(q.size):
-        rotation += carrier_by_kept[i] * q[i]
+        rotation += carrier_by_retained[i] * q[i]
     return rotation, status, ratio, touching
 
 
@@ -128,11 +128,11 @@ def solve_anywhere(position, tables, layout, face_width, values, q, memory):
 @jit
 def make_memory(law, tables):
     """Return the memory of one thread: a problem, Newton's work space, loads at nodes, the carrier's row."""
-    kept, contacts = tables.stiffness.shape[1], tables.contact_stiffness.shape[1]
+    retained, contacts = tables.stiffness.shape[1], tables.contact_stiffness.shape[1]
     elements = tables.play_stiffness.shape[1]
     return (
         make_problem(law, tables),
-        make_work(kept, contacts, elements),
-        make_nodes(kept, contacts, elements),
-        np.empty(kept),
+        make_work(retained, contacts, elements),
+        make_nodes(retained, contacts, elements),
+        np.empty(retained),
     )

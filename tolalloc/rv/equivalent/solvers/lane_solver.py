@@ -147,5 +147,5 @@ def solve_tile_at(discs, at, tables, layout, rows, waves, teeth_deviate, used, t
             careful[v + lane] = (bits >> lane) & 1
         total = load(tile.rotation, v)
         for i in range(tile.q.shape[0]):
-            total = fma(spread(tables.carrier_by_kept[at, i]), load(tile.q, i * TILE + v), total)
+            total = fma(spread(tables.carrier_by_retained[at, i]), load(tile.q, i * TILE + v), total)
         store(tile.rotation, v, total)

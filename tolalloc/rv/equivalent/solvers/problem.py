@@ -26,18 +26,18 @@ def values_of(errors, torque, layout, mapped, values):
 @jit
 def make_problem(law, tables):
     """Return a problem with memory of its own, to be filled by `fill_loads` and `blend`."""
-    kept, discs, pins = tables.stiffness.shape[1], tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]
+    retained, discs, pins = tables.stiffness.shape[1], tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]
     elements = tables.play_stiffness.shape[1]
     return Problem(
         law,
-        np.empty((kept, kept)),
-        np.empty(kept),
+        np.empty((retained, retained)),
+        np.empty(retained),
         np.empty((discs, 3, pins)),
         np.empty(discs * pins),
         np.empty(discs * pins),
         np.empty(discs * pins),
         np.zeros(discs * pins),
-        np.empty((elements, 2, kept)),
+        np.empty((elements, 2, retained)),
         np.empty((elements, 2)),
         np.empty(elements),
         np.empty(elements),
@@ -116,7 +116,7 @@ def problem_at_node(at, tables, layout, face_width, values, own):
         tables.contact_stiffness[at],
         tables.contact_log_length[at],
         own.half_tilt,
-        tables.play_by_kept[at],
+        tables.play_by_retained[at],
         own.play_offset,
         tables.play_stiffness[at],
         own.clearance,
@@ -131,5 +131,5 @@ def solve_at_node(at, tables, layout, face_width, values, q, own, work):
     rotation, problem = problem_at_node(at, tables, layout, face_width, values, own)
     status, ratio, touching = equilibrium(problem, q, work)
     for i in range(q.size):
-        rotation += tables.carrier_by_kept[at, i] * q[i]
+        rotation += tables.carrier_by_retained[at, i] * q[i]
     return rotation, status, ratio, touching

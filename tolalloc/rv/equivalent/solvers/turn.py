@@ -1,4 +1,4 @@
-"""All samples over a turn of angles: tiles of samples in parallel, each from its own last angle's equilibrium.
+"""All samples over a turn: tiles of samples in parallel, each from its own last angle's equilibrium; their forces.
 
 Pins on linear springs without play go eight samples to a register; whatever needs more care goes one by one. Which way
 a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
@@ -6,67 +6,25 @@ a sample goes depends on itself alone, so its bits do not depend on the tile tha
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from jaxtyping import Float, UInt8, UInt16
 
 from tolalloc.compiled import jit, parallel_jit, prange, thread_count
-from tolalloc.rv.cycloid.solvers.contact_law import LAWS, LINEAR
-from tolalloc.rv.equivalent.solvers.contact_solver import CONVERGED, NOT_FINITE
+from tolalloc.rv.cycloid.solvers import LINEAR
+from tolalloc.rv.cycloid.solvers.contact_law import pin_force
+from tolalloc.rv.equivalent.solvers.energy import compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
-from tolalloc.rv.equivalent.solvers.problem import solve_at_node, values_of
+from tolalloc.rv.equivalent.solvers.problem import problem_at_node, solve_at_node, values_of
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
 from tolalloc.rv.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
-from tolalloc.rv.reducer.design import Reducer
-
-
-class Design(NamedTuple):
-    """What a reducer is to the solvers, next to its tables.
-
-    Parameters
-    ----------
-    law
-        `tolalloc.rv.cycloid.solvers.contact_law.LINEAR` or `LOGARITHMIC` [-].
-    face_width
-        Loaded width of a disc [m].
-    """
-
-    law: int
-    face_width: float
-
-
-def design_of(reducer: Reducer) -> Design:
-    """Return a reducer as the solvers take it."""
-    return Design(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
-
-
-class Turn(NamedTuple):
-    """Equilibria of samples over angles, filled in by the solvers.
-
-    Parameters
-    ----------
-    rotation
-        Carrier rotation [rad].
-    kept
-        Kept coordinates at equilibrium [m].
-    status, residual, touching
-        Outcome, residual over the largest force, pins in contact [-].
-    """
-
-    rotation: Float[np.ndarray, "sample angle"]
-    kept: Float[np.ndarray, "sample angle coordinate"]
-    status: UInt8[np.ndarray, "sample angle"]
-    residual: Float[np.ndarray, "sample angle"]
-    touching: UInt16[np.ndarray, "sample angle"]
 
 
 @jit
-def make_turn(samples, angles, kept):
+def make_turn(samples, angles, retained):
     """Return an empty turn."""
-    return Turn(
+    return SolvedTurn(
         np.empty((samples, angles)),
-        np.empty((samples, angles, kept)),
+        np.empty((samples, angles, retained)),
         np.empty((samples, angles), np.uint8),
         np.empty((samples, angles)),
         np.empty((samples, angles), np.uint16),
@@ -76,7 +34,7 @@ def make_turn(samples, angles, kept):
 @jit
 def _give_up(turn, s):
     turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
-    turn.kept[s] = np.nan
+    turn.retained[s] = np.nan
 
 
 @jit
@@ -86,7 +44,7 @@ def _one_by_one(first, stride, tables, layout, design, values, finite, memory, t
         if not finite[s]:
             _give_up(turn, s)
             continue
-        guess = np.zeros(turn.kept.shape[2])
+        guess = np.zeros(turn.retained.shape[2])
         for angle in range(turn.rotation.shape[1]):
             _alone(s, angle, first + angle * stride, tables, layout, design, values, guess, memory, turn)
 
@@ -99,7 +57,7 @@ def _alone(s, angle, at, tables, layout, design, values, guess, memory, turn):
     )
     turn.rotation[s, angle], turn.status[s, angle] = rotation, status
     turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
-    turn.kept[s, angle] = guess
+    turn.retained[s, angle] = guess
     if status != CONVERGED:
         guess[:] = 0.0
 
@@ -123,7 +81,7 @@ def _fill_tile(layout, values, finite, used, tile, tilted):
 @jit
 def _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn):
     """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
-    samples, size, contacts = values.shape[0], turn.kept.shape[2], tables.contact_stiffness.shape[1]
+    samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
     used = (samples + FOUR - 1) // FOUR * FOUR
     tile, careful, tilted = make_tile(layout, size, contacts), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
     _fill_tile(layout, values, finite, used, tile, tilted)
@@ -137,7 +95,7 @@ def _side_by_side(discs, first, stride, tables, layout, design, values, finite, 
             turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
             turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
             for i in range(size):
-                turn.kept[s, angle, i] = tile.q[i, s]
+                turn.retained[s, angle, i] = tile.q[i, s]
             if finite[s] and (careful[s] or tilted[s]):
                 guess[:] = tile.last[:, s]
                 _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
@@ -164,7 +122,7 @@ def _curves_of_tile(number, size, discs, first, stride, tables, layout, mapped, 
     a, b = number * size, min((number + 1) * size, errors.shape[0])
     values = np.empty((b - a, layout.end))
     finite = values_of(errors[a:b], torque, layout, mapped, values)
-    part = Turn(turn.rotation[a:b], turn.kept[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
+    part = SolvedTurn(turn.rotation[a:b], turn.retained[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
     solve_tile(discs, first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
 
 
@@ -179,3 +137,45 @@ def solve_curves(size, discs, first, stride, tables, layout, mapped, design, err
         _curves_of_tile(
             np.int64(number), size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn
         )
+
+
+@jit
+def _forces_of_sample(s, tables, layout, mapped, design, errors, torque, turn_status, turn_retained, out):
+    status, retained = turn_status[s], turn_retained[s]
+    pins, rows, elements = out.pins[s], out.rows[s], out.elements[s]
+    own = np.empty((1, layout.end))
+    values_of(errors[s : s + 1], torque, layout, mapped, own)
+    values = own[0]
+    memory = make_memory(design.law, tables)
+    problem_memory, work = memory[0], memory[1]
+    discs, count = pins.shape[1:]
+    for at in range(status.size):
+        if status[at] != CONVERGED:
+            pins[at], rows[at], elements[at] = np.nan, np.nan, np.nan
+            continue
+        _, problem = problem_at_node(at, tables, layout, design.face_width, values, problem_memory)
+        compress(problem, retained[at], work.compression, work.play)
+        for d in range(discs):
+            for k in range(count):
+                c = d * count + k
+                pins[at, d, k], _ = pin_force(
+                    problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
+                )
+        for e in range(elements.shape[1]):
+            elements[at, e, 0], elements[at, e, 1], _, _, _ = play_force(
+                problem.play_stiffness[e], problem.clearance[e], work.play[e, 0], work.play[e, 1]
+            )
+        for row in range(rows.shape[1]):
+            compression = 0.0
+            for i in range(retained.shape[1]):
+                compression += tables.row_by_retained[at, row, i] * retained[at, i]
+            for m in range(layout.torque + 1):
+                compression += tables.row_by_load[at, row, m] * values[m]
+            rows[at, row] = tables.row_stiffness[at, row] * compression
+
+
+@parallel_jit
+def solve_forces(tables, layout, mapped, design, errors, torque, status, retained, out):
+    """Fill the forces of all samples at all nodes of the tables."""
+    for s in prange(errors.shape[0]):
+        _forces_of_sample(np.int64(s), tables, layout, mapped, design, errors, torque, status, retained, out)

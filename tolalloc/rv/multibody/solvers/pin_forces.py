@@ -28,7 +28,7 @@ class Mesh(NamedTuple):
     radius
         Their radii, [pin] [m].
     law
-        One of `tolalloc.rv.cycloid.solvers.contact_law.LAWS` [-].
+        One of `tolalloc.rv.cycloid.solvers.LAWS` [-].
     stiffness, log_length
         What its contacts take at equally spaced angles of a pin from the crank direction, 0 to π [N/m, -].
     """

@@ -1,0 +1,135 @@
+"""What goes between the model and its compiled solvers: settings in, arrays to fill; nothing here is compiled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+
+from tolalloc.rv.cycloid.solvers import LAWS
+from tolalloc.rv.reducer.design import Reducer
+
+CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
+"""How an equilibrium ended; `tolalloc.rv.equivalent.status.Status` has the words."""
+
+
+class SolverDesign(NamedTuple):
+    """What a reducer is to the solvers, next to its tables.
+
+    Parameters
+    ----------
+    law
+        `tolalloc.rv.cycloid.solvers.LAWS` [-].
+    face_width
+        Loaded width of a disc [m].
+    """
+
+    law: int
+    face_width: float
+
+
+def design_of(reducer: Reducer) -> SolverDesign:
+    """Return a reducer as the solvers take it."""
+    return SolverDesign(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
+
+
+class Halving(NamedTuple):
+    """How the extremes are searched among the nodes of the tables.
+
+    Parameters
+    ----------
+    first
+        Node of the turn's first angle; as many nodes stand before it and behind the turn [-].
+    stride
+        Nodes per coarse angle [-].
+    coarse
+        Coarse angles of the turn [-].
+    levels
+        Halvings of the coarse step [-].
+    safety
+        A candidate is followed while this many times its flank's rise could make it the extreme [-].
+    """
+
+    first: int
+    stride: int
+    coarse: int
+    levels: int
+    safety: float
+
+
+class SolvedTurn(NamedTuple):
+    """Equilibria of samples over angles, filled in by the solvers.
+
+    Parameters
+    ----------
+    rotation
+        Carrier rotation [rad].
+    retained
+        Retained coordinates at equilibrium [m].
+    status, residual, touching
+        Outcome, residual over the largest force, pins in contact [-].
+    """
+
+    rotation: Float[np.ndarray, "sample angle"]
+    retained: Float[np.ndarray, "sample angle coordinate"]
+    status: UInt8[np.ndarray, "sample angle"]
+    residual: Float[np.ndarray, "sample angle"]
+    touching: UInt16[np.ndarray, "sample angle"]
+
+
+class SolvedExtremes(NamedTuple):
+    """Extremes of samples, filled in by `solve_extremes`.
+
+    Parameters
+    ----------
+    extreme
+        Largest and smallest carrier rotation [rad].
+    position
+        Where they are, counted in nodes [-].
+    left_over
+        What finer angles may add to their difference [rad].
+    solves
+        Equilibria solved [-].
+    status, residual
+        Worst outcome, and largest residual over the largest force [-].
+    """
+
+    extreme: Float[np.ndarray, "sample 2"]
+    position: Float[np.ndarray, "sample 2"]
+    left_over: Float[np.ndarray, " sample"]
+    solves: Int[np.ndarray, " sample"]
+    status: UInt8[np.ndarray, " sample"]
+    residual: Float[np.ndarray, " sample"]
+
+
+class SolvedDerivatives(NamedTuple):
+    """Derivatives, filled in by the solvers.
+
+    Parameters
+    ----------
+    rotation
+        What is derived: the carrier rotation, for a peak-to-peak the weighted branches together [rad].
+    by_value
+        By every value of `tolalloc.rv.equivalent.columns.Layout` [rad/m, rad/(N·m), rad/rad].
+    by_row
+        By the stiffness of every bilateral row, then of every element with play [rad/(N/m)].
+    by_pin
+        By the relative change of all pin contact stiffnesses together [rad].
+    status
+        Worst outcome of the equilibria [-].
+    """
+
+    rotation: Float[np.ndarray, " sample"]
+    by_value: Float[np.ndarray, "sample value"]
+    by_row: Float[np.ndarray, "sample row"]
+    by_pin: Float[np.ndarray, " sample"]
+    status: UInt8[np.ndarray, " sample"]
+
+
+class SolvedForces(NamedTuple):
+    """Forces, filled in by `solve_forces`, as in `tolalloc.rv.equivalent.outputs.Forces` [N]."""
+
+    pins: Float[np.ndarray, "sample angle disc pin"]
+    rows: Float[np.ndarray, "sample angle row"]
+    elements: Float[np.ndarray, "sample angle element 2"]
