@@ -112,16 +112,16 @@ def loop(model: EquivalentModel, unit: np.ndarray) -> Figure:
 
 def directions(model: EquivalentModel, unit: np.ndarray) -> Figure:
     """Draw the error in one direction of rotation and what reversing adds."""
-    both = both_directions(model, unit, TORQUE)
-    angle = list(2 * np.pi * np.arange(both.forward.shape[1]) / both.forward.shape[1] / DEGREE)
+    forward, backward = both_directions(model, unit, TORQUE)
+    angle = list(2 * np.pi * np.arange(forward.shape[1]) / forward.shape[1] / DEGREE)
     return Figure(
         name="both_directions",
         title="Reversing the rotation lets the play show where few pins carry",
         x_label="carrier angle [°]",
         y_label="transmission error [arcsec]",
         series=(
-            Series(label="counter-clockwise", kind="line", x=angle, y=list(both.forward[0] / ARCSECOND)),
-            Series(label="clockwise minus it", kind="line", x=angle, y=list(both.difference[0] / ARCSECOND)),
+            Series(label="counter-clockwise", kind="line", x=angle, y=list(forward[0] / ARCSECOND)),
+            Series(label="clockwise minus it", kind="line", x=angle, y=list((backward - forward)[0] / ARCSECOND)),
         ),
     )
 

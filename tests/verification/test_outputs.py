@@ -96,7 +96,8 @@ def test_both_directions_differ_by_the_width_of_the_loop(rv20e, table4):
     angles = np.array([0.3, 2.0])
     loop = hysteresis_loop(rv20e, table4, angles)
     torque = rv20e.reducer.load.rated_torque
-    np.testing.assert_allclose(both_directions(rv20e, table4, torque, angles).difference, loop.width(1.0), atol=1e-15)
+    forward, backward = both_directions(rv20e, table4, torque, angles)
+    np.testing.assert_allclose(backward - forward, loop.width(1.0), atol=1e-15)
 
 
 @pytest.mark.parametrize("play", [0.0, 2e-6])

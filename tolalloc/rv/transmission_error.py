@@ -285,6 +285,7 @@ def transmission_error(
     worst = Status(max(extremes.status[0], equilibria.status.max()))
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
+    forward, backward = both_directions(model, errors, torque)
     return TransmissionErrorAnswer(
         header=Header(
             name=unit.name,
@@ -297,7 +298,7 @@ def transmission_error(
         equilibria=equilibria,
         extremes=extremes,
         loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
-        reversed_by=both_directions(model, errors, torque).difference[0],
+        reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
         equally_spaced=model.search.coarse,
         cautions=tuple(linear_model_warnings(reducer.cycloid_stage, reducer.modification)),

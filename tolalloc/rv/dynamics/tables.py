@@ -61,17 +61,6 @@ class StepTables(NamedTuple):
     drive_by_load: Float[np.ndarray, "step load"]
 
 
-class _Springs(NamedTuple):
-    """Bilateral springs of some steps: what `StepTables` says of them."""
-
-    stiffness: Float[np.ndarray, "step coordinate coordinate"]
-    damping: Float[np.ndarray, "step coordinate coordinate"]
-    load: Float[np.ndarray, "step coordinate load"]
-    drive_by_coordinate: Float[np.ndarray, "step coordinate"]
-    drive_by_velocity: Float[np.ndarray, "step coordinate"]
-    drive_by_load: Float[np.ndarray, "step load"]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Steps:
     """Everything but the samples of a simulation.
@@ -144,7 +133,10 @@ class Steps:
     def _positions(self, steps: slice) -> Positions:
         return Positions(self.reducer, self.motion.carrier_angle[steps], self.model.orders)
 
-    def _springs(self, at: Positions) -> _Springs:
+    def _springs(
+        self, at: Positions
+    ) -> tuple[dict[str, Float[np.ndarray, "step ..."]], Float[np.ndarray, "step coordinate load"]]:
+        """Return what `StepTables` says of the bilateral springs, and their load on all coordinates."""
         steps, size = at.carrier_angle.size, self.coordinates.count
         loads = self.model.error_columns.layout.torque + 1
         by_coordinate, by_velocity, by_load = np.zeros((steps, size)), np.zeros((steps, size)), np.zeros((steps, loads))
@@ -168,16 +160,22 @@ class Steps:
                 by_load[:, own] = self.sun_base_radius * (group.stiffness[..., np.newaxis] * group.error).sum(axis=1)
         rotation = self.coordinates.carrier + 2
         load[:, rotation, -1] = self.scale[rotation]
-        return _Springs(stiffness, damping, load, by_coordinate, by_velocity, by_load)
+        return {
+            "stiffness": stiffness,
+            "damping": damping,
+            "drive_by_coordinate": by_coordinate,
+            "drive_by_velocity": by_velocity,
+            "drive_by_load": by_load,
+        }, load
 
     def _tables(self, steps: slice) -> tuple[CondensedAngles, StepTables]:
         at, motion = self._positions(steps), self.motion
-        springs, size, count = self._springs(at), self.coordinates.count, at.carrier_angle.size
+        (springs, load), size, count = self._springs(at), self.coordinates.count, at.carrier_angle.size
         rates = np.tile(self.integrator.rates(motion.step), (count, 1))
         if steps.start == 0:
             rates[0] = 0.0
         retained, rest = self.retained, np.setdiff1d(np.arange(size), self.retained)
-        stiffness = springs.stiffness + rates[:, 1, None, None] * springs.damping
+        stiffness = springs["stiffness"] + rates[:, 1, None, None] * springs["damping"]
         stiffness += rates[:, 2, None, None] * np.diag(self.mass)
         by_retained, flexibility = np.zeros((count, size, retained.size)), np.zeros((count, size, size))
         inverse = np.linalg.inv(stiffness[:, rest[:, np.newaxis], rest])
@@ -188,17 +186,13 @@ class Steps:
         part = Motion(**{name: values[steps] for name, values in vars(motion).items()})
         angles = condense(self.reducer, self.model.orders, at.carrier_angle)._replace(
             stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
-            load=np.ascontiguousarray(np.swapaxes(springs.load, 1, 2)),
+            load=np.ascontiguousarray(np.swapaxes(load, 1, 2)),
         )
         return angles, StepTables(
-            stiffness=springs.stiffness,
-            damping=springs.damping,
+            **springs,
             by_retained=by_retained,
             flexibility=flexibility,
             rates=rates,
             acceleration=nominal_acceleration(at, part) / self.scale,
             torque=part.torque,
-            drive_by_coordinate=springs.drive_by_coordinate,
-            drive_by_velocity=springs.drive_by_velocity,
-            drive_by_load=springs.drive_by_load,
         )

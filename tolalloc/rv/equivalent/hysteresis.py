@@ -73,34 +73,18 @@ def hysteresis_loop(
     return HysteresisLoop(torque=torque, twist=np.stack(twist, axis=1))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Directions:
-    """Transmission error with the torque resisting either direction of rotation.
-
-    Parameters
-    ----------
-    forward, backward
-        Curves while turning counter-clockwise and clockwise [rad].
-    """
-
-    forward: Float[np.ndarray, "sample angle"]
-    backward: Float[np.ndarray, "sample angle"]
-
-    @property
-    def difference(self) -> Float[np.ndarray, "sample angle"]:
-        """What reversing adds at each angle: backward minus forward [rad]."""
-        return np.asarray(self.backward - self.forward)
-
-
 def both_directions(
     model: EquivalentModel,
     errors: Float[np.ndarray, "sample column"],
     torque: float,
     carrier_angle: Float[np.ndarray, " angle"] | None = None,
-) -> Directions:
-    """Return the transmission error of both directions of rotation under the magnitude of a resisting torque [N·m]."""
+) -> tuple[Float[np.ndarray, "sample angle"], Float[np.ndarray, "sample angle"]]:
+    """Return the transmission error while turning counter-clockwise and clockwise against a torque [rad].
+
+    What reversing adds is the second minus the first. The sign of the torque does not matter, as it resists both ways.
+    """
     forward, backward = (
         model.equilibria(errors, resisting, carrier_angle).transmission_error
         for resisting in (-abs(torque), abs(torque))
     )
-    return Directions(forward=forward, backward=backward)
+    return forward, backward
