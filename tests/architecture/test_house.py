@@ -19,7 +19,7 @@ DOORS = {
     "SALib": ("sensitivity/",),
     "pymoo": ("allocation/", "bench/identification/"),
     "cvxpy": ("allocation/",),
-    "sklearn": ("surrogate/", "rv/stand_ins/"),
+    "sklearn": ("surrogate/", "rv/stand_ins.py"),
     "plotly": ("report/",),
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
