@@ -149,6 +149,11 @@ class Model(ABC):
         """What a report calls it."""
 
     @property
+    def kind(self) -> str:
+        """What a summary calls such a model."""
+        return "model"
+
+    @property
     @abstractmethod
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs that the drawing lets vary, in the order of X."""
@@ -211,6 +216,11 @@ class Model(ABC):
         """What is not known of the model itself and stands on no drawing; `with_uncertain` answers for it."""
         return ()
 
+    @property
+    def uncertain_name(self) -> str:
+        """What a summary calls `uncertain`."""
+        return "not known of the model"
+
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of these outputs with the columns of `uncertain` after its own."""
         return self.reading(outputs)
@@ -233,6 +243,15 @@ class Model(ABC):
         `reading` knows them beside `outputs`.
         """
         return {}
+
+    @property
+    def spectra_note(self) -> str:
+        """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
+        return ""
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output, which has no unit."""
+        return output.split(" [")[0]
 
     def stand_ins(self) -> tuple[Any, ...]:
         """Return surrogates that know the model's structure, `tolalloc.surrogate.validation.Candidate`."""

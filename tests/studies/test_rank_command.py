@@ -28,7 +28,7 @@ def script_with(path: Path, **fields: object) -> Path:
     script.write_text(
         "from tolalloc.sensitivity.sobol import SobolEffort\n"
         "from tolalloc.study.definition import Study\n"
-        "from tolalloc.study.effort import Effort, RankingEffort\n"
+        "from tolalloc.sensitivity.effort import RankingEffort\nfrom tolalloc.study.effort import Effort\n"
         f"study = Study({text}, {EFFORT})\n",
         encoding="utf-8",
     )

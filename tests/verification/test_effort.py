@@ -17,11 +17,12 @@ from tolalloc.drawing.sources import Source
 from tolalloc.drawing.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.model import Evaluation
+from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.target import target_sensitivity
-from tolalloc.study.effort import QUICK, RankingEffort
+from tolalloc.study.effort import QUICK
 from tolalloc.surrogate.validation import answers_of
 
 ERRORS = ErrorModel(

@@ -18,10 +18,10 @@ from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.model import Evaluation
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
-from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 
-PLAYERS = ("a", "b", "b", "c", "a", "d")
+FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")
 CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))
 
 
@@ -74,22 +74,22 @@ def same_indices(one: SobolAnalysis, two: SobolAnalysis) -> None:
 
 
 @pytest.mark.parametrize("second_order", [False, True])
-@pytest.mark.parametrize("players", [PLAYERS, ("a",), tuple("abcd")])
+@pytest.mark.parametrize("factor_groups", [FACTOR_GROUPS, ("a",), tuple("abcd")])
 @pytest.mark.parametrize("blocks", [1, 64, 2048])
-def test_the_samples_are_those_of_salib_bit_for_bit(players, second_order, blocks):
-    columns = len(players)
+def test_the_samples_are_those_of_salib_bit_for_bit(factor_groups, second_order, blocks):
+    columns = len(factor_groups)
     names = [f"x{at}" for at in range(columns)]
-    problem = {"num_vars": columns, "names": names, "groups": list(players), "bounds": [[0.0, 1.0]] * columns}
-    design = SaltelliDesign(players=players, seed=7, second_order=second_order)
+    problem = {"num_vars": columns, "names": names, "groups": list(factor_groups), "bounds": [[0.0, 1.0]] * columns}
+    design = SaltelliDesign(factor_groups=factor_groups, seed=7, second_order=second_order)
     theirs = salib.sample(problem, blocks, calc_second_order=second_order, seed=7)
     ours = list(design.chunks(0, blocks))
     np.testing.assert_array_equal(np.concatenate(ours), theirs)
     assert all(len(chunk) % design.samples_per_block == 0 and len(chunk) <= SAMPLES_AT_ONCE for chunk in ours)
-    assert design.names == tuple(dict.fromkeys(players))
+    assert design.names == tuple(dict.fromkeys(factor_groups))
 
 
 def test_a_larger_design_begins_with_the_smaller_one_wherever_it_is_resumed():
-    design = SaltelliDesign(players=PLAYERS, seed=3)
+    design = SaltelliDesign(factor_groups=FACTOR_GROUPS, seed=3)
     whole = np.concatenate(list(design.chunks(0, 4096)))
     for stops in ((64, 128, 4096), (2048, 4096), (1, 2, 4, 3000, 4096)):
         parts = [chunk for start, stop in zip((0, *stops), stops, strict=False) for chunk in design.chunks(start, stop)]
@@ -98,14 +98,14 @@ def test_a_larger_design_begins_with_the_smaller_one_wherever_it_is_resumed():
 
 def test_seed_zero_is_refused_by_the_design_and_fine_for_the_analysis():
     with pytest.raises(InputError, match="seed is 0"):
-        SaltelliDesign(players=("a",), seed=0)
+        SaltelliDesign(factor_groups=("a",), seed=0)
     one, two, other = (analysis([[1.0, 2.0]], fixed(64), seed) for seed in (0, 0, 1))
     same_indices(one, two)
     assert (one.indices.total != other.indices.total).any()
 
 
 def test_a_block_larger_than_a_chunk_is_a_chunk():
-    design = SaltelliDesign(players=tuple(f"x{at}" for at in range(SAMPLES_AT_ONCE)), seed=1)
+    design = SaltelliDesign(factor_groups=tuple(f"x{at}" for at in range(SAMPLES_AT_ONCE)), seed=1)
     chunk = next(design.chunks(0, 4))
     assert chunk.shape == (SAMPLES_AT_ONCE + 2, SAMPLES_AT_ONCE)
 
@@ -204,7 +204,7 @@ def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_o
     truth = parts / parts.sum()
     effort = fixed(2048, second_order=second_order)
     found = sobol_indices(
-        Experiment.of(Linear(weights[np.newaxis], errors.columns), errors, SeedTree(8)), effort, Player.BLOCK
+        Experiment.of(Linear(weights[np.newaxis], errors.columns), errors, SeedTree(8)), effort, FactorGroup.BLOCK
     )
     own = found.of(0)
     assert found.sources == ("a + c", "b", "d")
@@ -217,7 +217,7 @@ def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_o
 
 def test_exchanging_a_block_exchanges_its_columns_and_no_others():
     errors = sizes("abcd", CORRELATED)
-    design = SaltelliDesign(players=("a + c", "b", "a + c", "d"), seed=5)
+    design = SaltelliDesign(factor_groups=("a + c", "b", "a + c", "d"), seed=5)
     x = errors.standard_values(np.concatenate(list(design.chunks(0, 64)))).reshape(64, -1, 4)
     a, exchanged, b = x[:, 0], x[:, 1], x[:, -1]
     np.testing.assert_allclose(exchanged[:, [0, 2]], b[:, [0, 2]], rtol=0, atol=1e-12)
@@ -227,7 +227,10 @@ def test_exchanging_a_block_exchanges_its_columns_and_no_others():
 def test_independent_sources_are_their_own_blocks():
     errors = sizes("abc")
     response = Linear(np.array([[1.0, 2.0, 3.0]]), errors.columns)
-    one, two = (sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64), player) for player in Player)
+    one, two = (
+        sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64), factor_group)
+        for factor_group in FactorGroup
+    )
     assert one.sources == two.sources
     same_indices(one, two)
 
@@ -239,7 +242,7 @@ def test_one_failed_sample_drops_its_block_and_nothing_else(sample):
     broken = analysis(weights.tolist(), effort, broken=(sample,))
     assert (broken.blocks, broken.dropped, broken.samples) == (127, 1, 128 * 5)
     assert np.isfinite(broken.indices.total_resamples).all()
-    design = SaltelliDesign(players=("a", "b", "c"), seed=SeedTree(1).child("sample").integer())
+    design = SaltelliDesign(factor_groups=("a", "b", "c"), seed=SeedTree(1).child("sample").integer())
     x = errors.standard_values(np.concatenate(list(design.chunks(0, 128)))) * 6.0
     without = np.delete(x.reshape(128, 5, 3), sample // 5, axis=0).reshape(-1, 3)
     whole = saltelli_indices(Linear(weights, errors.columns)(without), 3, SeedTree(1).child("resamples"))

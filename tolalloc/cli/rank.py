@@ -25,8 +25,6 @@ def rank(
     # The report's libraries take half a second to import; a misspelt script need not wait for them.
     from tolalloc.cli.document_script import written
     from tolalloc.report.document import Document
-    from tolalloc.sensitivity.answer.document import ranking_document
-    from tolalloc.sensitivity.answer.driver_tables import ranking_table
     from tolalloc.study.ranking import rank as ranked
 
     announce_compilation()
@@ -34,9 +32,9 @@ def rank(
 
     def build() -> Document:
         with UnitProgress() as progress:
-            results = ranked(asked, progress, quick=quick)
-        shown.append(ranking_table(results))
-        return ranking_document(results)
+            answer = ranked(asked, progress, quick=quick)
+        shown.append(answer.ranking)
+        return answer.document
 
     document = written(out or Path("runs") / f"{study.name}-rank", build)
     if as_json:

@@ -15,7 +15,7 @@ from tolalloc.drawing.sources import Source
 from tolalloc.drawing.tolerance_table import with_zones
 from tolalloc.report.results import StudyResults
 from tolalloc.rv.cycloid.assessment import Assessment
-from tolalloc.sensitivity.answer.sobol_table import sobol_table
+from tolalloc.sensitivity.driver_tables import sobol_table
 from tolalloc.units import ARCMINUTE, MEGAPASCAL, MICROMETRE
 
 

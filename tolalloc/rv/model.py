@@ -69,6 +69,11 @@ class ReducerModel(Model):
         return self.reducer.name
 
     @property
+    def kind(self) -> str:
+        """A reducer."""
+        return "reducer"
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """The kernel's columns [m, angles rad]."""
         return self.kernel.columns
@@ -182,6 +187,11 @@ class ReducerModel(Model):
         """What is not known of identified stiffnesses."""
         return (stiffness_source(self.identified, self.reducer),) if self.identified else ()
 
+    @property
+    def uncertain_name(self) -> str:
+        """Identified stiffness."""
+        return "identified stiffness"
+
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of the outputs with the stiffnesses as further columns, to first order in ln K."""
         if self.identified is None:
@@ -218,6 +228,19 @@ class ReducerModel(Model):
         stage = self.reducer.cycloid_stage
         multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
         return {order: wave_outputs(order) for order in sorted({1, 2, *multiples})}
+
+    @property
+    def spectra_note(self) -> str:
+        """Which errors show at multiples of teeth or pins."""
+        stage = self.reducer.cycloid_stage
+        return (
+            f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
+            f"disc or carrier at multiples of {stage.pin_count}"
+        )
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output; there is one peak-to-peak."""
+        return super().spoken(output).removesuffix(" transmission error")
 
     def stand_ins(self) -> tuple[Any, ...]:
         """Return the contact at fewer angles and, for few columns, a regression of the curve."""

@@ -22,8 +22,8 @@ class SaltelliDesign:
 
     Parameters
     ----------
-    players
-        Name of the player of each column; the columns of a player are exchanged together.
+    factor_groups
+        Name of the factor group of each column; the columns of a factor group are exchanged together.
     seed
         Seed of the scrambling, positive: 0 would be no seed at all for other libraries [-].
     second_order
@@ -39,7 +39,7 @@ class SaltelliDesign:
     1998), as `scipy.stats.qmc.Sobol` draws them for `SALib.sample.sobol`.
     """
 
-    players: tuple[str, ...]
+    factor_groups: tuple[str, ...]
     seed: int
     second_order: bool = False
 
@@ -50,7 +50,7 @@ class SaltelliDesign:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Players in the order of their first columns."""
-        return tuple(dict.fromkeys(self.players))
+        return tuple(dict.fromkeys(self.factor_groups))
 
     @property
     def samples_per_block(self) -> int:
@@ -59,7 +59,7 @@ class SaltelliDesign:
 
     def chunks(self, start: int, stop: int) -> Iterator[Float[np.ndarray, "sample column"]]:
         """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1)."""
-        sequence = qmc.Sobol(d=2 * len(self.players), scramble=True, seed=self.seed)
+        sequence = qmc.Sobol(d=2 * len(self.factor_groups), scramble=True, seed=self.seed)
         if start:
             sequence.fast_forward(start)
         # A power of two, as the first draw from the sequence ought to be.
@@ -68,13 +68,13 @@ class SaltelliDesign:
             yield self._samples(sequence.random(min(at_once, stop - first)))
 
     @cached_property
-    def _own(self) -> Bool[np.ndarray, "player column"]:
-        """Which columns belong to each player."""
-        return np.asarray(np.array(self.players) == np.array(self.names)[:, np.newaxis])
+    def _own(self) -> Bool[np.ndarray, "group column"]:
+        """Which columns belong to each factor group."""
+        return np.asarray(np.array(self.factor_groups) == np.array(self.names)[:, np.newaxis])
 
     def _samples(self, base: Float[np.ndarray, "block base_column"]) -> Float[np.ndarray, "sample column"]:
         """Return the samples of the blocks whose A and B stand side by side."""
         a, b = np.split(base[:, np.newaxis], 2, axis=2)
         exchanged = [(a, b), (b, a)][: 1 + self.second_order]
         between = [np.where(self._own, inner, outer) for outer, inner in exchanged]
-        return np.concatenate([a, *between, b], axis=1).reshape(-1, len(self.players))
+        return np.concatenate([a, *between, b], axis=1).reshape(-1, len(self.factor_groups))

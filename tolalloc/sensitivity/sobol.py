@@ -26,7 +26,7 @@ _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
 
 
-class Player(StrEnum):
+class FactorGroup(StrEnum):
     """Whose share of the variance an index is."""
 
     SOURCE = "source"
@@ -93,7 +93,7 @@ class _Answers:
 def sobol_indices(
     experiment: Experiment[Response],
     effort: SobolEffort,
-    player: Player = Player.SOURCE,
+    factor_group: FactorGroup = FactorGroup.SOURCE,
     ranked: tuple[str, ...] = (),
 ) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
@@ -102,7 +102,7 @@ def sobol_indices(
     ----------
     effort
         Blocks, from a first number doubled up to a limit, and what stops them.
-    player
+    factor_group
         Whether each source has an index, or each block of sources that depend on each other.
     ranked
         Outputs that count in the ranking over all, which is the one that must become stable; all of them if empty.
@@ -125,8 +125,10 @@ def sobol_indices(
     groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
     """
     errors, seeds, outputs = experiment.errors, experiment.seeds, experiment.response.outputs
-    players, counted = _players(errors, player), ranked or outputs
-    design = SaltelliDesign(players=players, seed=seeds.child("sample").integer(), second_order=effort.second_order)
+    factor_groups, counted = _factor_groups(errors, factor_group), ranked or outputs
+    design = SaltelliDesign(
+        factor_groups=factor_groups, seed=seeds.child("sample").integer(), second_order=effort.second_order
+    )
     answers, steps = _Answers(experiment, design), list[SaltelliIndices]()
 
     def resampled(blocks: int) -> Resampled:
@@ -161,16 +163,16 @@ def sobol_indices(
     )
 
 
-def _groups(errors: ErrorModel, players: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the group of each player: the tolerance that it shares with others, or itself."""
+def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the tolerance group of each factor group: the tolerance that it shares with others, or itself."""
     group_of = {source.name: source.group for source in errors.sources if source.group}
-    return tuple(group_of.get(name, name) for name in players)
+    return tuple(group_of.get(name, name) for name in factor_groups)
 
 
-def _players(errors: ErrorModel, player: Player) -> tuple[str, ...]:
-    """Return the name of the player of each column."""
+def _factor_groups(errors: ErrorModel, factor_group: FactorGroup) -> tuple[str, ...]:
+    """Return the name of the factor group of each column."""
     correlated = [" + ".join(block) for block in errors.blocks if len(block) > 1]
-    if player is Player.SOURCE and correlated:
+    if factor_group is FactorGroup.SOURCE and correlated:
         raise InputError(
             f"Sobol indices: {'; '.join(correlated)} are correlated; a Sobol index per source would share their "
             "variance arbitrarily; rank blocks or ask for Shapley effects."

@@ -31,7 +31,7 @@ from tolalloc.progress import Progress, Record
 from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.rv.response.stiffness import StiffnessResponse
-from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared, Study, prepare
 from tolalloc.study.effort import QUICK, AllocationEffort
@@ -196,7 +196,7 @@ class Searches:
                 self.prepared.study.largest_failed_share,
             ),
             SobolEffort(start=blocks, limit=blocks),
-            Player.BLOCK if errors.is_correlated else Player.SOURCE,
+            FactorGroup.BLOCK if errors.is_correlated else FactorGroup.SOURCE,
         ).of(PEAK_TO_PEAK)
 
 

@@ -8,27 +8,11 @@ import numpy as np
 
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
-from tolalloc.capability import yield_at_limit
-from tolalloc.drawing.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity import screening, target
+from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.sobol import SobolEffort
 from tolalloc.surrogate import validation
 
-_FEWEST = {
-    "units": target.fewest_units(),
-    "trajectories": screening.FEWEST_TRAJECTORIES,
-    "moment_units": screening.FEWEST_UNITS_OF_CLASS * screening.CLASSES,
-    # A bootstrap resample of fewer could be one unit again and again, and would not vary.
-    "derivative_units": 10,
-    "inverse_units": 1,
-    "surrogate_units": validation.FEWEST_OF_FOLD * validation.FOLDS,
-    "level_units": 100,
-    "level_runs": yield_at_limit.FEWEST_RUNS,
-    "widened_units": 100,
-    "permutations": 2,
-}
-"""Smallest numbers that the estimators take [-]."""
 _FEWEST_ALLOCATING = {
     "allocation.": {
         "graded_steps": 1,
@@ -53,69 +37,6 @@ _FEWEST_ALLOCATING = {
     },
 }
 """Smallest numbers with which an allocation has an answer in every stage [-]."""
-_CHAIN = 10
-"""Units of a level come in chains of so many [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RankingEffort:
-    """How much ``tolalloc rank`` may compute.
-
-    Parameters
-    ----------
-    units
-        Random units behind yields, capabilities and what the units out of the limit share [-].
-    design
-        How these units are spread; yields have an interval for the Monte Carlo design alone.
-    sobol
-        Blocks of the Sobol analysis, and what stops their growth.
-    trajectories
-        Trajectories of Morris' elementary effects [-].
-    moment_units, derivative_units, inverse_units, surrogate_units
-        Units behind PAWN and delta, behind derivatives, behind every trial zone, and behind the surrogates; the yield
-        target may ask for more behind the trial zones [-].
-    level_units, level_runs, widened_units
-        Units of a level and runs of the subset simulation, and units of the widened distribution that checks it, all
-        for limits that are rarely exceeded [-].
-    permutations
-        Permutations behind Shapley effects, where sources are correlated [-].
-
-    Raises
-    ------
-    InputError
-        A number with which an estimator would stop, often after long work of others.
-    """
-
-    units: int = 16_384
-    design: SamplingDesign = SamplingDesign.MONTE_CARLO
-    sobol: SobolEffort = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
-    trajectories: int = 32
-    moment_units: int = 4096
-    derivative_units: int = 1024
-    inverse_units: int = 2048
-    surrogate_units: int = 2048
-    level_units: int = 4000
-    level_runs: int = 5
-    widened_units: int = 20_000
-    permutations: int = 1000
-
-    def __post_init__(self) -> None:
-        for field_name, fewest in _FEWEST.items():
-            if getattr(self, field_name) < fewest:
-                raise self._refusal(field_name, getattr(self, field_name), f"{fewest} or more")
-        if self.level_units % _CHAIN:
-            raise self._refusal("level_units", self.level_units, f"a multiple of {_CHAIN}")
-        sobol = self.sobol
-        if sobol.limit < sobol.start:
-            raise self._refusal("sobol.limit", sobol.limit, f"the first number of blocks, {sobol.start}, or more")
-        if not 0.0 < sobol.probability < 1.0:
-            raise self._refusal("sobol.probability", sobol.probability, "a number between 0 and 1")
-        if sobol.resamples < 2:
-            raise self._refusal("sobol.resamples", sobol.resamples, "2 or more")
-
-    @staticmethod
-    def _refusal(field_name: str, value: float, allowed: str) -> InputError:
-        return InputError.at("study", f"effort.ranking.{field_name}", value, allowed)
 
 
 def _require_enough(effort: object, prefix: str) -> None:

@@ -25,7 +25,7 @@ from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.rv.response.stiffness import StiffnessEffect, StiffnessResponse, stiffness_effect
 from tolalloc.sensitivity.classical import classical_estimate
-from tolalloc.sensitivity.sobol import Player, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.study.definition import Prepared
 from tolalloc.units import ARCMINUTE
@@ -129,15 +129,15 @@ def _ranking(
     errors, own, blocks = prepared.space.errors, seeds.child("sobol"), prepared.study.effort.sobol_blocks
     effort, share = SobolEffort(start=blocks, limit=blocks), prepared.study.largest_failed_share
     # Correlated sources share their variance, so their block has the index.
-    player = Player.BLOCK if errors.is_correlated else Player.SOURCE
+    factor_group = FactorGroup.BLOCK if errors.is_correlated else FactorGroup.SOURCE
     if prepared.identified is None or prepared.stiffness is None:
-        return sobol_indices(Experiment.of(kernel, errors, own, share), effort, player).of(PEAK_TO_PEAK), None
+        return sobol_indices(Experiment.of(kernel, errors, own, share), effort, factor_group).of(PEAK_TO_PEAK), None
     response = StiffnessResponse(kernel=kernel, stiffnesses=tuple(prepared.identified.values))
     joint = replace(errors, joint=(prepared.stiffness,))
     units = sample.x[sample.evaluation.good][:_EFFECT_UNITS]
     directions = seeds.child("stiffness").generator().standard_normal((_DIRECTIONS, len(response.stiffnesses)))
     effect = stiffness_effect(response, prepared.stiffness, units, directions, _UNITS_PER_DIRECTION)
-    return sobol_indices(Experiment.of(response, joint, own, share), effort, player).of(PEAK_TO_PEAK), effect
+    return sobol_indices(Experiment.of(response, joint, own, share), effort, factor_group).of(PEAK_TO_PEAK), effect
 
 
 def _torsional_stiffness(prepared: Prepared) -> float:

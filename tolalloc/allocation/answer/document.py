@@ -11,7 +11,7 @@ from tolalloc.allocation.answer.results import AllocationResults
 from tolalloc.allocation.answer.sentences import answer
 from tolalloc.allocation.answer.summary import summary
 from tolalloc.report.document import Document, Section
-from tolalloc.sensitivity.answer.sobol_table import sobol_table
+from tolalloc.sensitivity.driver_tables import sobol_table
 
 
 def sections(results: AllocationResults) -> tuple[Section, ...]:

@@ -8,41 +8,40 @@ from jaxtyping import Float
 
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import proportion
-from tolalloc.sensitivity.answer.results import RankingResults
+from tolalloc.sensitivity.answer import RankingAnswer, unit_of
 from tolalloc.units import MICROMETRE
 
 
-def capability_table(results: RankingResults) -> pd.DataFrame:
+def capability_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return every requirement with its distribution, capability and yield."""
     rows = []
-    for at, output in enumerate(results.outputs):
+    for at, output in enumerate(answer.outputs):
         values, limits = (
-            results.sample.evaluation.values[results.sample.evaluation.good, at],
-            results.limits.get(output),
+            answer.sample.evaluation.values[answer.sample.evaluation.good, at],
+            answer.limits.get(output),
         )
-        name, unit = output.rsplit(" [", 1)
         row: dict[str, object] = {
-            "requirement": name,
-            "unit": unit.rstrip("]"),
+            "requirement": output.rsplit(" [", 1)[0],
+            "unit": unit_of(output),
             "Mean": float(values.mean()),
             "Sigma": float(values.std(ddof=1)),
             "Min": float(values.min()),
             "Max": float(values.max()),
         }
-        kept = quantile_interval(values, results.target)
+        kept = quantile_interval(values, answer.target)
         row |= {
-            f"{results.target:.2%} quantile, low 2.5 %": kept.low,
-            f"{results.target:.2%} quantile, high 97.5 %": kept.high if np.isfinite(kept.high) else "sample too small",
+            f"{answer.target:.2%} quantile, low 2.5 %": kept.low,
+            f"{answer.target:.2%} quantile, high 97.5 %": kept.high if np.isfinite(kept.high) else "sample too small",
         }
         if limits:
-            row |= _kept(results, values, limits)
+            row |= _kept(answer, values, limits)
         rows.append(row)
     return pd.DataFrame(rows).dropna(axis="columns", how="all")
 
 
-def _kept(results: RankingResults, values: Float[np.ndarray, " unit"], limits: Limits) -> dict[str, object]:
+def _kept(answer: RankingAnswer, values: Float[np.ndarray, " unit"], limits: Limits) -> dict[str, object]:
     """Return limits, capability and yield of one output; units without an answer count as outside."""
-    units = results.sample.evaluation.status.size
+    units = answer.sample.evaluation.status.size
     inside = proportion(units, units - values.size + limits.outside(values))
     row: dict[str, object] = {
         "LSL": np.nan if limits.lower is None else limits.lower,
@@ -52,7 +51,7 @@ def _kept(results: RankingResults, values: Float[np.ndarray, " unit"], limits: L
         "Yield high 97.5 % [%]": inside.high * 100,
         "% out [%]": (1 - inside.estimate) * 100,
         "PPM [1e-6]": (1 - inside.estimate) * 1e6,
-        "OK": "yes" if inside.bound >= results.target else "no",
+        "OK": "yes" if inside.bound >= answer.target else "no",
     }
     if np.ptp(values) > 0:
         found = capability(values, limits)
@@ -64,9 +63,9 @@ def _kept(results: RankingResults, values: Float[np.ndarray, " unit"], limits: L
     return row
 
 
-def beyond_table(results: RankingResults) -> pd.DataFrame:
+def beyond_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return the share beyond the limit by every method that was asked."""
-    found = results.beyond
+    found = answer.beyond
     return pd.DataFrame(
         [
             {
@@ -83,25 +82,25 @@ def beyond_table(results: RankingResults) -> pd.DataFrame:
     )
 
 
-def stack_up_table(results: RankingResults) -> pd.DataFrame:
+def stack_up_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return worst case, root-sum-square and Monte Carlo side by side."""
-    sample = results.sample
+    sample = answer.sample
     rows = [
-        ("worst case", results.classical.worst_case, "single errors at their limits, worst phase, summed"),
-        ("root-sum-square", results.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),
+        ("worst case", answer.classical.worst_case, "single errors at their limits, worst phase, summed"),
+        ("root-sum-square", answer.classical.root_sum_square, "the same, squared, summed, rooted, as if independent"),
         ("Monte Carlo mean", float(sample.values.mean()), "real model, all errors together"),
         (
-            f"Monte Carlo {results.target:.2%} quantile",
-            sample.quantile(results.target),
+            f"Monte Carlo {answer.target:.2%} quantile",
+            sample.quantile(answer.target),
             "real model, all errors together",
         ),
     ]
-    return pd.DataFrame(rows, columns=["estimate", "peak-to-peak [arcsec]", "assumes"])
+    return pd.DataFrame(rows, columns=["estimate", f"{answer.spoken} [{answer.unit}]", "assumes"])
 
 
-def reject_table(results: RankingResults) -> pd.DataFrame:
+def reject_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return what the units outside have in common, the strongest source first."""
-    found = results.reject
+    found = answer.reject
     first, lift, excess = found.first_interval, found.lift_interval, found.excess_interval
     frame = pd.DataFrame(
         {
@@ -124,10 +123,10 @@ def reject_table(results: RankingResults) -> pd.DataFrame:
     return frame.sort_values("excess [-]", ascending=False, kind="stable").reset_index(drop=True)
 
 
-def inverse_table(results: RankingResults) -> pd.DataFrame:
+def inverse_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return how far each zone may open alone, or must close."""
-    found = results.inverse
-    now = [source.zone / MICROMETRE for source in results.errors.active if source.name in found.sources]
+    found = answer.inverse
+    now = [source.zone / MICROMETRE for source in answer.errors.active if source.name in found.sources]
     frame = pd.DataFrame(
         {
             "source": found.sources,

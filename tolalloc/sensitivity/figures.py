@@ -5,20 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK
-from tolalloc.sensitivity.answer import driver_tables, limit_tables
-from tolalloc.sensitivity.answer.results import RankingResults
+from tolalloc.sensitivity.answer import RankingAnswer, sign_of
 
 _SHOWN = 24
 """Rows of a picture; the table has all [-]."""
 
 
-def ranking_figure(results: RankingResults) -> Figure:
-    """Draw total and first-order indices of the peak-to-peak with their intervals."""
-    frame = driver_tables.ranking_table(results).head(_SHOWN)
+def ranking_figure(answer: RankingAnswer) -> Figure:
+    """Draw total and first-order indices of the leading output with their intervals."""
+    frame = answer.ranking.head(_SHOWN)
     return Figure(
         name="ranking",
-        title="Which error drives the peak-to-peak, at the zones of the tolerance table",
+        title=f"Which error drives the {answer.spoken}, at the zones of the tolerance table",
         x_label="Sobol index [-]",
         y_label="",
         series=tuple(
@@ -38,10 +36,10 @@ def ranking_figure(results: RankingResults) -> Figure:
     )
 
 
-def requirements_figure(results: RankingResults) -> HeatMap:
+def requirements_figure(answer: RankingAnswer) -> HeatMap:
     """Draw the total index of every source for every requirement."""
-    sobol = results.sobol
-    outputs = [name for name in results.outputs if name not in sobol.constant]
+    sobol = answer.sobol
+    outputs = [name for name in answer.outputs if name not in sobol.constant]
     rows = sobol.overall.order[:_SHOWN]
     return HeatMap(
         name="requirements",
@@ -64,15 +62,18 @@ def _broken(name: str) -> str:
     return "\n".join(lines)
 
 
-def orders_figure(results: RankingResults) -> HeatMap:
+def orders_figure(answer: RankingAnswer) -> HeatMap:
     """Draw the share of every source in the wave of every order."""
-    found = results.orders
+    found, sign = answer.orders, sign_of(answer.wave_unit)
+    assert found is not None
     largest = np.nan_to_num(found.first).max(axis=0)
     rows = [int(at) for at in np.argsort(-largest, kind="stable")[:_SHOWN]]
     return HeatMap(
         name="orders",
         title="Which error makes which order of the output turn, alone",
-        columns=[f"{order}\n{deviation:.2g}″" for order, deviation in zip(found.orders, found.deviation, strict=True)],
+        columns=[
+            f"{order}\n{deviation:.2g}{sign}" for order, deviation in zip(found.orders, found.deviation, strict=True)
+        ],
         rows=[found.sources[at] for at in rows],
         x_label="order of the output turn [-], standard deviation of its wave",
         label="share of the wave's variance [-]",
@@ -80,22 +81,23 @@ def orders_figure(results: RankingResults) -> HeatMap:
     )
 
 
-def sample_figure(results: RankingResults) -> Figure:
-    """Draw the peak-to-peak of the random units."""
-    limit = results.limits[PEAK_TO_PEAK].upper
+def sample_figure(answer: RankingAnswer) -> Figure:
+    """Draw the leading output of the random units."""
+    limits = answer.limits[answer.leading]
+    lines = [(limit, f"limit {limit:g}{answer.sign}") for limit in (limits.lower, limits.upper) if limit is not None]
     return Figure(
-        name="peak_to_peak",
-        title="Peak-to-peak of random units at the zones of the tolerance table",
-        x_label="peak-to-peak transmission error [arcsec]",
+        name=answer.spoken.replace("-", "_").replace(" ", "_"),
+        title=f"{answer.spoken[0].upper()}{answer.spoken[1:]} of random units at the zones of the tolerance table",
+        x_label=answer.leading,
         y_label="units [-]",
-        series=(Series(label="random units", kind="histogram", x=list(results.sample.values)),),
-        vertical=() if limit is None else ((limit, f"limit {limit:g}″"),),
+        series=(Series(label="random units", kind="histogram", x=list(answer.sample.values)),),
+        vertical=tuple(lines),
     )
 
 
-def reject_figure(results: RankingResults) -> Figure:
+def reject_figure(answer: RankingAnswer) -> Figure:
     """Draw how much larger the deviations of the units outside are, summed over the columns of each source."""
-    frame = limit_tables.reject_table(results).head(_SHOWN // 2)
+    frame = answer.rejects.head(_SHOWN // 2)
     return Figure(
         name="rejects",
         title="What the units outside have in common",
@@ -115,15 +117,15 @@ def reject_figure(results: RankingResults) -> Figure:
     )
 
 
-def inverse_figure(results: RankingResults) -> Figure | None:
+def inverse_figure(answer: RankingAnswer) -> Figure | None:
     """Draw the zones now and what they may be alone; none if no zone has such a value."""
-    frame = limit_tables.inverse_table(results)
+    frame = answer.alone
     frame = frame[np.isfinite(frame["zone alone [µm]"])].head(_SHOWN)
     if frame.empty:
         return None
     return Figure(
         name="alone",
-        title=f"How far each zone may {'open' if results.inverse.meets else 'stay'} alone, all others as they are",
+        title=f"How far each zone may {'open' if answer.inverse.meets else 'stay'} alone, all others as they are",
         x_label="zone [µm]",
         y_label="",
         series=(

@@ -5,31 +5,65 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK
-from tolalloc.sensitivity.answer.results import RankingResults
-from tolalloc.sensitivity.answer.sobol_table import sobol_table
+from tolalloc.sensitivity.answer import RankingAnswer
+from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.units import MICROMETRE
 
 
-def ranking_table(results: RankingResults) -> pd.DataFrame:
-    """Return the ranking for the peak-to-peak, with the zone and the root mean square derivative beside it."""
-    frame = sobol_table(results.sobol.of(PEAK_TO_PEAK))
-    zones = dict(
-        zip((source.name for source in results.errors.active), results.errors.zones / MICROMETRE, strict=False)
-    )
-    sens = dict(zip(results.local.sources, results.local.root_mean_square, strict=True))
+def _blocks(pair: Neighbours | None) -> str:
+    """Return how many more Sobol blocks would tell a source from the next one."""
+    if pair is None or pair.more_blocks is None:
+        return ""
+    return "told apart" if pair.separated else f"about {float(f'{pair.more_blocks:.2g}'):.0f}"
+
+
+def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
+    """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
+    share = sobol.total / sobol.total.sum() * 100
+    first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
+    among, following = sobol.among_first(min(3, len(sobol.sources))), {pair.before: pair for pair in sobol.neighbours}
+    rows = [
+        {
+            "rank [-]": place + 1,
+            "source": sobol.sources[at],
+            "contribution [%]": share[at],
+            "cumulative [%]": share[sobol.order[: place + 1]].sum(),
+            "total index ST [-]": sobol.total[at],
+            "ST low 5 % [-]": total[0, at],
+            "ST high 95 % [-]": total[1, at],
+            "first index S1 [-]": sobol.first[at],
+            "S1 low 5 % [-]": first[0, at],
+            "S1 high 95 % [-]": first[1, at],
+            "S1 reading": "indistinguishable from 0" if sobol.first_is_zero[at] else "above 0",
+            "rank low 5 % [-]": rank[0, at],
+            "rank high 95 % [-]": rank[1, at],
+            "P(among first 3) [%]": among[at] * 100,
+            "P(before the next) [%]": following[at].probability * 100 if at in following else np.nan,
+            "more blocks to tell it from the next [-]": _blocks(following.get(at)),
+        }
+        for place, at in enumerate(sobol.order)
+    ]
+    return pd.DataFrame(rows)
+
+
+def ranking_table(answer: RankingAnswer) -> pd.DataFrame:
+    """Return the ranking of the leading output, with the zone and the root mean square derivative beside it."""
+    frame = sobol_table(answer.indices)
+    zones = dict(zip((source.name for source in answer.errors.active), answer.errors.zones / MICROMETRE, strict=False))
+    sens = dict(zip(answer.local.sources, answer.local.root_mean_square, strict=True))
     return frame.assign(
         **{
             "zone [µm]": [zones.get(name, np.nan) for name in frame["source"]],
-            "Sens, root mean square [arcsec/µm]": [sens.get(name, np.nan) for name in frame["source"]],
+            f"Sens, root mean square [{answer.unit}/µm]": [sens.get(name, np.nan) for name in frame["source"]],
         }
     )
 
 
-def pairs_table(results: RankingResults) -> pd.DataFrame:
+def pairs_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return what pairs of sources add only together, the largest first; empty unless second order was asked for."""
-    sobol = results.sobol.of(PEAK_TO_PEAK)
+    sobol = answer.indices
     low, high = sobol.second_interval
     return pd.DataFrame(
         [
@@ -45,9 +79,9 @@ def pairs_table(results: RankingResults) -> pd.DataFrame:
     )
 
 
-def overall_table(results: RankingResults) -> pd.DataFrame:
+def overall_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return one ranking over all outputs with a limit: the largest total index of each source and where it has it."""
-    overall, sobol = results.sobol.overall, results.sobol
+    overall, sobol = answer.sobol.overall, answer.sobol
     interval, rank = overall.total_interval, overall.rank_interval
     rows = []
     for place, at in enumerate(overall.order):
@@ -61,16 +95,16 @@ def overall_table(results: RankingResults) -> pd.DataFrame:
             "rank high 95 % [-]": rank[1, at],
             "drives most": overall.drives[at].split(" [")[0],
         }
-        for output in results.outputs:
+        for output in answer.outputs:
             if output not in sobol.constant:
                 row[f"ST {output.split(' [')[0]} [-]"] = sobol.indices.total[sobol.position(output), at]
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def growth_table(results: RankingResults) -> pd.DataFrame:
+def growth_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return how the first places settled as the blocks grew."""
-    names = results.sobol.sources
+    names = answer.sobol.sources
     return pd.DataFrame(
         [
             {
@@ -78,21 +112,22 @@ def growth_table(results: RankingResults) -> pd.DataFrame:
                 "first places": ", ".join(names[at] for at in step.first),
                 "share of the resamples with this order [%]": step.probability * 100,
             }
-            for step in results.sobol.growth.history
+            for step in answer.sobol.growth.history
         ]
     )
 
 
-def orders_table(results: RankingResults) -> pd.DataFrame:
+def orders_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return what each source adds to the wave of each order, alone and with others."""
-    found, rows = results.orders, []
+    found, rows = answer.orders, list[dict[str, object]]()
+    assert found is not None
     first, total = found.first_interval, found.total_interval
     for at, order in enumerate(found.orders):
         for source in np.argsort(-found.total[at], kind="stable"):
             rows.append(
                 {
                     "order of the output turn [-]": order,
-                    "standard deviation of the wave [arcsec]": found.deviation[at],
+                    f"standard deviation of the wave [{answer.wave_unit}]": found.deviation[at],
                     "source": found.sources[source],
                     "share alone [-]": found.first[at, source],
                     "alone low 5 % [-]": first[at, 0, source],
@@ -106,7 +141,7 @@ def orders_table(results: RankingResults) -> pd.DataFrame:
 
 
 def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
-    """Return the Shapley effects on the peak-to-peak, the largest first."""
+    """Return the Shapley effects on the leading output, the largest first."""
     interval, rank = found.interval(0), found.rank_interval(0)
     order = np.argsort(-found.effects[0], kind="stable")
     return pd.DataFrame(

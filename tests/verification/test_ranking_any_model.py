@@ -1,0 +1,159 @@
+"""A ranking of a model that is no reducer: its own names and units, any limits, derivatives by differences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from tolalloc.capability.indices import Limits
+from tolalloc.drawing.correlation import CorrelatedSource
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature
+from tolalloc.model import Evaluation, Model, Response
+from tolalloc.progress import Record
+from tolalloc.report.answer import Header
+from tolalloc.sensitivity.answer import RankingAnswer, rank
+from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.sobol import SobolEffort
+
+GAP, PLAY = "gap [mm]", "play [deg]"
+EFFORT = RankingEffort(
+    units=1500,
+    sobol=SobolEffort(start=64, limit=64),
+    trajectories=4,
+    moment_units=200,
+    derivative_units=50,
+    inverse_units=100,
+    surrogate_units=100,
+    level_units=100,
+    level_runs=2,
+    widened_units=100,
+)
+
+
+@dataclass(frozen=True)
+class Read:
+    """Some outputs of a chain of two lengths; a third column scales both, where it is asked for."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    scale: float = 0.0
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        factor = 1.0 + self.scale + (x[:, 2] if x.shape[1] > 2 else 0.0)
+        found = {GAP: factor * (1.0 + 1e3 * (3.0 * x[:, 0] - x[:, 1])), PLAY: factor * (2.0 + 1e4 * x[:, 1])}
+        values = np.stack([found[name] for name in self.outputs], axis=1)
+        return Evaluation(values=values, status=np.zeros(len(x), np.uint8))
+
+
+@dataclass(frozen=True)
+class Chain(Model):
+    """Two lengths, and a scale that is not known if asked for."""
+
+    deviation: float = 0.0
+    scale: float = 0.0
+    name = "a chain"
+    columns = ("a", "b")
+    outputs = (GAP, PLAY)
+
+    def reading(self, outputs: tuple[str, ...]) -> Response:
+        return Read(self.columns, outputs, self.scale)
+
+    @property
+    def uncertain(self) -> tuple[CorrelatedSource, ...]:
+        own = CorrelatedSource(name="scale", columns=("scale",), covariance=np.array([[self.deviation**2]]))
+        return (own,) if self.deviation else ()
+
+    def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
+        return Read((*self.columns, "scale"), outputs)
+
+    def changed(self, change: np.ndarray) -> Chain:
+        return Chain(self.deviation, float(change[0]))
+
+
+ERRORS = ErrorModel(
+    tuple(
+        Source(name=name, part="part", feature=Feature.SIZE, zone=20e-6, minimum=1e-6, maximum=1e-3, cost=1.0)
+        for name in "ab"
+    )
+)
+
+
+class Silent:
+    def begin(self, stage: str) -> None:
+        pass
+
+    def advance(self, units: int) -> None:
+        pass
+
+
+def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
+    record, header = Record(Silent(), model.outcomes), Header(name="links", model="", seed=1)
+    return rank(model, ERRORS, limits, 0.95, EFFORT, SeedTree(1), 0.01, record, header)
+
+
+@pytest.fixture(scope="module")
+def answer() -> RankingAnswer:
+    return ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)})
+
+
+def test_the_answer_speaks_of_the_outputs_by_name_and_unit(answer):
+    text = " ".join((answer.title, answer.subtitle, *answer.sentences))
+    assert "What drives a chain: links" in text
+    assert "Beyond the limit of 1.02 mm" in text or "the worst 5 %" in text
+    assert "″" not in text
+    assert "[arcsec" not in " ".join(" ".join(frame.columns) for frame in answer.tables.values())
+    assert answer.sections[0].heading == "Which error drives the gap"
+    assert "orders" not in answer.tables
+    assert {"gap", "ranking", "rejects", "requirements"} <= {*answer.figures}
+    assert answer.summary["model"] == "a chain"
+    assert answer.summary["limit [mm]"] == 1.02
+    assert answer.header.statuses == {"answer found": sum(answer.header.statuses.values()), "no answer": 0}
+
+
+def test_the_ranking_is_that_of_the_closed_form(answer):
+    assert answer.indices.sources == ("a", "b")
+    np.testing.assert_allclose(answer.indices.total, [0.9, 0.1], atol=0.05)
+    np.testing.assert_allclose(answer.local.at_nominal, [3e-3, -1e-3], rtol=1e-6)
+    assert answer.choice.chosen is not None
+    assert [frame["requirement"] for frame in answer.summary["requirements"]] == ["gap", "play"]
+
+
+def test_a_lower_limit_is_an_upper_one_of_the_output_with_its_sign_turned(answer):
+    turned = ranked({PLAY: Limits(lower=1.95)})
+    yields = turned.sample.evaluation.values[:, 0] >= 1.95
+    assert turned.outputs == (PLAY, GAP)
+    assert turned.beyond.interval.estimate == pytest.approx(yields.mean())
+    assert turned.limit_spoken == "the lower limit of 1.95°"
+    assert turned.summary["lower limit [deg]"] == 1.95
+    # Only b moves it, and its 95 % quantile is 1.945: its zone alone may close to 0.91 of itself.
+    assert (np.isnan(turned.inverse.factor[0]), np.isinf(turned.inverse.factor[0])) in ((True, False), (False, True))
+    assert turned.inverse.low[1] <= 0.05 / 0.0548 <= turned.inverse.high[1]
+
+
+def test_two_limits_count_the_units_beyond_either():
+    both = ranked({GAP: Limits(lower=0.98, upper=1.02)})
+    values = both.sample.evaluation.values[:, 0]
+    inside = (values >= 0.98) & (values <= 1.02)
+    assert both.beyond.interval.estimate == pytest.approx(inside.mean())
+    assert any("inside the limits" in sentence or "beyond the limits" in sentence for sentence in both.sentences)
+
+
+def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
+    found = ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)}, Chain(deviation=0.01))
+    assert found.indices.sources == ("a", "b", "scale")
+    at = found.sobol.sources.index("scale")
+    assert (found.sobol.indices.total[:, at] > 0.01).all()
+    share, variance = found.indices.total[at], found.sobol.indices.variance[0]
+    assert share == pytest.approx(0.01**2 / variance, rel=0.15)
+    effect = found.summary["not known of the model"]
+    assert effect["sigma of a unit [mm]"] == pytest.approx(0.01, rel=0.01)
+    assert effect["total index ST [-]"] == pytest.approx(share)
+    assert found.effect.first_order.root_mean_square < 1e-12
+    assert found.local.sources == ("a", "b")
+    assert any(sentence.startswith("Not knowing scale") for sentence in found.sentences)
+    assert ranked({GAP: Limits(upper=1.02)}).summary.keys().isdisjoint({"not known of the model"})

@@ -1,0 +1,347 @@
+"""What drives a model's outputs, and how sure that is: the answer to a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tolalloc.blas import one_blas_thread
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import MonteCarlo
+from tolalloc.capability.one_sided import OneSided
+from tolalloc.capability.yield_at_limit import YieldAtLimit
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SamplingDesign, SeedTree
+from tolalloc.model import Model
+from tolalloc.progress import Record
+from tolalloc.report.answer import Answer, Header
+from tolalloc.report.document import Section
+from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
+from tolalloc.sensitivity.derivatives import (
+    DerivativeMeasures,
+    LocalDerivatives,
+    derivative_measures,
+    local_derivatives,
+)
+from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.inverse import InverseSensitivity
+from tolalloc.sensitivity.measures import Measures
+from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
+from tolalloc.sensitivity.ranking import Reproduction
+from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent, elementary_effects
+from tolalloc.sensitivity.shapley import ShapleyEffects
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.target import TargetSensitivity
+from tolalloc.sensitivity.uncertain import UncertainEffect
+from tolalloc.surrogate.choice import Choice
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SIGNS = {"arcsec": "″", "arcmin": "′", "deg": "°", "%": " %", "-": ""}
+
+
+def unit_of(output: str) -> str:
+    """Return the unit in an output's name, which stands last in brackets."""
+    return output.rsplit(" [", 1)[1].rstrip("]") if " [" in output else "-"
+
+
+def sign_of(unit: str) -> str:
+    """Return what follows a number in a sentence: the unit's sign or, after a blank, the unit."""
+    return _SIGNS.get(unit, f" {unit}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankingAnswer(Answer):
+    """What drives a model's outputs, and how sure that is.
+
+    Parameters
+    ----------
+    model
+        What answered.
+    errors
+        Sources, their distributions and correlations.
+    limits
+        Output → limits; the first one leads.
+    target
+        Share of units that must keep a limit [-].
+    outputs
+        Names of all outputs, in the order of the sample's columns, the leading one first.
+    sample, design
+        Random units with all these outputs, and how they are spread.
+    sobol
+        Indices of these outputs and of the waves of the model's spectra.
+    reproduction
+        How much of the ranking a second seed has shown.
+    orders
+        What each source adds to each order; none for a model without spectra.
+    effect
+        What not knowing the model itself does to the leading output; none where all of it is known.
+    shapley
+        Effects of correlated sources; none where all are independent.
+    classical
+        What a hand calculation says.
+    local, derivatives
+        Derivatives by each source, and what they bound.
+    effects, moments
+        Measures beside Sobol's.
+    reject
+        What drives the units out of the limits.
+    inverse
+        How far each zone may open alone.
+    beyond
+        Probability of a leading output beyond its limits.
+    choice
+        Stand-ins for the model with their errors.
+    """
+
+    kind: ClassVar[str] = "ranking"
+
+    model: Model
+    errors: ErrorModel
+    limits: Mapping[str, Limits]
+    target: float
+    outputs: tuple[str, ...]
+    sample: MonteCarlo
+    design: SamplingDesign
+    sobol: SobolAnalysis
+    reproduction: Reproduction
+    orders: OrderContribution | None
+    effect: UncertainEffect | None
+    shapley: ShapleyEffects | None
+    classical: ClassicalEstimate
+    local: LocalDerivatives
+    derivatives: DerivativeMeasures
+    effects: ElementaryEffects
+    moments: MomentIndependent
+    reject: TargetSensitivity
+    inverse: InverseSensitivity
+    beyond: YieldAtLimit
+    choice: Choice
+
+    @property
+    def leading(self) -> str:
+        """Name of the leading output with its unit."""
+        return self.outputs[0]
+
+    @property
+    def spoken(self) -> str:
+        """What a sentence calls the leading output."""
+        return self.model.spoken(self.leading)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the leading output."""
+        return unit_of(self.leading)
+
+    @property
+    def sign(self) -> str:
+        """What follows a number of the leading output."""
+        return sign_of(self.unit)
+
+    @property
+    def wave_unit(self) -> str:
+        """Unit of the waves of the model's spectra."""
+        return unit_of(next(iter(self.model.spectra.values()))[0])
+
+    @cached_property
+    def indices(self) -> SobolIndices:
+        """Sobol indices of the leading output."""
+        return self.sobol.of(self.leading)
+
+    @cached_property
+    def one_sided(self) -> OneSided:
+        """The leading output against its limits."""
+        return OneSided(response=self.model.reading((self.leading,)), limits=self.limits[self.leading])
+
+    @property
+    def limit_spoken(self) -> str:
+        """What a sentence calls the limits of the leading output."""
+        limits = self.limits[self.leading]
+        if limits.lower is None:
+            return f"{limits.upper:g}{self.sign}"
+        if limits.upper is None:
+            return f"the lower limit of {limits.lower:g}{self.sign}"
+        return f"{limits.lower:g} to {limits.upper:g}{self.sign}"
+
+    @property
+    def title(self) -> str:
+        """Which model, in which study."""
+        return f"What drives {self.header.model}: {self.header.name}"
+
+    @property
+    def subtitle(self) -> str:
+        """Sources, conditions and seed."""
+        conditions = (super().subtitle,) if self.header.conditions else ()
+        return ", ".join((f"{len(self.errors.active)} sources", *conditions, f"seed {self.header.seed}"))
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """Who drives the leading output, each order and the units out of the limits."""
+        from tolalloc.sensitivity.sentences import sentences
+
+        return sentences(self)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on the answer."""
+        from tolalloc.sensitivity.sentences import warnings
+
+        return warnings(self)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Drivers, limits, and what the answer rests on."""
+        from tolalloc.sensitivity.sections import driver_sections, limit_sections, trust_sections
+
+        return (*driver_sections(self), *limit_sections(self), *trust_sections(self))
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        from tolalloc.sensitivity.sentences import assumptions
+
+        return assumptions(self)
+
+    @cached_property
+    def ranking(self) -> pd.DataFrame:
+        """The ranking of the leading output."""
+        from tolalloc.sensitivity.driver_tables import ranking_table
+
+        return ranking_table(self)
+
+    @cached_property
+    def requirements(self) -> pd.DataFrame:
+        """Every output with its distribution, capability and yield."""
+        from tolalloc.sensitivity.limit_tables import capability_table
+
+        return capability_table(self)
+
+    @cached_property
+    def rejects(self) -> pd.DataFrame:
+        """What the units outside have in common."""
+        from tolalloc.sensitivity.limit_tables import reject_table
+
+        return reject_table(self)
+
+    @cached_property
+    def alone(self) -> pd.DataFrame:
+        """How far each zone may open alone."""
+        from tolalloc.sensitivity.limit_tables import inverse_table
+
+        return inverse_table(self)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The whole answer for a program, units in the names."""
+        from tolalloc.sensitivity.sentences import summary
+
+        return summary(self)
+
+
+def rank(
+    model: Model,
+    errors: ErrorModel,
+    limits: Mapping[str, Limits],
+    target: float,
+    effort: RankingEffort,
+    seeds: SeedTree,
+    largest_failed_share: float,
+    record: Record,
+    header: Header,
+) -> RankingAnswer:
+    """Return what drives the outputs of a model at the zones of its drawing.
+
+    Parameters
+    ----------
+    model
+        What answers; its columns are those of the error model.
+    errors
+        Sources of the drawing.
+    limits
+        Output → limits; the first one leads: measures of one output are of this one.
+    target
+        Share of units that must keep a limit [-].
+    effort
+        How much may be computed.
+    seeds
+        Node of the seed tree that belongs to the ranking alone.
+    largest_failed_share
+        Share of units that may fail [-].
+    record
+        Keeps statuses and times.
+    header
+        Name, seed and digest of the study; model, conditions, statuses and stages are filled in here.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is not allowed.
+    SolveError
+        Too many units failed.
+    """
+    measures = Measures(
+        model=model.observed(record.observe),
+        errors=errors,
+        limits=limits,
+        target=target,
+        effort=effort,
+        seeds=seeds,
+        largest_failed_share=largest_failed_share,
+    )
+    leading, spectra, own = measures.leading, model.spectra, measures.experiment
+    with one_blas_thread():
+        with record.stage("random units"):
+            sample = measures.sample()
+        with record.stage("Sobol indices"):
+            sobol = measures.sobol("sobol", tuple(name for names in spectra.values() for name in names))
+            effect = measures.uncertain(sample)
+        with record.stage("Sobol, second seed"):
+            again = measures.sobol("second seed", blocks=sobol.growth.history[-1].blocks)
+        with record.stage("other measures"):
+            derived = measures.derived(sample)
+            shapley = measures.shapley()
+            local = local_derivatives(own("local", derived), effort.derivative_units)
+            derivatives = derivative_measures(own("derivatives", derived), effort.derivative_units)
+            effects = elementary_effects(own("effects", measures.response), effort.trajectories)
+            moments = measures.moments(sample)
+            classical = classical_estimate(own("classical", measures.response))
+        with record.stage("units out of the limit"):
+            reject, beyond = measures.reject(sample), measures.beyond(sample)
+        with record.stage("surrogates"):
+            choice = measures.choice(sample)
+        with record.stage("zones alone"):
+            inverse = measures.inverse(choice)
+    return RankingAnswer(
+        header=replace(
+            header,
+            model=model.name,
+            conditions=model.conditions,
+            assumptions=(*dict.fromkeys((*model.assumptions, *header.assumptions)),),
+            statuses=record.counts,
+            stages=record.stages,
+        ),
+        model=model,
+        errors=errors,
+        limits=limits,
+        target=target,
+        outputs=measures.outputs,
+        sample=sample,
+        design=effort.design,
+        sobol=sobol,
+        reproduction=sobol.of(leading).reproduced_by(again.of(leading)),
+        orders=order_contribution(sobol, spectra) if spectra else None,
+        effect=effect,
+        shapley=shapley,
+        classical=classical,
+        local=local,
+        derivatives=derivatives,
+        effects=effects,
+        moments=moments,
+        reject=reject,
+        inverse=inverse,
+        beyond=beyond,
+        choice=choice,
+    )

@@ -1,1 +1,0 @@
-"""The report on what drives a reducer's outputs."""

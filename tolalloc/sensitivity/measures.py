@@ -1,0 +1,226 @@
+"""What drives the outputs of any model: every measure on the same zones, with random numbers of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.capability.experiment import Experiment, Given
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
+from tolalloc.capability.one_sided import OneSided
+from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
+from tolalloc.differences import DifferencedResponse
+from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.model import Model, Response, ResponseWithDerivatives, SettingDerivatives
+from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
+from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
+from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
+from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
+from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
+from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
+from tolalloc.surrogate.choice import Choice, choose
+from tolalloc.surrogate.regression import RegressionCandidate, quadratic_regression, sparse_quadratic_regression
+from tolalloc.surrogate.validation import Candidate
+
+_MOST_COLUMNS = 100
+"""Columns beyond which all products of two are more than the samples can tell apart [-]."""
+_STEP = 0.02
+"""Step of a difference by a column over its standard deviation [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exact:
+    """An output with the exact derivatives that its model knows."""
+
+    model: Model
+    output: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The model's columns."""
+        return self.model.columns
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the output of every sample and its derivatives."""
+        return self.model.derivatives(self.output, x)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measures:
+    """What may be measured of a model at the zones of its drawing.
+
+    Parameters
+    ----------
+    model
+        What answers, observed.
+    errors
+        Sources of the drawing.
+    limits
+        Output → limits; the first one leads: measures of one output are of this one.
+    target
+        Share of units that must keep the limits [-].
+    effort
+        How much may be computed.
+    seeds
+        Node of the seed tree.
+    largest_failed_share
+        Share of units that may fail [-].
+    """
+
+    model: Model
+    errors: ErrorModel
+    limits: Mapping[str, Limits]
+    target: float
+    effort: RankingEffort
+    seeds: SeedTree
+    largest_failed_share: float
+
+    @property
+    def leading(self) -> str:
+        """Name of the leading output with its unit."""
+        return next(iter(self.limits))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All outputs of the model, the leading one first."""
+        return (self.leading, *(name for name in self.model.outputs if name != self.leading))
+
+    @cached_property
+    def response(self) -> Response:
+        """The leading output."""
+        return self.model.reading((self.leading,))
+
+    @cached_property
+    def one_sided(self) -> OneSided:
+        """The leading output against its limits."""
+        return OneSided(response=self.response, limits=self.limits[self.leading])
+
+    def experiment(self, name: str, response: Given, errors: ErrorModel | None = None) -> Experiment[Given]:
+        """Return the experiment of one measure."""
+        return Experiment.of(response, errors or self.errors, self.seeds.child(name), self.largest_failed_share)
+
+    def sample(self) -> MonteCarlo:
+        """Return random units with all outputs."""
+        units = self.experiment("units", self.model.reading(self.outputs))
+        return monte_carlo(units, self.effort.units, self.effort.design)
+
+    def sobol(self, name: str, waves: tuple[str, ...] = (), blocks: int = 0) -> SobolAnalysis:
+        """Return the indices of all outputs and waves, what is uncertain of the model among the sources.
+
+        Parameters
+        ----------
+        name
+            Node of the seed tree.
+        waves
+            Outputs of the model's spectra.
+        blocks
+            Number of blocks, without pairs; as many as the ranking needs if 0 [-].
+        """
+        outputs, effort = (*self.outputs, *waves), self.effort.sobol
+        joint = replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
+        response = self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
+        return sobol_indices(
+            self.experiment(name, response, joint),
+            replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
+            FactorGroup.BLOCK if self.errors.is_correlated else FactorGroup.SOURCE,
+            ranked=tuple(self.limits),
+        )
+
+    def uncertain(self, sample: MonteCarlo) -> UncertainEffect | None:
+        """Return what not knowing the model itself does to the leading output; none where all of it is known."""
+        if not self.model.uncertain:
+            return None
+        return uncertain_effect(
+            self.model, self.leading, sample.x[sample.evaluation.good], self.seeds.child("uncertain")
+        )
+
+    def shapley(self) -> ShapleyEffects | None:
+        """Return the shares of correlated sources; none where all are independent."""
+        if not self.errors.is_correlated:
+            return None
+        return shapley_effects(self.experiment("shapley", self.response), self.effort.permutations)
+
+    def derived(self, sample: MonteCarlo) -> ResponseWithDerivatives:
+        """Return the leading output with its derivatives, exact ones if the model knows them."""
+        if self.leading in self.model.exact:
+            return _Exact(model=self.model, output=self.leading)
+        return DifferencedResponse(
+            response=self.response, output=self.leading, steps=_STEP * sample.x[sample.evaluation.good].std(axis=0)
+        )
+
+    def moments(self, sample: MonteCarlo) -> MomentIndependent:
+        """Return PAWN and delta of the first units of a sample."""
+        first = _first(sample, self.effort.moment_units)
+        return moment_independent(
+            first, self.errors, self.seeds.child("moments"), largest_failed_share=self.largest_failed_share
+        )
+
+    def reject(self, sample: MonteCarlo) -> TargetSensitivity:
+        """Return what the units of a sample beyond the limits share."""
+        return target_sensitivity(
+            self.one_sided.of_sample(sample),
+            self.errors,
+            self.one_sided.limit,
+            self.seeds.child("reject"),
+            largest_failed_share=self.largest_failed_share,
+        )
+
+    def beyond(self, sample: MonteCarlo) -> YieldAtLimit:
+        """Return the probability of a unit beyond the limits, from a sample and where it is rare from more units."""
+        return yield_at_limit(
+            ResponseLimit(
+                experiment=self.experiment("beyond", self.one_sided.facing(self.response)), limit=self.one_sided.limit
+            ),
+            self.one_sided.of_sample(sample),
+            samples=self.effort.level_units,
+            runs=self.effort.level_runs,
+            weighted=self.effort.widened_units,
+        )
+
+    def inverse(self, choice: Choice) -> InverseSensitivity:
+        """Return how far each zone may open alone, on the surrogate if one has earned its place."""
+        return inverse_sensitivity(
+            self.experiment("inverse", self.one_sided.facing(choice.chosen or self.response)),
+            limit=self.one_sided.limit,
+            target=self.target,
+            units=max(self.effort.inverse_units, fewest_units(self.target)),
+        )
+
+    def choice(self, sample: MonteCarlo) -> Choice:
+        """Return which stand-in has earned its place on the first units of a sample."""
+        columns, outputs = self.response.columns, self.response.outputs
+        candidates: list[Candidate] = list(self.model.stand_ins()) if self.leading == self.model.outputs[0] else []
+        if len(columns) <= _MOST_COLUMNS or not candidates:
+            candidates += [
+                RegressionCandidate(name=name, columns=columns, outputs=outputs, estimator=estimator)
+                for name, estimator in (
+                    ("quadratic regression", quadratic_regression),
+                    ("sparse quadratic regression", sparse_quadratic_regression),
+                )
+            ]
+        return choose(
+            self.response,
+            candidates,
+            sample.x[: self.effort.surrogate_units],
+            self.seeds.child("surrogates"),
+            quantile=self.target,
+            largest_failed_share=self.largest_failed_share,
+        )
+
+
+def _first(sample: MonteCarlo, units: int) -> MonteCarlo:
+    """Return the first units of a sample."""
+    evaluation = sample.evaluation
+    return MonteCarlo(
+        x=sample.x[:units],
+        evaluation=replace(evaluation, values=evaluation.values[:units], status=evaluation.status[:units]),
+    )

@@ -1,0 +1,135 @@
+"""The sections of a ranking's report."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from tolalloc.drawing.tolerance_table import table_frame
+from tolalloc.report.document import Section
+from tolalloc.sensitivity import driver_tables, figures, limit_tables, trust_tables
+from tolalloc.sensitivity.answer import RankingAnswer
+
+
+def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return which error drives what: the peak-to-peak, all requirements, each order."""
+    return (
+        Section(
+            heading=f"Which error drives the {answer.spoken}",
+            paragraphs=(
+                "The total index is the share of the variance in which the error has a part, alone or together with "
+                "others; the first-order index is its part alone. Contribution is its share of the sum of all total "
+                "indices. Intervals of 90 % and places come from resampled blocks.",
+            ),
+            figures=(figures.ranking_figure(answer),),
+            tables=(
+                ("ranking", answer.ranking),
+                *_pairs(answer),
+                ("growth", driver_tables.growth_table(answer)),
+            ),
+        ),
+        *_correlated(answer),
+        Section(
+            heading="One ranking over all requirements",
+            paragraphs=(
+                "Sources by their largest total index over the outputs that have a limit "
+                f"({', '.join(name.split(' [')[0] for name in answer.sobol.ranked)}); the others stand beside them.",
+            ),
+            figures=(figures.requirements_figure(answer),),
+            tables=(("all requirements", driver_tables.overall_table(answer)),),
+        ),
+        *_orders(answer),
+    )
+
+
+def _orders(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return what makes each order; nothing for a model without spectra."""
+    if answer.orders is None:
+        return ()
+    note = f"{answer.model.spectra_note}; " if answer.model.spectra_note else ""
+    return (
+        Section(
+            heading="Which error makes which order",
+            paragraphs=(f"{note}what a source adds only together with others is the difference of the two shares.",),
+            figures=(figures.orders_figure(answer),),
+            tables=(("orders", driver_tables.orders_table(answer)),),
+        ),
+    )
+
+
+def _pairs(answer: RankingAnswer) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """Return the table of pairs, if the study asked for it."""
+    pairs = driver_tables.pairs_table(answer)
+    return () if pairs.empty else (("pairs", pairs),)
+
+
+def _correlated(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return how correlated sources share the variance; nothing where all are independent."""
+    if answer.shapley is None:
+        return ()
+    return (
+        Section(
+            heading="Correlated sources",
+            paragraphs=answer.errors.correlation.mappings(answer.errors.sources),
+            tables=(("Shapley effects", driver_tables.shapley_table(answer.shapley)),),
+        ),
+    )
+
+
+def limit_sections(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return what the limits do: yield, units beyond them, and how far each zone may open."""
+    alone = figures.inverse_figure(answer)
+    return (
+        Section(
+            heading="Yield and capability",
+            figures=(figures.sample_figure(answer),),
+            tables=(
+                ("requirements", answer.requirements),
+                ("beyond the limit", limit_tables.beyond_table(answer)),
+                ("stack-up", limit_tables.stack_up_table(answer)),
+            ),
+        ),
+        Section(
+            heading="What drives the units out of the limit",
+            figures=(figures.reject_figure(answer),),
+            tables=(("rejects", answer.rejects),),
+        ),
+        Section(
+            heading="How far each zone may open alone",
+            figures=(alone,) if alone else (),
+            tables=(("alone", answer.alone),),
+        ),
+    )
+
+
+def trust_sections(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return what the answer rests on: other measures, stand-ins, distributions, work done."""
+    return (
+        Section(
+            heading="Other measures of the same",
+            paragraphs=(
+                f"An index of PAWN below {answer.moments.pawn_dummy:.3f} or of delta below "
+                f"{answer.moments.delta_dummy:.3f} means nothing: an input that does nothing reaches as much.",
+            ),
+            tables=(("measures", trust_tables.measures_table(answer)),),
+        ),
+        Section(
+            heading="Stand-ins for the model",
+            paragraphs=(answer.choice.reason,),
+            tables=(("surrogates", trust_tables.surrogate_table(answer)),),
+        ),
+        Section(
+            heading="From zone to distribution",
+            tables=(
+                ("mapping", trust_tables.mapping_table(answer)),
+                *trust_tables.measured_tables(answer),
+                ("tolerances", table_frame(answer.errors.sources)),
+            ),
+        ),
+        Section(
+            heading="Work done",
+            paragraphs=(
+                ", ".join(f"{count} units: {outcome}" for outcome, count in answer.header.statuses.items() if count),
+            ),
+            tables=(("work", trust_tables.work_table(answer)),),
+        ),
+    )

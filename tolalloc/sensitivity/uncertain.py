@@ -1,0 +1,174 @@
+"""What not knowing the model itself does to an output, and how far the first order that says so can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawing.correlation import CorrelatedSource
+from tolalloc.drawing.seeds import SeedTree
+from tolalloc.exceptions import SolveError
+from tolalloc.model import Model
+
+_UNITS = 256
+"""Units over which the effect is averaged [-]."""
+_DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
+"""Directions in which all that is uncertain is changed together, either way, and units that the model solves there [-].
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrderError:
+    """First order minus model at a change of what is uncertain.
+
+    Parameters
+    ----------
+    root_mean_square, largest
+        Of the difference [output].
+    effect
+        Root-mean-square of what the same changes do to the output [output].
+    units, changes
+        Units and changes behind it [-].
+    accuracy
+        How well the model answers; no smaller difference means anything [output].
+    """
+
+    root_mean_square: float
+    largest: float
+    effect: float
+    units: int
+    changes: int
+    accuracy: float
+
+    @property
+    def fails(self) -> bool:
+        """Whether the error is half of the effect or more, and more than the model's accuracy leaves."""
+        return self.root_mean_square > max(0.5 * self.effect, self.accuracy)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertainEffect:
+    """What not knowing the model does to the output, and how well that is known.
+
+    Parameters
+    ----------
+    sources
+        What is uncertain.
+    sigma
+        Standard deviation of one unit's output from the sources alone, root-mean-square over units [output].
+    sigma_of_mean
+        Standard deviation of the mean over all units, which the sources shift together [output].
+    first_order
+        First order against model.
+    """
+
+    sources: tuple[CorrelatedSource, ...]
+    sigma: float
+    sigma_of_mean: float
+    first_order: FirstOrderError
+
+    def summary(self, total: float, unit: str) -> dict[str, Any]:
+        """Return the effect for a program, with its total index in the ranking and the unit of the output."""
+        return {
+            "source": " + ".join(source.name for source in self.sources),
+            "total index ST [-]": total,
+            f"sigma of a unit [{unit}]": self.sigma,
+            f"sigma of the mean [{unit}]": self.sigma_of_mean,
+            f"first-order error at 2 sigma, rms [{unit}]": self.first_order.root_mean_square,
+            f"first-order error at 2 sigma, largest [{unit}]": self.first_order.largest,
+            f"effect at 2 sigma, rms [{unit}]": self.first_order.effect,
+        }
+
+
+def uncertain_effect(
+    model: Model, output: str, x: Float[np.ndarray, "unit column"], seeds: SeedTree, units: int = _UNITS
+) -> UncertainEffect:
+    """Return what the model's uncertain columns alone do to units, with the first order checked at ±2σ.
+
+    Parameters
+    ----------
+    model
+        What answers, to first order by `with_uncertain` and exactly by `changed`.
+    output
+        Name of the output with its unit.
+    x
+        Good units.
+    seeds
+        Node of the seed tree, from which the directions of the changes come.
+    units
+        How many of the units are taken [-].
+    """
+    factor = _factor(model.uncertain)
+    gradient = _gradient(model, output, x[:units])
+    known = gradient[np.isfinite(gradient).all(axis=1)]
+    directions = seeds.generator().standard_normal((_DIRECTIONS, len(factor)))
+    ends = 2.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True) @ factor.T
+    return UncertainEffect(
+        sources=model.uncertain,
+        sigma=float(np.sqrt(((known @ factor) ** 2).sum(axis=1).mean())),
+        sigma_of_mean=float(np.linalg.norm(known.mean(axis=0) @ factor)),
+        first_order=first_order_error(model, output, x[:_UNITS_PER_DIRECTION], np.concatenate([ends, -ends])),
+    )
+
+
+def first_order_error(
+    model: Model, output: str, x: Float[np.ndarray, "unit column"], changes: Float[np.ndarray, "change uncertain"]
+) -> FirstOrderError:
+    """Return how far the first order is from the model whose uncertain columns have changed.
+
+    Parameters
+    ----------
+    changes
+        Joint changes of the uncertain columns, each of which the model must be made anew for.
+
+    Raises
+    ------
+    SolveError
+        No unit has an answer at any of the changes.
+    """
+    before = model.reading((output,))(x)
+    predicted = _gradient(model, output, x) @ changes.T
+    after = [model.changed(change).reading((output,))(x) for change in changes]
+    effect = np.stack(
+        [np.where(found.good & before.good, found.values[:, 0] - before.values[:, 0], np.nan) for found in after],
+        axis=1,
+    )
+    error = predicted - effect
+    good = np.isfinite(error)
+    if not good.any():
+        raise SolveError(
+            f"{' + '.join(source.name for source in model.uncertain)}: no unit has an answer at changes of up to "
+            f"{float(np.abs(changes).max()):.3g}; allowed are standard uncertainties that leave a {model.name}."
+        )
+    return FirstOrderError(
+        root_mean_square=float(np.sqrt((error[good] ** 2).mean())),
+        largest=float(np.abs(error[good]).max()),
+        effect=float(np.sqrt((effect[good] ** 2).mean())),
+        units=x.shape[0],
+        changes=changes.shape[0],
+        accuracy=model.accuracy.get(output, 0.0),
+    )
+
+
+def _gradient(model: Model, output: str, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit uncertain"]:
+    """Return the first order itself, NaN where a unit has no answer [output per uncertain column]."""
+    columns = sum(len(source.columns) for source in model.uncertain)
+    shifts = np.concatenate([np.zeros((1, columns)), np.eye(columns)])
+    rows = np.concatenate([np.repeat(x, len(shifts), axis=0), np.tile(shifts, (len(x), 1))], axis=1)
+    found = model.with_uncertain((output,))(rows)
+    values = np.where(found.good, found.values[:, 0], np.nan).reshape(len(x), -1)
+    return values[:, 1:] - values[:, :1]
+
+
+def _factor(sources: tuple[CorrelatedSource, ...]) -> Float[np.ndarray, "uncertain uncertain"]:
+    """Return the symmetric root of the covariance of all uncertain columns."""
+    size = sum(len(source.columns) for source in sources)
+    factor, start = np.zeros((size, size)), 0
+    for source in sources:
+        stop = start + len(source.columns)
+        factor[start:stop, start:stop] = source.factor
+        start = stop
+    return factor
