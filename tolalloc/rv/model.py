@@ -244,13 +244,11 @@ class ReducerModel(Model):
 
     def stand_ins(self) -> tuple[Any, ...]:
         """Return the contact at fewer angles and, for few columns, a regression of the curve."""
-        from tolalloc.rv.stand_ins import ContactCandidate
+        from tolalloc.rv.stand_ins import ContactCandidate, CurveCandidate
 
         contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
         if len(self.columns) > _MOST_COLUMNS:
             return contact
-        from tolalloc.rv.stand_ins import CurveCandidate
-
         return (*contact, CurveCandidate(kernel=self.kernel))
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
