@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from published_cases import CASES, bearing_moments, clutch, figures, gap_chain, limit_stack
+from published.allocation_cases import CASES, bearing_moments, clutch, figures, gap_chain, limit_stack
 
 from tolalloc.allocation.program.problem import AllocationProblem, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-import importlib.util
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tolalloc.allocation.program.problem import Solution
+from studies.published import allocation_cases as published
+from studies.published.stacks import root_sum_square
+from tolalloc.allocation.cost.process_costs_file import priced
+from tolalloc.allocation.program.problem import AllocationProblem, Feature, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
+from tolalloc.drawing.sources import Source
+from tolalloc.drawing.zones import Feature as Callout
+from tolalloc.units import MILLIMETRE
 
-SCRIPT = Path(__file__).parents[2] / "studies" / "published_cases.py"
 CHAIN = ("reciprocal", "t_min of x1 is 0.25", "t_max of x3 is 0.30", "exponential")
 METHODS = ("root sum square", "worst case")
-
-
-@pytest.fixture(scope="module")
-def published():
-    spec = importlib.util.spec_from_file_location("published_cases", SCRIPT)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def solved(problem) -> Solution:
@@ -72,7 +65,7 @@ def brute_force(case: dict, slopes: np.ndarray, loss: float, method: str) -> lis
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("loss", [0, 20, 100])
-def test_the_clutch_equals_a_brute_force_over_all_process_sets(published, loss, method):
+def test_the_clutch_equals_a_brute_force_over_all_process_sets(loss, method):
     case, problem = published.CASES["clutch_choi2000"], published.clutch(loss, method=method)
     best = solved(problem)
     second = second_best(problem, best)
@@ -84,8 +77,28 @@ def test_the_clutch_equals_a_brute_force_over_all_process_sets(published, loss, 
     assert second.gap <= 1e-6
 
 
+def test_the_clutch_priced_as_a_users_own_model_has_the_optimum_of_the_file():
+    """Costs a + b/t with t = ± tolerance in mm, through zones in metres."""
+    case = published.CASES["clutch_choi2000"]
+    rows = {
+        part: [(f"process {at}", own["a"], own["b"], own["t_min"], own["t_max"]) for at, own in enumerate(processes, 1)]
+        for part, processes in case["processes"].items()
+    }
+    sources = [
+        Source(name=part, part=part, feature=Callout.SIZE, zone=0.2e-3, minimum=1e-5, maximum=1e-3, cost=1.0)
+        for part in rows
+    ]
+    made = priced(rows, sources, tolerance="half zone")
+    features = tuple(Feature(name=part, processes=processes) for part, processes in made.items())
+    stack = root_sum_square("angle", np.array(case["sensitivities"]) / (2 * MILLIMETRE), 0.035)
+    best, known = solved(AllocationProblem(features=features, stacks=(stack,))), case["results"]["0"]["true_optimum"]
+    assert best.cost == pytest.approx(known["total"], rel=1e-9)
+    assert (best.processes + 1).tolist() == known["processes"]
+    np.testing.assert_allclose(best.zones / (2 * MILLIMETRE), known["t"], rtol=1e-5)
+
+
 @pytest.mark.parametrize("loss", ["0", "20"])
-def test_the_clutch_has_the_optimum_of_the_file(published, loss):
+def test_the_clutch_has_the_optimum_of_the_file(loss):
     known = published.CASES["clutch_choi2000"]["results"][loss]["true_optimum"]
     problem = published.clutch(float(loss))
     best = solved(problem)
@@ -99,7 +112,7 @@ def test_the_clutch_has_the_optimum_of_the_file(published, loss):
 
 
 @pytest.mark.parametrize(("loss", "over"), [("0", 1.435e-4), ("20", 1.451e-4)])
-def test_the_published_points_of_the_clutch_break_its_requirement(published, loss, over):
+def test_the_published_points_of_the_clutch_break_its_requirement(loss, over):
     """By 0.014 %: that is how the second of them is cheaper than the optimum."""
     own, problem = published.CASES["clutch_choi2000"]["results"][loss], published.clutch(float(loss))
     point, processes = np.array(own["published_t"]), np.array(own["published_processes"]) - 1
@@ -111,7 +124,7 @@ def test_the_published_points_of_the_clutch_break_its_requirement(published, los
     assert problem.cost(point, processes) + best.prices[0] * problem.violation(point, np.empty(0))[0] > best.cost
 
 
-def test_the_other_size_of_the_cage_has_the_optimum_of_the_file(published):
+def test_the_other_size_of_the_cage_has_the_optimum_of_the_file():
     case = published.CASES["clutch_choi2000"]
     np.testing.assert_allclose(published.clutch_sensitivities(101.6), case["sensitivities"], rtol=1e-13)
     known = case["computed_variants"]["rss_A0_with_X4=101.69"]
@@ -129,7 +142,7 @@ def test_the_other_size_of_the_cage_has_the_optimum_of_the_file(published):
 
 
 @pytest.mark.parametrize("variant", CHAIN)
-def test_the_gap_chain_equals_its_closed_form(published, variant):
+def test_the_gap_chain_equals_its_closed_form(variant):
     known, problem = published.CASES["gap_chain"]["computed"], published.gap_chain(variant)
     best = solved(problem)
     assert problem.stacks[0].budget == pytest.approx(known["sigma_max"], rel=1e-9)
@@ -138,13 +151,13 @@ def test_the_gap_chain_equals_its_closed_form(published, variant):
     assert second_best(problem, best) is None
 
 
-def test_the_price_of_the_gap_chain_is_its_multiplier(published):
+def test_the_price_of_the_gap_chain_is_its_multiplier():
     """The file's multiplier belongs to the variance; that of the standard deviation is 2σ times it."""
     known, best = published.CASES["gap_chain"]["computed"], solved(published.gap_chain("reciprocal"))
     assert best.prices[0] == pytest.approx(2 * known["sigma_max"] * known["reciprocal"]["lambda"], rel=1e-5)
 
 
-def test_a_bound_that_binds_in_the_gap_chain_has_a_price(published):
+def test_a_bound_that_binds_in_the_gap_chain_has_a_price():
     for variant, at, side in ((CHAIN[1], 0, 0), (CHAIN[2], 2, 1)):
         priced = solved(published.gap_chain(variant)).bound_prices
         assert priced[at, side] > 0.1
@@ -152,7 +165,7 @@ def test_a_bound_that_binds_in_the_gap_chain_has_a_price(published):
         assert priced.max() < 1e-5
 
 
-def test_the_bearing_stack_has_its_moments_and_yields(published):
+def test_the_bearing_stack_has_its_moments_and_yields():
     case = published.CASES["bearing_stack"]
     known, printed, limits = (
         case["computed"],
@@ -174,7 +187,7 @@ def test_the_bearing_stack_has_its_moments_and_yields(published):
     np.testing.assert_allclose(extremes, printed["worst case"], atol=1e-12)
 
 
-def test_the_bearing_stack_sampled_has_the_printed_yield(published, generator):
+def test_the_bearing_stack_sampled_has_the_printed_yield(generator):
     """Within four standard errors of a million units, and the printed ±0.0005."""
     case, units = published.CASES["bearing_stack"], 1_000_000
     gap = np.zeros(units)
@@ -190,7 +203,7 @@ def test_the_bearing_stack_sampled_has_the_printed_yield(published, generator):
     assert abs(inside - printed) <= tolerance + 4 * np.sqrt(printed * (1 - printed) / units)
 
 
-def test_the_allocated_bearing_stack_just_keeps_its_yield(published):
+def test_the_allocated_bearing_stack_just_keeps_its_yield():
     """Its costs are not printed, so that it is the cheapest point cannot be checked, only that nothing is left over.
 
     Zones are printed to 0.001 mm, which moves the yield by 5e-5.
@@ -202,7 +215,7 @@ def test_the_allocated_bearing_stack_just_keeps_its_yield(published):
     assert kept == pytest.approx(case["published"]["allocated yield"], abs=5e-5)
 
 
-def test_the_handbook_stack_has_its_printed_zones(published):
+def test_the_handbook_stack_has_its_printed_zones():
     case = published.CASES["handbook_1999"]["chapter 9"]
     nominal, signs, zones = published.limit_stack(case["rows"])
     printed, found = case["published"], published.figures(signs, zones)
@@ -215,7 +228,7 @@ def test_the_handbook_stack_has_its_printed_zones(published):
         assert nominal + found[method] == pytest.approx(printed[f"{method}_max"], abs=5.1e-4)
 
 
-def test_the_two_dimensional_handbook_stack_has_the_recomputed_zones(published):
+def test_the_two_dimensional_handbook_stack_has_the_recomputed_zones():
     """The book's own 0.0719 and 0.0967 come from sensitivities that it prints rounded."""
     case = published.CASES["handbook_1999"]["chapter 12"]
     sizes, zones, slopes = np.array(case["rows"]).T
@@ -227,7 +240,7 @@ def test_the_two_dimensional_handbook_stack_has_the_recomputed_zones(published):
     assert found["RSS"] == pytest.approx(case["computed"]["RSS"], rel=1e-12)
 
 
-def test_the_shaft_stack_has_its_printed_zones(published):
+def test_the_shaft_stack_has_its_printed_zones():
     """The printed σ of 0.05874 is 1.1 % below a third of the printed RSS and follows from none of its data."""
     case = published.CASES["mitcalc_stack"]
     nominal, signs, zones = published.limit_stack(case["rows"])

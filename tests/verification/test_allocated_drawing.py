@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 from tolalloc.allocation.answer.cost_formulas import cost_formula
 from tolalloc.allocation.answer.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import Weighted
+from tolalloc.allocation.cost.model import SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Points
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
-from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
+from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import app
 from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame

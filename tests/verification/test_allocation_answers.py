@@ -9,8 +9,7 @@ import pytest
 
 import tolalloc.allocation.robustness as module
 from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import Weighted
-from tolalloc.allocation.cost.sampled import SumOfCosts
+from tolalloc.allocation.cost.model import SumOfCosts, Weighted
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.robustness import COST_CHANGE, Robustness, Variant, robustness

@@ -15,9 +15,9 @@ from tolalloc.allocation.cost.closed_forms import (
     reciprocal_squared,
 )
 from tolalloc.allocation.cost.fit import best_fit, fits
-from tolalloc.allocation.cost.model import CostModel, Process
+from tolalloc.allocation.cost.model import CostModel, Process, SumOfCosts
 from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.sampled import OUTER_ERROR, Spline, SumOfCosts, Tabulated
+from tolalloc.allocation.cost.sampled import OUTER_ERROR, Spline, Tabulated
 from tolalloc.exceptions import InputError
 
 ZONES = np.geomspace(2.0, 30.0, 10)

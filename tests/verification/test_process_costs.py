@@ -14,9 +14,8 @@ from tolalloc.allocation.cost.closed_forms import (
     ReciprocalPower,
     reciprocal_squared,
 )
-from tolalloc.allocation.cost.points_file import load_shop_points
-from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
-from tolalloc.allocation.cost.process_costs_file import load_process_costs, today
+from tolalloc.allocation.cost.points import load_shop_points
+from tolalloc.allocation.cost.process_costs_file import ProcessCostRow, load_process_costs, today
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawing.table_file import DATA, read_rows
 from tolalloc.drawing.tolerance_table import load_tolerance_table
@@ -248,3 +247,34 @@ def test_shop_data_are_sorted_micrometres(tmp_path):
     found = load_shop_points(tmp_path / "shop.csv")
     assert found["hobbed", None].zones == pytest.approx((5.0, 10.0, 20.0, 30.0))
     assert found["hobbed", Feature.RUNOUT].costs == (9.0, 7.0)
+
+
+@pytest.mark.parametrize(("tolerance", "factor"), [("zone", 0.02), ("half zone", 0.04)])
+def test_costs_from_python_are_read_in_millimetres_and_given_in_metres(tolerance, factor):
+    found = priced({"disc1.pitch": [("rough", 1.0, 0.02, 0.01, 0.4)]}, SOURCES, tolerance)
+    (rough,) = found["disc1.pitch"]
+    assert cost_at(rough, 20) == pytest.approx(1 + factor / 0.02)
+    assert (rough.minimum, rough.maximum) == pytest.approx((0.01e-3 * factor / 0.02, PITCH.maximum))
+    assert set(found) == set(load_process_costs("rv20e", SOURCES))
+    runout = next(source for source in SOURCES if source.name == "disc1.runout")
+    assert found["disc1.runout"] == (today(runout),)
+
+
+def test_of_costs_from_python_those_stay_whose_zones_the_source_may_have():
+    rows = [("rough", 1.0, 0.02, 0.01, 0.4), ("roughest", 0.5, 0.02, 1.0, 2.0)]
+    assert [process.name for process in priced({"disc1.pitch": rows}, [PITCH])["disc1.pitch"]] == ["rough"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        ({"disc3.pitch": []}, "process costs: source whose zone may change, 'disc3.pitch' is not known"),
+        ({"disc1.pitch": [("own", 1, 1, 0.01, 0.02)] * 2}, "processes is .* allowed is each name once"),
+        ({"disc1.pitch": [("own", 1, 1, 1, 2)]}, "no process can hold a zone of 3.5 to 46.6 µm for disc1.pitch"),
+        ({"disc1.pitch": [("own", 1, -1, 0.01, 0.02)]}, "factor is -0.001; allowed is a finite number above 0"),
+    ],
+)
+def test_bad_costs_from_python_are_refused_in_one_sentence(rows, sentence):
+    with pytest.raises(TolallocError, match=sentence) as caught:
+        priced(rows, [PITCH])
+    assert "\n" not in str(caught.value)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tolalloc.allocation.program.stacks import (
+from studies.published.stacks import (
     inertial,
     inflated,
     mean_shift,
@@ -73,7 +73,7 @@ def test_the_inertial_stack_is_attained_by_equal_inertias():
     ],
 )
 @pytest.mark.parametrize("share", [0.6, 0.9973, 1 - 1e-9])
-def test_the_room_of_a_yield_is_the_deviation_that_just_keeps_it(limits, mean, share):
+def test_the_budget_of_a_yield_is_the_deviation_that_just_keeps_it(limits, mean, share):
     stack = yield_root_sum_square("gap", SLOPES, limits, mean=mean, share=share, deviations=4.0)
     low = -np.inf if limits.lower is None else limits.lower
     high = np.inf if limits.upper is None else limits.upper

@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.cost.model import Process, made_together
 from tolalloc.allocation.cost.process_costs_file import today
-from tolalloc.allocation.cost.sampled import made_together
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import Source

@@ -16,18 +16,16 @@ def costs(
     as_json: AsJson = False,
 ) -> None:
     """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
-    from tolalloc.allocation.cost.fits_answer import cost_fits_document, fits_table, fitted_processes
-    from tolalloc.allocation.cost.points_file import load_shop_points
+    from tolalloc.allocation.cost.answer import CostFitsAnswer
+    from tolalloc.allocation.cost.points import load_shop_points
     from tolalloc.cli.document_script import written
 
-    found = fitted_processes(load_shop_points(shop))
-    document = cost_fits_document(found, shop.name)
+    answer = CostFitsAnswer.of(load_shop_points(shop), shop.name)
     if out:
-        written(out, lambda: document)
+        written(out, lambda: answer.document)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    table = fits_table(found)
     columns = ["process", "form, t in µm [cost units]", "rms error [%]", "error at points left out [%]", "taken"]
-    print_table(table[columns], f"{shop.name}: what a zone costs")
-    say(document)
+    print_table(answer.fits[columns], f"{shop.name}: what a zone costs")
+    say(answer.document)

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import Weighted
-from tolalloc.allocation.cost.sampled import Spline, SumOfCosts, Tabulated
+from tolalloc.allocation.cost.model import SumOfCosts, Weighted
+from tolalloc.allocation.cost.sampled import Spline, Tabulated
 
 
 @singledispatch

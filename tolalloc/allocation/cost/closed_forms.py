@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite, log
+from typing import Any
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
+
+Expression = Any
+"""Expression of cvxpy, which is imported when a program is made."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +55,10 @@ class Reciprocal(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.factor / zone**2)
 
-    def expression(self, zone: cp.Expression) -> cp.Expression:
+    def expression(self, zone: Expression) -> Expression:
         """Return the cost as a convex expression."""
+        import cvxpy as cp
+
         return self.fixed + self.factor * cp.inv_pos(zone)
 
     def rescaled(self, unit: float) -> Reciprocal:
@@ -81,13 +86,15 @@ class ReciprocalPower(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.exponent * self.factor * zone ** (-self.exponent - 1.0))
 
-    def expression(self, zone: cp.Expression) -> cp.Expression:
+    def expression(self, zone: Expression) -> Expression:
         """Return the cost as a convex expression.
 
         Notes
         -----
         Through the logarithm, as solvers take powers by a rational exponent that is only close to n.
         """
+        import cvxpy as cp
+
         return self.fixed + cp.exp(log(self.factor) - self.exponent * cp.log(zone))
 
     def rescaled(self, unit: float) -> ReciprocalPower:
@@ -120,8 +127,10 @@ class Exponential(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.factor / self.scale * np.exp(-zone / self.scale))
 
-    def expression(self, zone: cp.Expression) -> cp.Expression:
+    def expression(self, zone: Expression) -> Expression:
         """Return the cost as a convex expression."""
+        import cvxpy as cp
+
         return self.fixed + self.factor * cp.exp(-zone / self.scale)
 
     def rescaled(self, unit: float) -> Exponential:
@@ -157,8 +166,10 @@ class Combined(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-(self.value(zone) - self.fixed) * (self.exponent / zone + 1.0 / self.scale))
 
-    def expression(self, zone: cp.Expression) -> cp.Expression:
+    def expression(self, zone: Expression) -> Expression:
         """Return the cost as a convex expression."""
+        import cvxpy as cp
+
         return self.fixed + cp.exp(log(self.factor) - self.exponent * cp.log(zone) - zone / self.scale)
 
     def rescaled(self, unit: float) -> Combined:

@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares, nnls
 
 from tolalloc.allocation.cost.closed_forms import ClosedForm, Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.points import Points
@@ -182,6 +181,8 @@ def _searched(
 
     logs = np.log(list(start.values()))
     if start:
+        from scipy.optimize import least_squares
+
         lower, upper = np.log([_BOUNDS[name] for name in start]).T
         inside = np.clip(logs, lower, upper)  # a result at its bound is rounded when it is started from again
         tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
@@ -193,6 +194,8 @@ def _searched(
 
 def _linear(unit: Float[np.ndarray, " point"], costs: Float[np.ndarray, " point"]) -> tuple[float, float]:
     """Return fixed cost and factor of the part that falls, both 0 or above, with the smallest relative errors."""
+    from scipy.optimize import nnls
+
     columns = np.stack([1.0 / costs, unit / unit.max() / costs], axis=1)
     (fixed, factor), _ = nnls(columns, np.ones_like(costs))
     return float(fixed), float(factor / unit.max())

@@ -1,24 +1,22 @@
-"""What every cost model can do, and a process: a cost model with the zones that it can hold."""
+"""What every cost model can do, a process with the zones that it can hold, and costs made of other costs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.cost.closed_forms import Expression, Reciprocal
 from tolalloc.exceptions import InputError
 
 
 @runtime_checkable
 class CostModel(Protocol):
-    """Cost of a feature as a decreasing function of its zone.
-
-    Zones are in the unit of the model's parameters; `rescaled` changes that unit, so that programs see numbers of
-    order one.
-    """
+    """Cost of a feature as a decreasing function of its zone, in the unit of its parameters until it is `rescaled`."""
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""
@@ -28,7 +26,7 @@ class CostModel(Protocol):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         ...
 
-    def expression(self, zone: cp.Expression) -> cp.Expression | None:
+    def expression(self, zone: Expression) -> Expression | None:
         """Return the cost as a convex expression of scalar or vector zones, or None where it is not convex."""
         ...
 
@@ -81,20 +79,8 @@ class Process:
         return np.asarray(self.cost.value(zone) + self.change)
 
     def rescaled(self, unit: float) -> Process:
-        """Return the same process with zones counted in another unit.
-
-        Parameters
-        ----------
-        unit
-            The new unit [old unit].
-        """
-        return Process(
-            name=self.name,
-            cost=self.cost.rescaled(unit),
-            minimum=self.minimum / unit,
-            maximum=self.maximum / unit,
-            change=self.change,
-        )
+        """Return the same process with zones counted in another unit [old unit]."""
+        return replace(self, cost=self.cost.rescaled(unit), minimum=self.minimum / unit, maximum=self.maximum / unit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +106,7 @@ class Weighted:
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(self.weight * self.model.slope(zone))
 
-    def expression(self, zone: cp.Expression) -> cp.Expression | None:
+    def expression(self, zone: Expression) -> Expression | None:
         """Return the cost as a convex expression, or None where the model is not convex."""
         found = self.model.expression(zone)
         return None if found is None else self.weight * found
@@ -128,3 +114,53 @@ class Weighted:
     def rescaled(self, unit: float) -> Weighted:
         """Return the same cost as a function of zone / unit."""
         return Weighted(model=self.model.rescaled(unit), weight=self.weight)
+
+
+def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostModel:
+    """Return the cost of several callouts that change together, as simple as it can be said; see `SumOfCosts`."""
+    own = [model.rescaled(ratio) for model, ratio in zip(models, ratios, strict=True)]
+    reciprocal = [model for model in own if isinstance(model, Reciprocal)]
+    if len(reciprocal) == len(own):
+        return Reciprocal(
+            fixed=sum(model.fixed for model in reciprocal), factor=sum(model.factor for model in reciprocal)
+        )
+    return SumOfCosts(models=tuple(models), ratios=tuple(ratios))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumOfCosts:
+    """Cost of several callouts that are made in the same way and change together.
+
+    Parameters
+    ----------
+    models
+        Cost of each callout as a function of its own zone.
+    ratios
+        Zone of each callout over the common variable [unit of the zone per unit of the variable].
+    """
+
+    models: tuple[CostModel, ...]
+    ratios: tuple[float, ...]
+
+    @cached_property
+    def _parts(self) -> tuple[CostModel, ...]:
+        """Costs as functions of the common variable."""
+        return tuple(model.rescaled(ratio) for model, ratio in zip(self.models, self.ratios, strict=True))
+
+    def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
+        """Return the cost [cost units]."""
+        return np.asarray(np.sum([part.value(zone) for part in self._parts], axis=0))
+
+    def slope(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
+        """Return the derivative of the cost by the common variable [cost units per unit of the variable]."""
+        return np.asarray(np.sum([part.slope(zone) for part in self._parts], axis=0))
+
+    def expression(self, zone: Expression) -> Expression | None:
+        """Return the cost as a convex expression, or None where a part is not convex."""
+        parts = [part.expression(zone) for part in self._parts]
+        convex = [part for part in parts if part is not None]
+        return sum(convex) if len(convex) == len(parts) else None
+
+    def rescaled(self, unit: float) -> SumOfCosts:
+        """Return the same cost as a function of variable / unit."""
+        return replace(self, ratios=tuple(ratio * unit for ratio in self.ratios))

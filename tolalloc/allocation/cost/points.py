@@ -1,13 +1,21 @@
-"""Points of a cost curve: what a shop asks for a feature at some zones."""
+"""Points of a cost curve: what a shop asks for features at some tolerances, and the file with one row per price."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from math import isfinite
+from pathlib import Path
+from typing import Annotated, ClassVar
 
-from tolalloc.exceptions import InputError
+from pydantic import Field
+
+from tolalloc.drawing.fields import LARGEST_ZONE, UNITS
+from tolalloc.drawing.table_file import TableRow, read_rows
+from tolalloc.drawing.zones import Feature
+from tolalloc.exceptions import InputError, UnknownNameError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,26 +55,12 @@ class Points:
 
     @classmethod
     def sorted(cls, zones: Sequence[float], costs: Sequence[float], place: str) -> Points:
-        """Return the points in ascending order of their zones.
-
-        Parameters
-        ----------
-        zones, costs
-            Zones [unit of the zone] and their costs [cost units], in any order.
-        place
-            Where they stand.
-        """
+        """Return points that are given in any order."""
         order = sorted(range(len(zones)), key=lambda at: (zones[at], -costs[at]))
         return cls(zones=tuple(zones[at] for at in order), costs=tuple(costs[at] for at in order), place=place)
 
     def require_falling(self) -> None:
-        """Raise unless every point is above the next in cost and below it in zone.
-
-        Raises
-        ------
-        InputError
-            The two points that contradict each other.
-        """
+        """Raise an InputError of two points that contradict each other unless the cost falls with the zone."""
         for (zone, cost), (wider, dearer) in pairwise(zip(self.zones, self.costs, strict=True)):
             if zone == wider:
                 raise InputError(
@@ -81,3 +75,60 @@ class Points:
     def rescaled(self, unit: float) -> Points:
         """Return the same points with zones counted in another unit [old unit]."""
         return Points(zones=tuple(zone / unit for zone in self.zones), costs=self.costs, place=self.place)
+
+
+class LengthUnit(StrEnum):
+    """Unit of a tolerance."""
+
+    MICROMETRE = "µm"
+    MICROMETRE_TYPED = "um"
+    MILLIMETRE = "mm"
+
+
+class ShopPrice(TableRow):
+    """One row; the fields are the column headers without their unit."""
+
+    units: ClassVar[Mapping[str, str]] = {"cost": "cost units"}
+
+    process: Annotated[str, Field(min_length=1)]
+    feature: Feature | None = None
+    tolerance: Annotated[float, Field(gt=0)]
+    unit: LengthUnit
+    cost: Annotated[float, Field(gt=0, le=1e9)]
+    note: str = ""
+
+
+ShopPoints = Mapping[tuple[str, Feature | None], Points]
+"""Process and feature, or None for every feature → points in micrometres."""
+
+
+def load_shop_points(path: Path) -> ShopPoints:
+    """Return the points of a CSV file with the columns process, tolerance [unit], unit and cost [cost units].
+
+    A column ``feature`` may say for which kind of callout a price is; without it the price is for every kind.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed, or a process with less than two tolerances.
+    """
+    prices: dict[tuple[str, Feature | None], list[tuple[float, float]]] = {}
+    for place, row in read_rows(path, ShopPrice, "process"):
+        zone = row.tolerance * UNITS[row.unit]
+        if zone > LARGEST_ZONE:
+            raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")
+        prices.setdefault((row.process, row.feature), []).append((zone, row.cost))
+    found = {}
+    for (process, feature), pairs in prices.items():
+        zones, costs = zip(*pairs, strict=True)
+        found[process, feature] = Points.sorted(zones, costs, f"{path} ({process}, zones in µm)")
+    return found
+
+
+def points_of(points: ShopPoints, process: str, feature: Feature, place: str) -> Points:
+    """Return the points of a process for a kind of callout [µm], those for every kind where it has none of its own."""
+    found = points.get((process, feature)) or points.get((process, None))
+    if found is None:
+        known = [name for name, kind in points if kind in (feature, None)]
+        raise UnknownNameError.among(place, f"process for feature {feature}", process, known)
+    return found

@@ -1,22 +1,150 @@
-"""Process cost tables: the ways in which the features of a tolerance table can be made, and what each costs."""
+"""Ways to make the features of a drawing: from a process cost table, from Python, or as the tolerance table knows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from enum import StrEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.cost.points_file import ShopPoints, load_shop_points, points_of
-from tolalloc.allocation.cost.process_cost_row import ProcessCostRow
+from tolalloc.allocation.cost.closed_forms import (
+    ClosedForm,
+    Combined,
+    Exponential,
+    Reciprocal,
+    ReciprocalPower,
+    reciprocal_squared,
+)
+from tolalloc.allocation.cost.fit import best_fit
+from tolalloc.allocation.cost.model import CostModel, Process
+from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points, points_of
+from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.drawing.fields import LARGEST_ZONE
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_file import DATA, read_rows
+from tolalloc.drawing.table_file import DATA, TableRow, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
-from tolalloc.units import MICROMETRE
+from tolalloc.units import MICROMETRE, MILLIMETRE
+
+Cost = Annotated[float, Field(ge=0, le=1e9)]
+Zone = Annotated[float | None, Field(gt=0, le=LARGEST_ZONE)]
+Positive = Annotated[float | None, Field(gt=0, le=1e12)]
+
+
+class CostCurve(StrEnum):
+    """How a cost falls with the zone."""
+
+    RECIPROCAL = "reciprocal"
+    RECIPROCAL_POWER = "reciprocal power"
+    RECIPROCAL_SQUARED = "reciprocal squared"
+    EXPONENTIAL = "exponential"
+    COMBINED = "combined"
+    TABULATED = "tabulated"
+    SPLINE = "spline"
+    FITTED = "fitted"
+
+    @property
+    def is_through_points(self) -> bool:
+        """Whether it is made from shop data."""
+        return self in (CostCurve.TABULATED, CostCurve.SPLINE, CostCurve.FITTED)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Columns that must be given."""
+        if self.is_through_points:
+            return frozenset({"points"})
+        needed = {
+            CostCurve.RECIPROCAL_POWER: {"exponent"},
+            CostCurve.EXPONENTIAL: {"scale"},
+            CostCurve.COMBINED: {"exponent", "scale"},
+        }
+        return frozenset(needed.get(self, ()))
+
+    @property
+    def takes(self) -> frozenset[str]:
+        """Columns that may be given."""
+        return self.needs if self.is_through_points else self.needs | {"fixed", "factor"}
+
+
+class ProcessCostRow(TableRow):
+    """One row; the fields are the column headers without their unit, zones in micrometres."""
+
+    units: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("scale", "min", "max"), "µm"),
+        **dict.fromkeys(("fixed", "change", "inspection"), "cost units"),
+    }
+
+    sources: Annotated[str, Field(min_length=1)]
+    process: Annotated[str, Field(min_length=1)]
+    model: CostCurve
+    fixed: Annotated[float | None, Field(ge=0, le=1e9)] = None
+    factor: Positive = None
+    exponent: Annotated[float | None, Field(gt=0, le=10)] = None
+    scale: Positive = None
+    points: str | None = None
+    min: Zone = None
+    max: Zone = None
+    change: Cost = 0.0
+    inspection: Cost = 0.0
+    note: Annotated[str, Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _columns_fit_the_model(self) -> ProcessCostRow:
+        columns = ("fixed", "factor", "exponent", "scale", "points")
+        given = {name for name in columns if getattr(self, name) is not None}
+        if missing := sorted(self.model.needs - given):
+            raise ValueError(f"model {self.model.value} needs {' and '.join(missing)}")
+        if excess := sorted(given - self.model.takes):
+            raise ValueError(f"model {self.model.value} takes no {' and no '.join(excess)}")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(f"min must not be above max: {self.min:g}, {self.max:g} µm")
+        return self
+
+    def cost(self, source: Source, points: Points | None, place: str) -> CostModel:
+        """Return the cost with the inspection by the zone in micrometres.
+
+        A row without factor, which is that of the tolerance table's process, gives the source its cost in that table at
+        its zone; a fixed cost and an inspection above that are an InputError.
+        """
+        if points is not None:
+            return self._through(points)
+        fixed = (self.fixed or 0.0) + self.inspection
+        if self.factor is not None:
+            return self._closed_form(fixed, self.factor)
+        falling = source.cost - fixed
+        if falling <= 0:
+            raise InputError.at(
+                place,
+                "fixed and inspection without a factor",
+                fixed,
+                f"less than {source.cost:g}, the cost of {source.name} in the tolerance table",
+            )
+        unit = self._closed_form(0.0, 1.0).value(np.asarray(source.zone / MICROMETRE))
+        return self._closed_form(fixed, falling / float(unit))
+
+    def _through(self, points: Points) -> CostModel:
+        if self.model is CostCurve.FITTED:
+            model = best_fit(points).model
+            return replace(model, fixed=model.fixed + self.inspection)
+        inspected = replace(points, costs=tuple(cost + self.inspection for cost in points.costs))
+        return Tabulated(inspected) if self.model is CostCurve.TABULATED else Spline(inspected)
+
+    def _closed_form(self, fixed: float, factor: float) -> ClosedForm:
+        if self.model is CostCurve.RECIPROCAL_SQUARED:
+            return reciprocal_squared(fixed=fixed, factor=factor)
+        if self.exponent and self.scale:
+            return Combined(fixed=fixed, factor=factor, exponent=self.exponent, scale=self.scale)
+        if self.exponent:
+            return ReciprocalPower(fixed=fixed, factor=factor, exponent=self.exponent)
+        if self.scale:
+            return Exponential(fixed=fixed, factor=factor, scale=self.scale)
+        return Reciprocal(fixed=fixed, factor=factor)
+
 
 ProcessesOfSources = Mapping[str, tuple[Process, ...]]
 """Source → ways to make it, zones in metres."""
@@ -33,6 +161,57 @@ def today(source: Source) -> Process:
         minimum=source.minimum,
         maximum=source.maximum,
     )
+
+
+def priced(
+    rows: Mapping[str, Iterable[tuple[str, float, float, float, float]]],
+    sources: Sequence[Source],
+    tolerance: Literal["zone", "half zone"] = "zone",
+) -> ProcessesOfSources:
+    """Return the ways to make features from costs A + B/t, for a user's own model.
+
+    A feature without a row keeps the one way of the tolerance table.
+
+    Parameters
+    ----------
+    rows
+        Source → name of a process, A [cost units], B [cost units × mm], and smallest and largest t that it holds [mm].
+    sources
+        Rows of the tolerance table.
+    tolerance
+        Whether t is the whole zone, or half of it as in ± t.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A source or value that is not allowed, a process that stands twice, or a feature that no process can hold.
+
+    Examples
+    --------
+    >>> from tolalloc.drawing.zones import Feature
+    >>> hub = Source(name="hub", part="hub", feature=Feature.SIZE, zone=0.2e-3, minimum=0.03e-3, maximum=0.5e-3, cost=9)
+    >>> [turned] = priced({"hub": [("turned", 5, 0.5, 0.06, 0.15)]}, [hub], tolerance="half zone")["hub"]
+    >>> float(turned.total(np.array(0.2e-3)))
+    10.0
+    """
+    unit = MILLIMETRE * {"zone": 1.0, "half zone": 2.0}[tolerance]
+    free = {source.name: source for source in sources if source.zone > 0 and not source.locked}
+    found: dict[str, tuple[Process, ...]] = {name: (today(source),) for name, source in free.items()}
+    for name, own in rows.items():
+        if name not in free:
+            raise UnknownNameError.among("process costs", "source whose zone may change,", name, free)
+        made, source = [*own], free[name]
+        if len({row[0] for row in made}) < len(made):
+            raise InputError.at(f"process costs of {name}", "processes", [row[0] for row in made], "each name once")
+        ranges = [(max(source.minimum, low * unit), min(source.maximum, high * unit)) for *_, low, high in made]
+        found[name] = tuple(
+            Process(name=way, cost=Reciprocal(fixed=fixed, factor=factor * unit), minimum=minimum, maximum=maximum)
+            for (way, fixed, factor, *_), (minimum, maximum) in zip(made, ranges, strict=True)
+            if minimum <= maximum
+        )
+        if not found[name]:
+            raise _none_holds(f"process costs of {name}", source)
+    return found
 
 
 def load_process_costs(name: str | Path, sources: Sequence[Source]) -> ProcessesOfSources:
@@ -91,11 +270,15 @@ def _processes(
     processes = [_process(source, place, row, shops, 0.0 if row.process == now else row.change) for place, row in rows]
     left = tuple(process for process in processes if process is not None)
     if not left:
-        raise InputError(
-            f"{path}: no process can hold a zone of {source.minimum / MICROMETRE:g} to "
-            f"{source.maximum / MICROMETRE:g} µm for {source.name}; allowed are rows whose min and max reach into it."
-        )
+        raise _none_holds(path, source)
     return left
+
+
+def _none_holds(place: str | Path, source: Source) -> InputError:
+    return InputError(
+        f"{place}: no process can hold a zone of {source.minimum / MICROMETRE:g} to "
+        f"{source.maximum / MICROMETRE:g} µm for {source.name}; allowed are rows whose min and max reach into it."
+    )
 
 
 def _process(

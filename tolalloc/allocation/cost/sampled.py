@@ -1,20 +1,19 @@
-"""Cost models through points, and the cost of several callouts that are made together."""
+"""Cost models through points of a shop: straight lines, or a monotone spline that is convex where it can be."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.convex_slopes import ROUNDING, convex_slopes
-from tolalloc.allocation.cost.model import CostModel
+from tolalloc.allocation.cost.closed_forms import Expression
 from tolalloc.allocation.cost.points import Points
+
+ROUNDING = 1e-9
+"""Relative difference of slopes up to which it is rounding, such as on one straight line [-]."""
 
 OUTER_ERROR = 1e-6
 """Largest share of its cost by which the convex form of a spline lies below the spline [-]."""
@@ -59,7 +58,7 @@ class Tabulated:
         """Return the derivative of the cost by the zone, at a point to its right [cost units per unit of the zone]."""
         return np.asarray(self._slopes[self._line(zone)])
 
-    def expression(self, zone: cp.Expression) -> cp.Expression | None:
+    def expression(self, zone: Expression) -> Expression | None:
         """Return the cost as the highest of the lines, or None where their slopes do not increase."""
         if np.diff(self._slopes, append=0.0).min() < ROUNDING * self._slopes.min():
             return None
@@ -101,7 +100,9 @@ class Spline:
         self.points.require_falling()
 
     @cached_property
-    def _curve(self) -> CubicHermiteSpline:
+    def _curve(self) -> Any:
+        from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
         zones, costs = np.array(self.points.zones), np.array(self.points.costs)
         monotone = PchipInterpolator(zones, costs)(zones, 1)
         return CubicHermiteSpline(zones, costs, convex_slopes(np.diff(costs) / np.diff(zones), monotone))
@@ -116,7 +117,7 @@ class Spline:
         inside = np.clip(zone, self.points.zones[0], self.points.zones[-1])
         return np.asarray(np.minimum(self._curve(inside, 1), 0.0))  # above 0 it is rounding
 
-    def expression(self, zone: cp.Expression) -> cp.Expression | None:
+    def expression(self, zone: Expression) -> Expression | None:
         """Return the cost as the highest of many tangents, or None where the spline is not convex.
 
         Notes
@@ -142,71 +143,48 @@ class Spline:
         return Spline(self.points.rescaled(unit))
 
 
-def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostModel:
-    """Return the cost of several callouts that change together, as simple as it can be said.
+def convex_slopes(
+    secants: Float[np.ndarray, " piece"], slopes: Float[np.ndarray, " point"]
+) -> Float[np.ndarray, " point"]:
+    """Return slopes that make the spline convex, or the given ones where none do.
 
     Parameters
     ----------
-    models
-        Cost of each callout as a function of its own zone.
-    ratios
-        Zone of each callout over the common variable [unit of the zone per unit of the variable].
+    secants
+        Slopes of the straight lines between neighbouring points, 0 or below [cost units per unit of the zone].
+    slopes
+        Slopes at the points to stay close to [cost units per unit of the zone].
+
+    Notes
+    -----
+    A cubic with end slopes −x and −y over a secant −m is convex where x + 2y ≤ 3m ≤ 2x + y. Given an interval of y,
+    those of x that leave a choice are an interval too; so the intervals are found from the last point to the first, and
+    the slopes inside them from the first to the last.
     """
-    own = [model.rescaled(ratio) for model, ratio in zip(models, ratios, strict=True)]
-    reciprocal = [model for model in own if isinstance(model, Reciprocal)]
-    if len(reciprocal) == len(own):
-        return Reciprocal(
-            fixed=sum(model.fixed for model in reciprocal), factor=sum(model.factor for model in reciprocal)
-        )
-    return SumOfCosts(models=tuple(models), ratios=tuple(ratios))
-
-
-@dataclass(frozen=True, kw_only=True)
-class SumOfCosts:
-    """Cost of several callouts that are made in the same way and change together.
-
-    Parameters
-    ----------
-    models
-        Cost of each callout as a function of its own zone.
-    ratios
-        Zone of each callout over the common variable [unit of the zone per unit of the variable].
-    """
-
-    models: tuple[CostModel, ...]
-    ratios: tuple[float, ...]
-
-    @cached_property
-    def _parts(self) -> tuple[CostModel, ...]:
-        """Costs as functions of the common variable."""
-        return tuple(model.rescaled(ratio) for model, ratio in zip(self.models, self.ratios, strict=True))
-
-    def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
-        """Return the cost [cost units]."""
-        return np.asarray(np.sum([part.value(zone) for part in self._parts], axis=0))
-
-    def slope(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
-        """Return the derivative of the cost by the common variable [cost units per unit of the variable]."""
-        return np.asarray(np.sum([part.slope(zone) for part in self._parts], axis=0))
-
-    def expression(self, zone: cp.Expression) -> cp.Expression | None:
-        """Return the cost as a convex expression, or None where a part is not convex."""
-        parts = [part.expression(zone) for part in self._parts]
-        convex = [part for part in parts if part is not None]
-        return sum(convex) if len(convex) == len(parts) else None
-
-    def rescaled(self, unit: float) -> SumOfCosts:
-        """Return the same cost as a function of variable / unit."""
-        return replace(self, ratios=tuple(ratio * unit for ratio in self.ratios))
+    falls = -secants
+    intervals = [(0.0, np.inf)]
+    for fall in falls[::-1]:
+        least, most = intervals[-1]
+        if least > fall * (1 + ROUNDING):
+            return slopes
+        intervals.append(((3 * fall - min(most, fall)) / 2, 3 * fall - 2 * least))
+    intervals.reverse()
+    chosen = [float(np.clip(-slopes[0], *intervals[0]))]
+    for fall, (least, most), wanted in zip(falls, intervals[1:], -slopes[1:], strict=True):
+        least, most = max(least, 3 * fall - 2 * chosen[-1]), min(most, (3 * fall - chosen[-1]) / 2)
+        chosen.append(float(np.clip(wanted, least, most)))
+    return -np.array(chosen)
 
 
 def _highest(
     touched: Float[np.ndarray, " line"],
     costs: Float[np.ndarray, " line"],
     slopes: Float[np.ndarray, " line"],
-    zone: cp.Expression,
-) -> cp.Expression:
+    zone: Expression,
+) -> Expression:
     """Return the highest of the lines with these slopes through these points, for every zone."""
+    import cvxpy as cp
+
     flat = cp.reshape(zone, (1, zone.size), order="C")
     heights = np.outer(costs - slopes * touched, np.ones(zone.size))
     return cp.reshape(cp.max(slopes[:, np.newaxis] @ flat + heights, axis=0), zone.shape, order="C")

@@ -1,6 +1,8 @@
 """Tolerance stacks by the usual methods: how the zones of features add up to that of a requirement.
 
-Zones and budgets are counted alike: all of them are ± tolerances, or all of them full widths.
+Every stack has the name of what it keeps; `sensitivities`, the change of the requirement with every feature [unit of
+the requirement per unit of the feature]; and the budget, which is the zone of the requirement [unit of the
+requirement]. Zones and budgets are counted alike: all of them are ± tolerances, or all of them full widths.
 """
 
 from __future__ import annotations
@@ -16,32 +18,12 @@ from tolalloc.exceptions import InputError
 
 
 def worst_case(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
-    """Return the stack in which all zones are used up on the bad side at once.
-
-    Parameters
-    ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    budget
-        Zone of the requirement [unit of the requirement].
-    """
+    """Return the stack in which all zones are used up on the bad side at once."""
     return mean_shift(name, sensitivities, budget, shift=1.0)
 
 
 def root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
-    """Return the stack of independent, centred features whose zones hold equally many standard deviations.
-
-    Parameters
-    ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    budget
-        Zone of the requirement [unit of the requirement].
-    """
+    """Return the stack of independent, centred features whose zones hold equally many standard deviations."""
     return mean_shift(name, sensitivities, budget, shift=0.0)
 
 
@@ -50,12 +32,6 @@ def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], budget: fl
 
     Parameters
     ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    budget
-        Zone of the requirement [unit of the requirement].
     factor
         What the root sum square is multiplied by, 1 or above [-].
 
@@ -75,15 +51,6 @@ def inflated(name: str, sensitivities: Float[np.ndarray, " feature"], budget: fl
 
 def modified_root_sum_square(name: str, sensitivities: Float[np.ndarray, " feature"], budget: float) -> Stack:
     """Return the modified root sum of squares, which lies between the root sum square and the worst case.
-
-    Parameters
-    ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    budget
-        Zone of the requirement [unit of the requirement].
 
     Raises
     ------
@@ -115,12 +82,6 @@ def mean_shift(
 
     Parameters
     ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
-    budget
-        Zone of the requirement [unit of the requirement].
     shift
         Largest shift of the mean over half the width of the zone, one for all features or one each: 0 is the root sum
         square, 1 the worst case [-].
@@ -145,10 +106,6 @@ def inertial(name: str, sensitivities: Float[np.ndarray, " feature"], budget: fl
 
     Parameters
     ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
     budget
         Half the width between the limits of the requirement, which is centred [unit of the requirement].
     capability
@@ -191,10 +148,6 @@ def yield_root_sum_square(
 
     Parameters
     ----------
-    name
-        What the stack keeps.
-    sensitivities
-        Change of the requirement with every feature [unit of the requirement per unit of the feature].
     limits
         Limits of the requirement.
     mean

@@ -14,15 +14,11 @@ from jaxtyping import Float
 from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
 from tolalloc.allocation.cost.model import CostModel, Process
 from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
-from tolalloc.allocation.program.stacks import (
-    modified_root_sum_square,
-    root_sum_square,
-    worst_case,
-    yield_root_sum_square,
-)
 from tolalloc.capability.indices import Limits
 
-_FILE = Path(__file__).parents[1] / "tests" / "validation" / "allocation.json"
+from .stacks import modified_root_sum_square, root_sum_square, worst_case, yield_root_sum_square
+
+_FILE = Path(__file__).parents[2] / "tests" / "validation" / "allocation.json"
 CASES: dict[str, Any] = {item["id"]: item for item in json.loads(_FILE.read_text(encoding="utf-8"))["problems"]}
 
 
