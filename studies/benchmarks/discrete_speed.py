@@ -31,7 +31,7 @@ from numpy_cores import CORES, timed
 from tolalloc.allocation.cost.closed_forms import ReciprocalPower
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program.discrete import DiscreteProblem, feature_options
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 
 FEATURES, GRADES, PROCESSES = 30, 8, 3
 STACKS = {"rss 1": (0.0, 1.0), "rss 2": (0.0, 1.0), "worst case": (1.0, 0.0), "both": (0.3, 1.0)}
@@ -55,7 +55,7 @@ def random_problem(random: np.random.Generator) -> DiscreteProblem:
             )
             for at in range(PROCESSES)
         )
-        features.append(Feature(name=f"feature {number}", processes=processes))
+        features.append(PricedFeature(name=f"feature {number}", processes=processes))
     stacks = []
     for name, kinds in STACKS.items():
         weights = np.exp(random.normal(0.0, 0.7, (2, FEATURES))) * (random.random((2, FEATURES)) < 0.6)

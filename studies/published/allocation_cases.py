@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
 from tolalloc.allocation.cost.model import CostModel, Process
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.capability.indices import Limits
 
 from .stacks import modified_root_sum_square, root_sum_square, worst_case, yield_root_sum_square
@@ -46,7 +46,7 @@ def clutch(loss: float, cage: float = 101.6, method: str = "root sum square") ->
     case, sensitivities = CASES["clutch_choi2000"], clutch_sensitivities(cage)
     budget = case["requirement"]["half_width"]
     features = tuple(
-        Feature(
+        PricedFeature(
             name=name,
             processes=tuple(
                 Process(
@@ -79,7 +79,7 @@ def gap_chain(variant: str) -> AllocationProblem:
         own = case["computed"][variant]
         costs = [Exponential(fixed=1.0, factor=float(factor), scale=own["scale"]) for factor in own["b"]]
     features = tuple(
-        Feature(
+        PricedFeature(
             name=f"x{at + 1}", processes=(Process(name="only", cost=costs[at], minimum=lower[at], maximum=upper[at]),)
         )
         for at in range(3)

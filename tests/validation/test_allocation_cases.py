@@ -11,11 +11,11 @@ from scipy.optimize import minimize
 from studies.published import allocation_cases as published
 from studies.published.stacks import root_sum_square
 from tolalloc.allocation.cost.process_costs_file import priced
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Solution
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
 from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature as Callout
+from tolalloc.drawing.zones import Feature
 from tolalloc.units import MILLIMETRE
 
 CHAIN = ("reciprocal", "t_min of x1 is 0.25", "t_max of x3 is 0.30", "exponential")
@@ -85,11 +85,11 @@ def test_the_clutch_priced_as_a_users_own_model_has_the_optimum_of_the_file():
         for part, processes in case["processes"].items()
     }
     sources = [
-        Source(name=part, part=part, feature=Callout.SIZE, zone=0.2e-3, minimum=1e-5, maximum=1e-3, cost=1.0)
+        Source(name=part, part=part, feature=Feature.SIZE, zone=0.2e-3, minimum=1e-5, maximum=1e-3, cost=1.0)
         for part in rows
     ]
     made = priced(rows, sources, tolerance="half zone")
-    features = tuple(Feature(name=part, processes=processes) for part, processes in made.items())
+    features = tuple(PricedFeature(name=part, processes=processes) for part, processes in made.items())
     stack = root_sum_square("angle", np.array(case["sensitivities"]) / (2 * MILLIMETRE), 0.035)
     best, known = solved(AllocationProblem(features=features, stacks=(stack,))), case["results"]["0"]["true_optimum"]
     assert best.cost == pytest.approx(known["total"], rel=1e-9)

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 
 LOWER, UPPER = 0.2, 5.0
 
@@ -89,7 +89,7 @@ class StackProblem:
 def stack_problem(features=12, seed=5, **options) -> StackProblem:
     generator = np.random.default_rng(seed)
     made = tuple(
-        Feature(
+        PricedFeature(
             name=f"feature {at}",
             processes=(Process(name="any", cost=Reciprocal(factor=float(factor)), minimum=LOWER, maximum=UPPER),),
         )

@@ -12,11 +12,17 @@ from scipy.optimize import linprog, minimize
 from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program.certificate import cost_bound
-from tolalloc.allocation.program.convex import ConvexProgram
-from tolalloc.allocation.program.front import front
+from tolalloc.allocation.program.convex import ConvexProgram, front
 from tolalloc.allocation.program.lagrange_dual import LagrangeDual
-from tolalloc.allocation.program.least_infeasible import LeastInfeasible, least_infeasible
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Solution, Stack
+from tolalloc.allocation.program.problem import (
+    AllocationProblem,
+    LeastInfeasible,
+    PricedFeature,
+    Shared,
+    Solution,
+    Stack,
+    least_infeasible,
+)
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.exceptions import InputError
 
@@ -58,7 +64,7 @@ def random_problem(
 ) -> AllocationProblem:
     generator = np.random.default_rng(seed)
     made = tuple(
-        Feature(
+        PricedFeature(
             name=f"feature {at}",
             processes=overlapping_processes(generator, processes, unit),
             loss=float(generator.uniform(0, 5) / unit**2),
@@ -288,7 +294,7 @@ def test_the_feasible_shared_variables_of_the_linear_program_are_found():
         for name, slope in (("up", 1.0), ("down", -1.0))
     )
     shared = Shared(names=("offset",), lower=np.array([-1.0]), upper=np.array([3.0]))
-    problem = AllocationProblem(features=(Feature(name="one", processes=zones),), stacks=stacks, shared=shared)
+    problem = AllocationProblem(features=(PricedFeature(name="one", processes=zones),), stacks=stacks, shared=shared)
     found = solved(problem)
     assert found.shared[0] == pytest.approx(0.0, abs=1e-6)
     assert found.zones[0] == pytest.approx(1.25, rel=1e-9)
@@ -390,7 +396,7 @@ class Stepwise:
 def test_a_cost_that_is_not_convex_is_refused_by_name():
     stepwise = Process(name="stepwise", cost=Stepwise(), minimum=1.0, maximum=5.0)
     problem = random_problem(0)
-    bad = replace(problem, features=(Feature(name="bore", processes=(stepwise,)), *problem.features[1:]))
+    bad = replace(problem, features=(PricedFeature(name="bore", processes=(stepwise,)), *problem.features[1:]))
     for refuse in (lambda: allocate(bad), lambda: compiled(bad), lambda: cost_bound(bad, np.ones(1), np.ones(4))):
         with pytest.raises(InputError, match=r"feature bore: process stepwise.*not convex"):
             refuse()

@@ -11,7 +11,7 @@ from tolalloc.allocation.program.choice_rows import ChoiceRows
 from tolalloc.allocation.program.choice_search import best_choice
 from tolalloc.allocation.program.discrete import DiscreteProblem, Option, feature_options
 from tolalloc.allocation.program.multiple_choice import MultipleChoice
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.exceptions import InputError, SolveError
 
 LADDER = np.array([1.0, 1.6, 2.5, 4.0, 6.3, 10.0])
@@ -33,7 +33,7 @@ def random_problem(seed, features=5, steps=3, processes=2, shared=0, mixed=True)
             )
             for at in range(processes)
         )
-        made.append(Feature(name=f"feature {number}", processes=ways, loss=random.uniform(0, 0.01)))
+        made.append(PricedFeature(name=f"feature {number}", processes=ways, loss=random.uniform(0, 0.01)))
     chosen = np.sort(random.choice(LADDER.size, steps, replace=False))
     options = tuple(feature_options(feature, LADDER[chosen], [LABELS[at] for at in chosen]) for feature in made)
     grids = tuple(np.round(random.uniform(-1, 1, 4), 3) for _ in range(shared))
@@ -128,7 +128,7 @@ def test_the_least_violating_choice_is_the_one_of_all_combinations(seed):
 def one_stack(zones, budget, root_sum_square=0.0, worst_case=1.0, cost=1.0):
     features = len(zones)
     process = Process(name="ground", cost=Reciprocal(factor=cost), minimum=1e-3, maximum=1e3)
-    made = tuple(Feature(name=f"feature {at}", processes=(process,)) for at in range(features))
+    made = tuple(PricedFeature(name=f"feature {at}", processes=(process,)) for at in range(features))
     stack = Stack(
         name="sum",
         worst_case=np.full(features, worst_case),
@@ -190,7 +190,7 @@ def test_a_locked_feature_keeps_its_only_option():
 def test_the_fixed_cost_of_a_process_and_the_loss_stand_in_the_option():
     cheap = Process(name="milled", cost=Reciprocal(factor=1.0), minimum=2.0, maximum=9.0)
     fine = Process(name="ground", cost=Reciprocal(factor=2.0), minimum=1.0, maximum=4.0, change=3.0)
-    feature = Feature(name="bore", processes=(cheap, fine), loss=0.1)
+    feature = PricedFeature(name="bore", processes=(cheap, fine), loss=0.1)
     options = feature_options(feature, np.array([1.0, 2.0, 4.0, 8.0, 10.0]), list("abcde"))
     assert [(own.process, own.label) for own in options] == [(0, "b"), (0, "c"), (0, "d"), (1, "a"), (1, "b"), (1, "c")]
     assert options[4].cost == pytest.approx(2.0 / 2.0 + 3.0 + 0.1 * 4.0)

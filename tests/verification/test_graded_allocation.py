@@ -10,7 +10,7 @@ import pytest
 
 from tolalloc.allocation.design_space import ClearanceRange
 from tolalloc.allocation.grade.iso286 import grade_zones
-from tolalloc.allocation.grade.preferred import SERIES, ZONES
+from tolalloc.allocation.grade.ladder import SERIES, ZONES
 from tolalloc.allocation.graded import AMOUNT_STEP, allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier

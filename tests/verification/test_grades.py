@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_zones
-from tolalloc.allocation.grade.ladder import Ladder, group_ladder
-from tolalloc.allocation.grade.preferred import ZONES
+from tolalloc.allocation.grade.ladder import ZONES, Ladder, group_ladder
 from tolalloc.drawing.sources import Source
 from tolalloc.drawing.tolerance_table import load_tolerance_table
 from tolalloc.drawing.zones import Feature

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE, DesignProblem
 from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
 from tolalloc.allocation.pareto.indicators import nondominated
-from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawing.seeds import SeedTree

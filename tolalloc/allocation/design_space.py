@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.allocation.cost.model import Process, made_together
 from tolalloc.allocation.cost.process_costs_file import today
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.sources import Source
 from tolalloc.exceptions import InputError
@@ -99,9 +99,9 @@ class DesignSpace:
         return np.asarray((by_zone * self.errors.zones) @ members)
 
     @cached_property
-    def features(self) -> tuple[Feature, ...]:
+    def features(self) -> tuple[PricedFeature, ...]:
         """Every group with the processes that all of its members have, over its scale."""
-        return tuple(Feature(name=group, processes=self._processes(group)) for group in self.groups)
+        return tuple(PricedFeature(name=group, processes=self._processes(group)) for group in self.groups)
 
     @property
     def has_choices(self) -> bool:

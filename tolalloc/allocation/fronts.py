@@ -14,7 +14,7 @@ from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import Criterion, Ladders
 from tolalloc.allocation.pareto.indicators import spread_over
 from tolalloc.allocation.program import process_choice
-from tolalloc.allocation.program.front import front
+from tolalloc.allocation.program.convex import front
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.cost.model import Weighted
 from tolalloc.allocation.program import process_choice
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Solution
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.drawing.seeds import SeedTree
@@ -139,7 +139,7 @@ def _with_costs(
     return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1, kept=True)
 
 
-def _priced(feature: Feature, factor: float) -> Feature:
+def _priced(feature: PricedFeature, factor: float) -> PricedFeature:
     processes = tuple(
         replace(made, cost=Weighted(model=made.cost, weight=factor), change=factor * made.change)
         for made in feature.processes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.allocation.cost.closed_forms import ClosedForm
-from tolalloc.allocation.cost.fit import Fit, best_fit, fits
+from tolalloc.allocation.cost.fit import CostFit, best_fit, fits
 from tolalloc.allocation.cost.points import Points, ShopPoints
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
@@ -41,8 +41,8 @@ class FittedProcess:
 
     name: str
     points: Points
-    forms: tuple[Fit, ...]
-    best: Fit
+    forms: tuple[CostFit, ...]
+    best: CostFit
 
 
 def fitted_processes(shop: ShopPoints) -> tuple[FittedProcess, ...]:

@@ -27,7 +27,7 @@ _EXACT = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit:
+class CostFit:
     """A closed form through points, and how well it keeps to them.
 
     Parameters
@@ -64,7 +64,7 @@ class Fit:
         return _rms(self.unseen)
 
 
-def fits(points: Points) -> tuple[Fit, ...]:
+def fits(points: Points) -> tuple[CostFit, ...]:
     """Return every closed form that the points suffice for, fitted to the smallest squares of relative errors.
 
     Raises
@@ -92,7 +92,7 @@ def fits(points: Points) -> tuple[Fit, ...]:
 
 
 @lru_cache(maxsize=256)
-def best_fit(points: Points) -> Fit:
+def best_fit(points: Points) -> CostFit:
     """Return the form with the fewest parameters that predicts as well as the best one.
 
     Raises
@@ -129,7 +129,7 @@ def _bending(form: type[ClosedForm]) -> tuple[str, ...]:
     return tuple(item.name for item in fields(form) if item.name in _BOUNDS)
 
 
-def _fit(form: type[ClosedForm], points: Points) -> Fit | None:
+def _fit(form: type[ClosedForm], points: Points) -> CostFit | None:
     """Return the fit, or None where the form would have to rise."""
     middle = float(np.exp(np.log(points.zones).mean()))
     zones, costs = np.array(points.zones) / middle, np.array(points.costs)
@@ -148,7 +148,7 @@ def _fit(form: type[ClosedForm], points: Points) -> Fit | None:
         if again is None:  # one point alone makes the curve fall
             return None
         unseen[left_out] = _errors(again, zones, costs)[left_out]
-    return Fit(
+    return CostFit(
         model=model.rescaled(1.0 / middle),
         errors=_errors(model, zones, costs),
         unseen=unseen,

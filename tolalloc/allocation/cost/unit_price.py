@@ -45,23 +45,12 @@ class QualityLoss:
     def nominal_is_best(self, offset: float, deviation: float) -> float:
         """Return the mean loss per unit where the nominal value is best [cost units].
 
-        Parameters
-        ----------
-        offset
-            Mean less nominal value [unit of the output].
-        deviation
-            Standard deviation [unit of the output].
+        The offset is the mean less the nominal value, the deviation the standard one [unit of the output].
         """
         return self.at_limit / self.limit**2 * (offset**2 + deviation**2)
 
     def smaller_is_better(self, mean: float, deviation: float) -> float:
-        """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units].
-
-        Parameters
-        ----------
-        mean, deviation
-            Mean and standard deviation [unit of the output].
-        """
+        """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units]."""
         return self.nominal_is_best(mean, deviation)
 
 
@@ -99,12 +88,7 @@ class UnitPrice:
                 raise InputError.at("price of a unit", name, value, allowed)
 
     def good_share(self, target: float) -> float:
-        """Return the share of good units after rework [-].
-
-        Parameters
-        ----------
-        target
-            Yield before rework [-].
+        """Return the share of good units after rework, for a yield before it [-].
 
         Raises
         ------
@@ -125,11 +109,6 @@ class UnitPrice:
             Making one unit, good or bad [cost units].
         target
             Yield before rework [-].
-
-        Raises
-        ------
-        InputError
-            As `good_share`.
         """
         beyond = self.rework_share * self.rework + (1 - self.rework_share) * self.scrap
         return (manufacturing + self.inspection + (1 - target) * beyond) / self.good_share(target)

@@ -55,18 +55,7 @@ _ROUNDING = 1e-9
 
 
 def size_step(nominal: float) -> int:
-    """Return the position of the size step that a nominal size lies in.
-
-    Parameters
-    ----------
-    nominal
-        Nominal size [m].
-
-    Raises
-    ------
-    InputError
-        The size is outside 0 to 500 mm.
-    """
+    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError."""
     size = nominal / MILLIMETRE
     if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
         raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
@@ -74,18 +63,7 @@ def size_step(nominal: float) -> int:
 
 
 def grade_zones(nominal: float) -> dict[str, float]:
-    """Return the zone of every grade of a nominal size, finest first [m].
-
-    Parameters
-    ----------
-    nominal
-        Nominal size [m].
-
-    Raises
-    ------
-    InputError
-        The size is outside 0 to 500 mm.
-    """
+    """Return the zone of every grade of a nominal size in metres, finest first [m]."""
     step = size_step(nominal)
     zones = {grade: row[step] * MICROMETRE for grade, row in PRINTED.items()}
     for number in range(12, 19):

@@ -18,7 +18,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives, ParetoProblem
 from tolalloc.exceptions import InputError
+from tolalloc.model import Evaluation, Response
 
 _PROBED = 1e-6
 """Relative difference up to which an answer asked for again is the same, on another machine too [-]."""
@@ -58,13 +60,7 @@ class Checkpoint:
             self.read()
 
     def read(self) -> tuple[str, Float[np.ndarray, "design gene"], Float[np.ndarray, "design number"]]:
-        """Return the identity of the problem, designs and their numbers.
-
-        Raises
-        ------
-        InputError
-            The file is no complete checkpoint, or one of another question.
-        """
+        """Return the identity of the problem, designs and their numbers; another file's are an InputError."""
         try:
             with np.load(self.path, allow_pickle=False) as file:
                 identity, question, digest = (str(file[name]) for name in ("identity", "question", "digest"))
@@ -86,7 +82,7 @@ class Checkpoint:
         return InputError(f"{self.path}: the checkpoint is of another problem; remove it or name another file.")
 
 
-class Answers:
+class RememberedAnswers:
     """Everything that has been answered so far.
 
     Parameters
@@ -166,6 +162,71 @@ class Answers:
         ):
             raise checkpoint.other_problem
         self._known = {design.tobytes(): row for design, row in zip(designs, numbers, strict=True)}
+
+
+class RememberedProblem:
+    """A problem that answers every design once, beyond this process if there is a checkpoint."""
+
+    def __init__(self, problem: ParetoProblem, checkpoint: Checkpoint | None = None) -> None:
+        self.problem = problem
+        genes = problem.genes
+        bounds = np.array([genes.lower, genes.upper, genes.integer]).tolist()
+        self.answers = RememberedAnswers(
+            self._ask, repr((genes.names, bounds, problem.objectives, problem.constraints)), checkpoint
+        )
+
+    @property
+    def genes(self) -> Genes:
+        """What the search may change."""
+        return self.problem.genes
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """What is traded off."""
+        return self.problem.objectives
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of the constraints."""
+        return self.problem.constraints
+
+    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
+        """Return the objectives of every design."""
+        numbers, count = self.answers(designs), len(self.objectives)
+        return Objectives(
+            values=numbers[:, :count], violation=numbers[:, count:-1], status=numbers[:, -1].astype(np.uint8)
+        )
+
+    def _ask(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
+        answers = self.problem(designs)
+        return np.column_stack([answers.values, answers.violation, answers.status])
+
+
+class RememberedResponse:
+    """A response that answers every sample once, beyond this process if there is a checkpoint."""
+
+    def __init__(self, response: Response, checkpoint: Checkpoint | None = None) -> None:
+        self.response = response
+        self.answers = RememberedAnswers(self._ask, repr((response.columns, response.outputs)), checkpoint)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.response.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units."""
+        return self.response.outputs
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample."""
+        numbers = self.answers(x)
+        return Evaluation(values=numbers[:, :-1], status=numbers[:, -1].astype(np.uint8))
+
+    def _ask(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample number"]:
+        evaluation = self.response(x)
+        return np.column_stack([evaluation.values, evaluation.status])
 
 
 def _hashed(text: str) -> str:

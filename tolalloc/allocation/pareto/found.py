@@ -32,7 +32,7 @@ class LeastViolating:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class SearchedDesigns:
     """Designs with their answers.
 
     Parameters
@@ -59,7 +59,7 @@ class Found:
         """Designs that failed [-]."""
         return int(np.count_nonzero(~self.answers.good))
 
-    def front(self, number: int) -> Found:
+    def front(self, number: int) -> SearchedDesigns:
         """Return allowed designs that no other one beats, in the order of the first objective, possibly none.
 
         Parameters
@@ -91,9 +91,9 @@ class Found:
             blocking=self.problem.constraints[int(np.argmax(violation))] if blocked else None,
         )
 
-    def _at(self, which: Int[np.ndarray, " kept"]) -> Found:
+    def _at(self, which: Int[np.ndarray, " kept"]) -> SearchedDesigns:
         answers = self.answers
-        return Found(
+        return SearchedDesigns(
             problem=self.problem,
             designs=self.designs[which],
             answers=Objectives(

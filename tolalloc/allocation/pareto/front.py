@@ -8,12 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem, Ladders
-from tolalloc.allocation.pareto.found import Found
-from tolalloc.allocation.pareto.genetic import search
+from tolalloc.allocation.pareto.found import SearchedDesigns
 from tolalloc.allocation.pareto.indicators import knee, spread_over
-from tolalloc.allocation.pareto.remembered import RememberedResponse
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import SolveError
@@ -84,7 +82,7 @@ class FrontEffort:
     points: int = 12
 
 
-def _front(found: Found, problem: DesignProblem, number: int) -> Front:
+def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front:
     """Return the front of a search, not yet judged by the kernel.
 
     Raises
@@ -157,6 +155,8 @@ def pareto_front(
     SolveError
         More designs failed, or none is allowed.
     """
+    from tolalloc.allocation.pareto.genetic import search
+
     kernel = RememberedResponse(response, checkpoint)
     problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further, sides=sides)
     known = problem.genes_of(convex_front)

@@ -19,11 +19,10 @@ from pymoo.optimize import minimize
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
-from tolalloc.allocation.pareto.answers import Checkpoint
-from tolalloc.allocation.pareto.found import Found
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedProblem
+from tolalloc.allocation.pareto.found import SearchedDesigns
 from tolalloc.allocation.pareto.indicators import spread_over
 from tolalloc.allocation.pareto.problem import Genes, ParetoProblem
-from tolalloc.allocation.pareto.remembered import RememberedProblem
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
@@ -78,15 +77,7 @@ def _less_violating(
 
 
 def reference_directions(objectives: int, population: int) -> Float[np.ndarray, "direction objective"]:
-    """Return the finest regular lattice of Das & Dennis with no more directions than the population has designs.
-
-    Parameters
-    ----------
-    objectives
-        Number of objectives [-].
-    population
-        Designs of a generation [-].
-    """
+    """Return the finest regular lattice of Das & Dennis with no more directions than the population has designs."""
     partitions = 1
     while comb(partitions + objectives, objectives - 1) <= population:
         partitions += 1
@@ -122,7 +113,7 @@ def search(
     population: int = 80,
     generations: int = 100,
     checkpoint: Checkpoint | None = None,
-) -> Found:
+) -> SearchedDesigns:
     """Return every design that a search has asked for, in that order.
 
     Parameters
@@ -175,4 +166,4 @@ def search(
     )
     remembered.answers.write()
     designs = np.concatenate(searched.asked)
-    return Found(problem=problem, designs=designs, answers=remembered(designs))
+    return SearchedDesigns(problem=problem, designs=designs, answers=remembered(designs))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
-from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 
 def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
     """Return which designs no other one beats in one objective without losing in another; equal ones stay both."""
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
     front = np.zeros(len(losses), bool)
     front[NonDominatedSorting().do(losses, only_non_dominated_front=True)] = True
     return front
@@ -18,17 +18,12 @@ def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarr
 def thinned(losses: Float[np.ndarray, "design objective"], number: int) -> Int[np.ndarray, " kept"]:
     """Return the positions of at most so many designs of a front, those in the densest places left out one by one.
 
-    Parameters
-    ----------
-    losses
-        Losses of a front.
-    number
-        How many may stay [-].
-
     References
     ----------
     Kukkonen & Deb 2006, CEC, 1179–1186, for two objectives; Kukkonen & Deb 2006, PPSN IX, 553–562, for more.
     """
+    from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
+
     if len(losses) <= number:
         return np.arange(len(losses))
     crowding = get_crowding_function("pcd" if losses.shape[1] == 2 else "mnn")
@@ -67,13 +62,5 @@ def knee(losses: Float[np.ndarray, "design objective"]) -> int:
 
 
 def spread_over(count: int, number: int) -> list[int]:
-    """Return at most so many positions among ``count``, evenly spread, the first and the last among them.
-
-    Parameters
-    ----------
-    count
-        How many there are [-].
-    number
-        How many are wanted [-].
-    """
+    """Return at most so many positions among ``count``, evenly spread, the first and the last among them."""
     return [int(at) for at in np.unique(np.linspace(0, count - 1, min(number, count)).astype(int))]

@@ -6,7 +6,6 @@ from contextlib import suppress
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.optimize import minimize
 
 from tolalloc.allocation.program.lagrange_dual import LagrangeDual, PricedProcesses, unit_rows
 from tolalloc.allocation.program.problem import AllocationProblem
@@ -41,6 +40,8 @@ def ascend(
     The logarithms of the prices and the directions of the norms move together. Where processes tie the dual has a
     kink, and the ascent may stop short of its top; every multiplier on the way gives a valid bound all the same.
     """
+    from scipy.optimize import minimize
+
     tried = [start]
     if dual.bound(start, allowed) >= enough or not start.prices.size:
         return tried

@@ -14,15 +14,12 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.optimize import linprog
 from scipy.sparse import csr_matrix
 
 from tolalloc.allocation.program.choice_rows import COSTS, RELAXED, ChoiceRows
-from tolalloc.allocation.program.exchange import exchanged
-from tolalloc.allocation.program.multiple_choice import MultipleChoice
+from tolalloc.allocation.program.multiple_choice import MultipleChoice, exchanged
 from tolalloc.exceptions import SolveError
 
 _SLACK = 1e-6
@@ -39,7 +36,7 @@ _SECTIONS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
+class ProvenChoice:
     """What is taken out of every group, with the proof.
 
     Parameters
@@ -57,7 +54,7 @@ class Choice:
     bound: float
 
 
-def best_choice(program: MultipleChoice, most_nodes: int) -> Choice | None:
+def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None:
     """Return the best choice, None where no choice is allowed.
 
     Parameters
@@ -76,11 +73,11 @@ def best_choice(program: MultipleChoice, most_nodes: int) -> Choice | None:
     kept = program.undominated & program.possible
     if np.unique(program.group[kept]).size < program.starts.size:
         return None
-    found = _Search(program.restricted(kept), most_nodes).run()
+    found = _ChoiceSearch(program.restricted(kept), most_nodes).run()
     return found and replace(found, taken=np.flatnonzero(kept)[found.taken])
 
 
-class _Search:
+class _ChoiceSearch:
     """What is known of the best choice of a program."""
 
     def __init__(self, program: MultipleChoice, most_nodes: int) -> None:
@@ -88,8 +85,10 @@ class _Search:
         self.best: Int[np.ndarray, " group"] | None = None
         self.cost, self.bound = np.inf, -np.inf
 
-    def run(self) -> Choice | None:
+    def run(self) -> ProvenChoice | None:
         """Return the best choice, None where no choice is allowed."""
+        import cvxpy as cp
+
         values, multipliers = self._relaxation()
         lift = self._lift(multipliers)
         self._offer(exchanged(self.program, values))
@@ -109,7 +108,7 @@ class _Search:
         if self.best is None:
             return None
         cost = float(self.program.cost[self.best].sum())
-        return Choice(taken=self.best, cost=cost, bound=min(self.bound / self.rows.scale, cost))
+        return ProvenChoice(taken=self.best, cost=cost, bound=min(self.bound / self.rows.scale, cost))
 
     def _offer(self, taken: Int[np.ndarray, " any_group"]) -> bool:
         """Keep a choice if it is allowed and the cheapest so far; return whether it is allowed."""
@@ -121,6 +120,8 @@ class _Search:
 
     def _relaxation(self) -> tuple[Float[np.ndarray, " choice"], Float[np.ndarray, " row"]]:
         """Return the answer and the multipliers of the linear program with tangents, which keeps all stacks."""
+        from scipy.optimize import linprog
+
         rows = self.rows
         for _ in range(_CUTS):
             found = linprog(
@@ -159,6 +160,8 @@ class _Search:
 
     def _range(self, stack: int, kept: Bool[np.ndarray, " more"]) -> tuple[float, float] | None:
         """Return the least and largest root sum of squares of what may be cheaper, None where nothing is to divide."""
+        from scipy.optimize import linprog
+
         rows, limits = self.rows.matrix, self.rows.relaxed_limits
         if self.cost < np.inf:
             rows = np.vstack([rows, self.rows.cost / COSTS])
@@ -180,6 +183,8 @@ class _Search:
 
     def _decide(self, kept: Bool[np.ndarray, " more"]) -> tuple[Int[np.ndarray, " any_group"] | None, float, str]:
         """Return the answer of the mixed-integer program, its bound and its status."""
+        import cvxpy as cp
+
         rows, columns = self.rows, np.flatnonzero(kept)
         z = cp.Variable(columns.size, boolean=True)
         keep = csr_matrix(rows.matrix[:, columns]) @ z <= rows.relaxed_limits

@@ -5,16 +5,23 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.allocation.cost.closed_forms import Expression
 from tolalloc.allocation.program.certificate import cost_bound
-from tolalloc.allocation.program.least_infeasible import LeastInfeasible, least_infeasible
-from tolalloc.allocation.program.priced_cost import convex_cost
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Shared, Solution, Stack
+from tolalloc.allocation.program.lagrange_dual import convex_cost
+from tolalloc.allocation.program.problem import (
+    AllocationProblem,
+    LeastInfeasible,
+    PricedFeature,
+    Shared,
+    Solution,
+    Stack,
+    least_infeasible,
+)
 from tolalloc.exceptions import SolveError
 
 _ATTEMPTS: tuple[dict[str, float | bool], ...] = (
@@ -31,12 +38,12 @@ _ENOUGH = 1e-10
 
 
 class _StackParameters(NamedTuple):
-    """One stack, divided by its scale, over zones divided by their units."""
+    """One stack, divided by its scale, over zones divided by their units: parameters of cvxpy."""
 
-    worst_case: cp.Parameter
-    root_sum_square: cp.Parameter
-    slopes: cp.Parameter
-    budget: cp.Parameter
+    worst_case: Any
+    root_sum_square: Any
+    slopes: Any
+    budget: Any
 
 
 class ConvexProgram:
@@ -66,8 +73,10 @@ class ConvexProgram:
     """
 
     def __init__(
-        self, features: Sequence[Feature], processes: Int[np.ndarray, " feature"], stacks: int, shared: Shared
+        self, features: Sequence[PricedFeature], processes: Int[np.ndarray, " feature"], stacks: int, shared: Shared
     ) -> None:
+        import cvxpy as cp
+
         self.features, self.shared, self.processes = tuple(features), shared, processes
         self._made = tuple(feature.processes[at] for feature, at in zip(features, processes, strict=True))
         self.lower = np.array([process.minimum for process in self._made])
@@ -95,7 +104,9 @@ class ConvexProgram:
         around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]
         self._problem = cp.Problem(cp.Minimize(cost), [*self._keeping, *self._kept, *around])
 
-    def _load(self, stack: _StackParameters) -> cp.Expression:
+    def _load(self, stack: _StackParameters) -> Expression:
+        import cvxpy as cp
+
         spread = cp.norm2(cp.multiply(stack.root_sum_square, self._zones))
         return stack.worst_case @ self._zones + spread + stack.slopes @ self._shared
 
@@ -180,6 +191,8 @@ class ConvexProgram:
 
     def _run(self) -> None:
         """Solve the compiled program, less precisely where it must be; how precisely shows in the gap."""
+        import cvxpy as cp
+
         said = ""
         for settings in _ATTEMPTS:
             try:
@@ -211,3 +224,13 @@ class ConvexProgram:
             bound_prices=np.maximum(np.stack([side.dual_value for side in self._keeping], axis=1), 0.0)
             * (self._cost_scale / self._units)[:, None],
         )
+
+
+def front(
+    program: ConvexProgram, stacks: Sequence[Stack], at: int, budgets: Float[np.ndarray, " point"]
+) -> tuple[Solution | None, ...]:
+    """Return the exact front: the cheapest design for every budget of the stack at a position, None where none is."""
+    return tuple(
+        program.solve([*stacks[:at], replace(stacks[at], budget=float(budget)), *stacks[at + 1 :]])
+        for budget in budgets
+    )

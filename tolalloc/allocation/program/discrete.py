@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.allocation.program.choice_search import Choice, best_choice
+from tolalloc.allocation.program.choice_search import ProvenChoice, best_choice
 from tolalloc.allocation.program.multiple_choice import MultipleChoice
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.exceptions import InputError
 
 MOST_NODES = 10_000
@@ -44,17 +44,10 @@ class Option:
     cost: float
 
 
-def feature_options(feature: Feature, zones: Float[np.ndarray, " step"], labels: Sequence[str]) -> tuple[Option, ...]:
+def feature_options(
+    feature: PricedFeature, zones: Float[np.ndarray, " step"], labels: Sequence[str]
+) -> tuple[Option, ...]:
     """Return every step of a ladder made by every process of a feature that can hold it.
-
-    Parameters
-    ----------
-    feature
-        The feature.
-    zones
-        Zones of the ladder [unit of the zone].
-    labels
-        Their names.
 
     Raises
     ------
@@ -240,11 +233,11 @@ class DiscreteProblem:
             (np.array([*taken, at]) for at in grid), key=lambda own: float(program.violation(own).max(initial=-1))
         )
         cost = float(program.cost[best].sum())
-        found = self._solution(Choice(taken=best, cost=cost, bound=cost if program.allows(best) else np.inf))
+        found = self._solution(ProvenChoice(taken=best, cost=cost, bound=cost if program.allows(best) else np.inf))
         assert found
         return found
 
-    def _solution(self, choice: Choice | None) -> DiscreteSolution | None:
+    def _solution(self, choice: ProvenChoice | None) -> DiscreteSolution | None:
         if choice is None:
             return None
         options = tuple(self._flat[at] for at in choice.taken[:-1])

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
-import cvxpy as cp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.allocation.program.priced_cost import convex_cost, least_priced_cost
+from tolalloc.allocation.cost.closed_forms import Expression, Reciprocal
+from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program.problem import AllocationProblem
+from tolalloc.exceptions import InputError
+
+_FRACTIONS = np.linspace(0.0, 1.0, 33)
+_ROUNDS = 4
+"""Each narrows a zone to 1/32 of its range, so four leave a ratio of 1 + 1e-5 at most [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +73,8 @@ class LagrangeDual:
     """
 
     def __init__(self, problem: AllocationProblem) -> None:
+        import cvxpy as cp
+
         self.problem = problem
         counts = [len(feature.processes) for feature in problem.features]
         self.feature = np.repeat(np.arange(len(counts)), counts)
@@ -96,15 +104,7 @@ class LagrangeDual:
         return unit_rows(self._root_sum_square * zones)
 
     def price(self, prices: Float[np.ndarray, " stack"], planes: Float[np.ndarray, "stack feature"]) -> PricedProcesses:
-        """Return the least priced cost of every process.
-
-        Parameters
-        ----------
-        prices
-            Price of every stack's budget, 0 or above [cost units per unit of the stack].
-        planes
-            Unit directions for the norms [-].
-        """
+        """Return the least priced cost of every process, for prices of 0 or above and planes of unit length."""
         half = np.where(self._squared, prices / 2, 0.0)
         plane = np.where(self._squared, 0.0, prices)
         budget = np.where(self._squared, self._budget, 1.0)
@@ -157,3 +157,53 @@ def unit_rows(rows: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "row c
     """Return rows of length one; a row of zeros stays one."""
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     return rows / np.where(length > 0, length, 1.0)
+
+
+def convex_cost(place: str, process: Process, zone: Expression) -> Expression:
+    """Return the cost of a process as a convex expression [cost units]; one that is not convex is an InputError."""
+    expression = process.cost.expression(zone)
+    if expression is None:
+        raise InputError.at(place, f"process {process.name}", "a cost that is not convex", "a convex cost")
+    return expression
+
+
+def least_priced_cost(process: Process, linear: float, square: float) -> tuple[float, float]:
+    """Return a lower bound on cost + linear·zone + square·zone² over the range of a process, and the zone there.
+
+    Parameters
+    ----------
+    process
+        The process, whose cost is convex.
+    linear, square
+        Price of its zone [cost units per unit of the zone], and of its square, 0 or above [cost units per unit²].
+
+    Notes
+    -----
+    A convex function lies above its tangents at any two zones, so the crossing of the two bounds it from below
+    wherever they stand; that they stand on both sides of the minimum and close together only makes the bound tight.
+    For b/t + p·t the minimum is known: it is reached at √(b/p), or at the nearer end of the range.
+    """
+    if isinstance(process.cost, Reciprocal) and square == 0:
+        return _least_reciprocal(process, process.cost, linear)
+    low, high = process.minimum, process.maximum
+    for _ in range(_ROUNDS):
+        zones = np.minimum(low * (high / low) ** _FRACTIONS, high)
+        rising = process.cost.slope(zones) + linear + 2 * square * zones >= 0
+        after = int(np.argmax(rising)) if rising[-1] else zones.size
+        low, high = float(zones[max(after - 1, 0)]), float(zones[min(after, zones.size - 1)])
+        if low == high:
+            break
+    ends = np.array([low, high])
+    values = process.total(ends) + linear * ends + square * ends**2
+    if low == high:
+        return float(values[0]), low
+    slopes = process.cost.slope(ends) + linear + 2 * square * ends
+    step = float(np.clip((values[1] - values[0] - slopes[1] * (high - low)) / (slopes[0] - slopes[1]), 0, high - low))
+    return float(values[0] + slopes[0] * step), low + step
+
+
+def _least_reciprocal(process: Process, cost: Reciprocal, price: float) -> tuple[float, float]:
+    """Return the least of a reciprocal cost with a price on its zone, and the zone there."""
+    best = sqrt(cost.factor / price) if price > 0 else process.maximum
+    zone = min(max(best, process.minimum), process.maximum)
+    return cost.fixed + process.change + cost.factor / zone + price * zone, zone

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import heapq
+import pickle
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Int
 
-from tolalloc.allocation.program.alike_features import AlikeFeatures
 from tolalloc.allocation.program.certificate import ascend
 from tolalloc.allocation.program.convex import ConvexProgram
 from tolalloc.allocation.program.lagrange_dual import LagrangeDual, PricedProcesses
-from tolalloc.allocation.program.least_infeasible import LeastInfeasible, least_infeasible
-from tolalloc.allocation.program.problem import AllocationProblem, Solution
+from tolalloc.allocation.program.problem import AllocationProblem, LeastInfeasible, Solution, least_infeasible
 from tolalloc.exceptions import SolveError
 
 _GAP = 1e-9
@@ -45,7 +45,7 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
     SolveError
         The search ended before it found a design, or a convex program was not solved.
     """
-    search = _Search(problem)
+    search = _BranchAndBound(problem)
     best = search.cheapest([np.ones(search.dual.feature.size, dtype=bool)], most_nodes)
     if best is not None:
         return best
@@ -58,23 +58,10 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
 def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 500) -> Solution | None:
     """Return the cheapest design made by another set of processes than the best, or None if no other keeps the stacks.
 
-    Sets that differ only in which of several alike features takes which process count as one.
-
-    Parameters
-    ----------
-    problem
-        The allocation.
-    best
-        Its solution.
-    most_nodes
-        Nodes after which the search ends with what it has [-].
-
-    Raises
-    ------
-    InputError
-        A cost is not convex.
+    Sets that differ only in which of several alike features takes which process count as one. The search ends with what
+    it has after so many nodes [-].
     """
-    search = _Search(problem)
+    search = _BranchAndBound(problem)
     others, free = [], np.ones(search.dual.feature.size, dtype=bool)
     for at, chosen in enumerate(search.dual.starts + best.processes):
         differently = free.copy()
@@ -85,17 +72,11 @@ def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 50
     return search.cheapest(others, most_nodes)
 
 
-class _Search:
-    """Best-first branch and bound; every multiplier ever tried bounds every node.
-
-    Parameters
-    ----------
-    problem
-        The allocation.
-    """
+class _BranchAndBound:
+    """Best-first branch and bound; every multiplier ever tried bounds every node."""
 
     def __init__(self, problem: AllocationProblem) -> None:
-        self.problem, self.dual, self._alike = problem, LagrangeDual(problem), AlikeFeatures(problem)
+        self.problem, self.dual, self._alike = problem, LagrangeDual(problem), _AlikeFeatures(problem)
         self._tried: list[PricedProcesses] = []
         self._solved: dict[tuple[int, ...], Solution | None] = {}
         self._best: Solution | None = None
@@ -193,3 +174,34 @@ class _Search:
             for feature, part in zip(self.problem.features, parts, strict=True)
         )
         return least_infeasible(replace(self.problem, features=features)).feasible
+
+
+class _AlikeFeatures:
+    """Groups of features with the same processes, loss and place in every stack, bit by bit.
+
+    Who of them takes which process makes no difference.
+    """
+
+    def __init__(self, problem: AllocationProblem) -> None:
+        groups: dict[bytes, list[slice]] = defaultdict(list)
+        start = 0
+        for at, feature in enumerate(problem.features):
+            made = [(own.cost, own.minimum, own.maximum, own.change) for own in feature.processes]
+            loads = [(float(stack.worst_case[at]), float(stack.root_sum_square[at])) for stack in problem.stacks]
+            groups[pickle.dumps((made, loads, feature.loss))].append(slice(start, start + len(made)))
+            start += len(made)
+        self._groups = [group for group in groups.values() if len(group) > 1]
+
+    def ordered(self, allowed: Bool[np.ndarray, " process"]) -> Bool[np.ndarray, " process"]:
+        """Return the allowed processes less those that no choice in ascending order within the groups contains."""
+        left = allowed.copy()
+        for group in self._groups:
+            first = 0
+            for own in group:
+                left[own][:first] = False
+                first = int(np.argmax(left[own]))
+            last = left[group[-1]].size
+            for own in reversed(group):
+                left[own][last:] = False
+                last = left[own].size - int(np.argmax(left[own][::-1]))
+        return left

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.cost.closed_forms import ClosedForm, Exponential, Reciprocal
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program.problem import AllocationProblem, Feature, Stack
+from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.assembly.gains import FinalErrors
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.exceptions import InputError
@@ -106,7 +106,7 @@ def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProble
     losses = requirements.effort_price * errors.effort_by_variance / 9 * ARCSECOND**2
     names = [f"{part}.{axis}" for part, axis in product(plan.chain.names, "xyz")]
     features = tuple(
-        Feature(name=name, processes=(_process(requirements, at),), loss=float(loss))
+        PricedFeature(name=name, processes=(_process(requirements, at),), loss=float(loss))
         for at, (name, loss) in enumerate(zip(names, losses, strict=True))
     )
     stacks = tuple(
