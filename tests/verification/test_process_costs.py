@@ -15,7 +15,7 @@ from tolalloc.allocation.cost.closed_forms import (
     reciprocal_squared,
 )
 from tolalloc.allocation.cost.points import load_shop_points
-from tolalloc.allocation.cost.process_costs_file import ProcessCostRow, load_process_costs, today
+from tolalloc.allocation.cost.process_costs_file import ProcessCostRow, load_process_costs, priced, today
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawing.table_file import DATA, read_rows
 from tolalloc.drawing.tolerance_table import load_tolerance_table

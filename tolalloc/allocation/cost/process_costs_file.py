@@ -149,6 +149,9 @@ class ProcessCostRow(TableRow):
 ProcessesOfSources = Mapping[str, tuple[Process, ...]]
 """Source → ways to make it, zones in metres."""
 
+PricedWay = tuple[str, float | int, float | int, float | int, float | int]
+"""Name of a process, its A and B in A + B/t, and the smallest and largest t that it holds."""
+
 PlacedRow = tuple[str, ProcessCostRow]
 """File and row, and what stands there."""
 
@@ -164,7 +167,7 @@ def today(source: Source) -> Process:
 
 
 def priced(
-    rows: Mapping[str, Iterable[tuple[str, float, float, float, float]]],
+    rows: Mapping[str, Iterable[PricedWay]],
     sources: Sequence[Source],
     tolerance: Literal["zone", "half zone"] = "zone",
 ) -> ProcessesOfSources:
@@ -205,7 +208,9 @@ def priced(
             raise InputError.at(f"process costs of {name}", "processes", [row[0] for row in made], "each name once")
         ranges = [(max(source.minimum, low * unit), min(source.maximum, high * unit)) for *_, low, high in made]
         found[name] = tuple(
-            Process(name=way, cost=Reciprocal(fixed=fixed, factor=factor * unit), minimum=minimum, maximum=maximum)
+            Process(
+                name=way, cost=Reciprocal(fixed=float(fixed), factor=factor * unit), minimum=minimum, maximum=maximum
+            )
             for (way, fixed, factor, *_), (minimum, maximum) in zip(made, ranges, strict=True)
             if minimum <= maximum
         )

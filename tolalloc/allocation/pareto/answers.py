@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives, ParetoProblem
 from tolalloc.exceptions import InputError
 from tolalloc.model import Evaluation, Response
 
@@ -162,44 +161,6 @@ class RememberedAnswers:
         ):
             raise checkpoint.other_problem
         self._known = {design.tobytes(): row for design, row in zip(designs, numbers, strict=True)}
-
-
-class RememberedProblem:
-    """A problem that answers every design once, beyond this process if there is a checkpoint."""
-
-    def __init__(self, problem: ParetoProblem, checkpoint: Checkpoint | None = None) -> None:
-        self.problem = problem
-        genes = problem.genes
-        bounds = np.array([genes.lower, genes.upper, genes.integer]).tolist()
-        self.answers = RememberedAnswers(
-            self._ask, repr((genes.names, bounds, problem.objectives, problem.constraints)), checkpoint
-        )
-
-    @property
-    def genes(self) -> Genes:
-        """What the search may change."""
-        return self.problem.genes
-
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        """What is traded off."""
-        return self.problem.objectives
-
-    @property
-    def constraints(self) -> tuple[str, ...]:
-        """Names of the constraints."""
-        return self.problem.constraints
-
-    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
-        """Return the objectives of every design."""
-        numbers, count = self.answers(designs), len(self.objectives)
-        return Objectives(
-            values=numbers[:, :count], violation=numbers[:, count:-1], status=numbers[:, -1].astype(np.uint8)
-        )
-
-    def _ask(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
-        answers = self.problem(designs)
-        return np.column_stack([answers.values, answers.violation, answers.status])
 
 
 class RememberedResponse:

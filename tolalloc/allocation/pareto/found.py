@@ -62,10 +62,7 @@ class SearchedDesigns:
     def front(self, number: int) -> SearchedDesigns:
         """Return allowed designs that no other one beats, in the order of the first objective, possibly none.
 
-        Parameters
-        ----------
-        number
-            How many at most; where there are more, those in the densest places are left out [-].
+        Where there are more than the number [-], those in the densest places are left out.
         """
         allowed = self._at(np.flatnonzero(self.answers.kept))
         front = allowed._at(np.flatnonzero(nondominated(allowed.losses)))

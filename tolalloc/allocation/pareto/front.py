@@ -83,13 +83,7 @@ class FrontEffort:
 
 
 def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front:
-    """Return the front of a search, not yet judged by the kernel.
-
-    Raises
-    ------
-    SolveError
-        No design is allowed.
-    """
+    """Return the front of a search, not yet judged by the kernel."""
     front = found.front(number)
     if not len(front.designs):
         nearest = found.least_violating()

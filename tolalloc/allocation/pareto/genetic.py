@@ -19,10 +19,10 @@ from pymoo.optimize import minimize
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
-from tolalloc.allocation.pareto.answers import Checkpoint, RememberedProblem
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedAnswers
 from tolalloc.allocation.pareto.found import SearchedDesigns
 from tolalloc.allocation.pareto.indicators import spread_over
-from tolalloc.allocation.pareto.problem import Genes, ParetoProblem
+from tolalloc.allocation.pareto.problem import Genes, Objectives, ParetoProblem
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
@@ -31,12 +31,15 @@ _MARGIN = 0.49
 
 
 class _Searched(Problem):  # type: ignore[misc]
-    """The problem as pymoo sees it: everything is made small, and one constraint sums up all violations."""
+    """The problem as pymoo sees it: everything is made small, one constraint sums up all violations, all is kept."""
 
-    def __init__(self, problem: ParetoProblem) -> None:
+    def __init__(self, problem: ParetoProblem, checkpoint: Checkpoint | None) -> None:
         self.searched, genes = problem, problem.genes
         self.asked: list[Float[np.ndarray, "design gene"]] = []
         self.signs = np.array([objective.sign for objective in problem.objectives])
+        bounds = np.array([genes.lower, genes.upper, genes.integer]).tolist()
+        identity = repr((genes.names, bounds, problem.objectives, problem.constraints))
+        self.remembered = RememberedAnswers(self._ask, identity, checkpoint)
         margin = _MARGIN * genes.integer
         super().__init__(
             n_var=genes.lower.size,
@@ -46,9 +49,20 @@ class _Searched(Problem):  # type: ignore[misc]
             xu=genes.upper + margin,
         )
 
+    def answers(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
+        """Return the objectives of every design, each asked for once."""
+        numbers, count = self.remembered(designs), self.signs.size
+        return Objectives(
+            values=numbers[:, :count], violation=numbers[:, count:-1], status=numbers[:, -1].astype(np.uint8)
+        )
+
+    def _ask(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
+        answers = self.searched(designs)
+        return np.column_stack([answers.values, answers.violation, answers.status])
+
     def _evaluate(self, x: Float[np.ndarray, "design gene"], out: dict[str, object], *_: object, **__: object) -> None:
         self.asked.append(x)
-        answers = self.searched(x)
+        answers = self.answers(x)
         out["F"], out["G"] = answers.values * self.signs, answers.total_violation[:, np.newaxis]
 
 
@@ -150,8 +164,7 @@ def search(
         raise InputError.at(
             "Pareto search", "population and generations", (population, generations), f"{count + 1} and 1, or more"
         )
-    remembered = RememberedProblem(problem, checkpoint)
-    searched = _Searched(remembered)
+    searched = _Searched(problem, checkpoint)
     minimize(
         searched,
         _algorithm(
@@ -164,6 +177,6 @@ def search(
         seed=seeds.child("genetic").integer(),
         copy_algorithm=False,
     )
-    remembered.answers.write()
+    searched.remembered.write()
     designs = np.concatenate(searched.asked)
-    return SearchedDesigns(problem=problem, designs=designs, answers=remembered(designs))
+    return SearchedDesigns(problem=problem, designs=designs, answers=searched.answers(designs))

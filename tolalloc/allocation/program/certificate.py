@@ -24,21 +24,11 @@ def ascend(
 ) -> list[PricedProcesses]:
     """Return the multipliers tried on the way to the largest lower bound, the start first.
 
-    Parameters
-    ----------
-    dual
-        The dual function.
-    start
-        Where the ascent starts.
-    allowed
-        The processes that compete.
-    enough
-        Bound at which nothing more is asked for [cost units].
-
     Notes
     -----
-    The logarithms of the prices and the directions of the norms move together. Where processes tie the dual has a
-    kink, and the ascent may stop short of its top; every multiplier on the way gives a valid bound all the same.
+    Nothing more is asked for once a bound is enough [cost units]. The logarithms of the prices and the directions of
+    the norms move together. Where processes tie the dual has a kink, and the ascent may stop short of its top; every
+    multiplier on the way gives a valid bound all the same.
     """
     from scipy.optimize import minimize
 

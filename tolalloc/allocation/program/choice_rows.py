@@ -33,13 +33,7 @@ RELAXED = 1e-9
 
 
 class ChoiceRows:
-    """Rows and their limits; costs are scaled for the solvers.
-
-    Parameters
-    ----------
-    program
-        The groups and their choices.
-    """
+    """Rows and their limits; costs are scaled for the solvers."""
 
     def __init__(self, program: MultipleChoice) -> None:
         spent = np.maximum.reduceat(np.abs(program.cost), program.starts).sum()
@@ -93,15 +87,7 @@ class ChoiceRows:
         return True
 
     def add_tangents(self, values: Float[np.ndarray, " choice"], allowed: float) -> bool:
-        """Add a tangent for every stack that a point of the relaxation breaks; False if there is none.
-
-        Parameters
-        ----------
-        values
-            How much of every choice is taken [-].
-        allowed
-            Violation up to which a stack is not broken [-].
-        """
+        """Add a tangent for every stack that a point of the relaxation breaks by more than allowed [-], if any."""
         program, before = self.program, len(self._rows)
         for worst_case, squares, budget in zip(program.worst_case, program.squares, program.budget, strict=True):
             roots = np.sqrt(squares)
@@ -127,15 +113,7 @@ class ChoiceRows:
         self.add_tangents((taken[self.program.group] == np.arange(self.cost.size)).astype(float), ROUNDING)
 
     def add_chord(self, stack: int, start: float, end: float) -> None:
-        """Add the chord of a stack's root sum of squares.
-
-        Parameters
-        ----------
-        stack
-            Position of the stack [-].
-        start, end
-            Values that the root sum lies between [-].
-        """
+        """Add the chord of a stack's root sum of squares between two of its values [-]."""
         self._add(*self._chord(stack, start, end))
 
     def _chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
@@ -145,15 +123,7 @@ class ChoiceRows:
         return row, float(self.program.budget[stack] - start + slope * start**2)
 
     def add_sections(self, stack: int, ends: Float[np.ndarray, " end"]) -> None:
-        """Add a group whose choice says between which ends a stack's root sum of squares lies, and the chords there.
-
-        Parameters
-        ----------
-        stack
-            Position of the stack [-].
-        ends
-            Ends of the sections, ascending [-].
-        """
+        """Add a group whose choice says between which ends a stack's root sum of squares lies, and the chords there."""
         program, sections = self.program, ends.size - 1
         chords = [self._chord(stack, *pair) for pair in pairwise(ends.tolist())]
         none, nothing = np.zeros(sections), np.zeros((program.budget.size, sections))

@@ -57,13 +57,7 @@ class ProvenChoice:
 def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None:
     """Return the best choice, None where no choice is allowed.
 
-    Parameters
-    ----------
-    program
-        The groups and their choices.
-    most_nodes
-        Nodes of the mixed-integer programs together, after which the best allowed choice so far is returned with its
-        bound [-].
+    After so many nodes of the mixed-integer programs together [-] it is the best allowed one so far with its bound.
 
     Raises
     ------

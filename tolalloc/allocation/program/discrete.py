@@ -200,18 +200,7 @@ class DiscreteProblem:
         )
 
     def solve(self, most_nodes: int = MOST_NODES) -> DiscreteSolution | None:
-        """Return the cheapest allowed choice, None where none is allowed.
-
-        Parameters
-        ----------
-        most_nodes
-            Nodes of branch and bound, after which the best choice so far is returned with its bound [-].
-
-        Raises
-        ------
-        SolveError
-            No allowed choice was found within these nodes.
-        """
+        """Return the cheapest allowed choice, None where none is allowed; see `best_choice` for the nodes [-]."""
         return self._solution(best_choice(self._program, most_nodes))
 
     def least_violating(self) -> DiscreteSolution:

@@ -100,12 +100,7 @@ class MultipleChoice:
 def exchanged(program: MultipleChoice, values: Float[np.ndarray, " choice"]) -> Taken:
     """Return choices that no exchange of two improves: less violation first, then less cost.
 
-    Parameters
-    ----------
-    program
-        The groups and their choices.
-    values
-        How much of every choice the relaxation takes; the dearest of those is where the exchanges start [-].
+    The exchanges start from the dearest of the choices of which the relaxation takes some value [-].
     """
     liking = np.where(values > 1e-9, program.cost + 1e-9 * (1.0 + np.ptp(program.cost)) * values, -np.inf)
     parts = np.split(liking, program.starts[1:])

@@ -24,19 +24,9 @@ Allowed = Bool[np.ndarray, " process"]
 
 
 def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | LeastInfeasible:
-    """Return the cheapest choice of processes and zones, with a bound over all choices.
+    """Return the cheapest choice of processes and zones with a bound over all choices, or what violates stacks least.
 
-    Parameters
-    ----------
-    problem
-        The allocation.
-    most_nodes
-        Nodes after which the search ends with what it has; the gap of the solution says what is left [-].
-
-    Returns
-    -------
-    Solution or LeastInfeasible
-        The design that violates the stacks least, where none keeps them all.
+    After so many nodes [-] the search ends with what it has; the gap of the solution says what is left.
 
     Raises
     ------
