@@ -20,7 +20,7 @@ from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.rv.modification.history import History, quartiles
 from tolalloc.rv.modification.problem import Amounts, EvaluatedAmounts, ModificationProblem
-from tolalloc.rv.modification.reference import Optimum, Tally, reference
+from tolalloc.rv.modification.reference import BestPoint, Optimum, reference
 from tolalloc.units import MILLIMETRE
 
 REACHED = 1e-6 * MILLIMETRE
@@ -54,8 +54,8 @@ class SearchResult(Optimum):
     history: History
 
 
-class Recorder(Tally):
-    """A tally that also keeps the way of the search."""
+class Recorder(BestPoint):
+    """The best point, and the way of the search to it."""
 
     def __init__(self, problem: ModificationProblem) -> None:
         super().__init__(problem)
@@ -75,7 +75,7 @@ class Recorder(Tally):
         if before is not None:
             history = before.then(history)
         return SearchResult(
-            amounts=self.best,
+            amounts=self.amounts,
             objective=self.objective,
             violation=self.violation,
             evaluations=int(history.evaluations[-1]),
@@ -199,7 +199,7 @@ def polish(problem: ModificationProblem, result: SearchResult) -> SearchResult:
         options={"ftol": 1e-15, "maxiter": 50},
     )
     for reach in _REACHES:
-        start = recorder.best / MILLIMETRE
+        start = recorder.amounts / MILLIMETRE
         corners = np.array([[0, 0], [reach, 0], [0, reach]]) * (upper - lower)
         minimize_downhill(
             lambda genes: evaluate(genes).merit[0] / MILLIMETRE,

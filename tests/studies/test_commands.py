@@ -49,10 +49,14 @@ def set_cell(row: int, column: str, value: str):
     return change
 
 
-def test_te_of_table_4():
-    result = tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--torque", "-1", "--json")
+def test_te_of_table_4(tmp_path):
+    folder = tmp_path / "report"
+    result = tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--torque", "-1", "--json", "--out", folder)
     answer = json.loads(result.stdout)
     assert result.returncode == 0
+    assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"transmission_error", "orders"}
+    assert len(pd.read_csv(folder / "tables" / "one turn.csv")) > 20
     assert answer["peak_to_peak_arcsec"] == pytest.approx(96.58, abs=0.05)
     assert [wave["order"] for wave in answer["main_orders"]][:6] == [1, 78, 80, 79, 39, 2]
     assert answer["torsional_stiffness_nm_per_arcmin"]["perfect_reducer"] == pytest.approx(2519, abs=1)
@@ -279,6 +283,10 @@ def test_unknown_names_offer_the_nearest(tmp_path):
 @pytest.mark.parametrize("torque", ["nan", "0", "1e9"])
 def test_a_torque_without_meaning_is_refused(torque):
     refused(tolalloc("te", "--torque", torque), "torque", "1670 N·m, but not 0")
+
+
+def test_te_writes_no_file_about_a_reducer_that_nobody_named(tmp_path):
+    refused(tolalloc("te", "--out", tmp_path / "report"), "--reducer is missing", "rv20e, rv40e, rv80e")
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path):

@@ -53,12 +53,12 @@ class Optimum:
         return f"no point of {self.evaluations} met the constraints; the one that misses them least, by {missed}"
 
 
-class Tally:
+class BestPoint:
     """Evaluates points of a problem, counts them and keeps the best.
 
     Attributes
     ----------
-    best
+    amounts
         Best amounts up to now [m].
     objective, violation
         Objective and missed constraints there [m].
@@ -68,7 +68,7 @@ class Tally:
 
     def __init__(self, problem: ModificationProblem) -> None:
         self.problem = problem
-        self.best, self.evaluations = np.full(2, np.nan), 0
+        self.amounts, self.evaluations = np.full(2, np.nan), 0
         self._merit = self.objective = self.violation = np.inf
 
     def __call__(self, amounts: Amounts) -> EvaluatedAmounts:
@@ -76,7 +76,7 @@ class Tally:
         evaluated = self.problem.evaluate(amounts)
         at = int(evaluated.merit.argmin())
         if evaluated.merit[at] < self._merit:
-            self.best, self._merit = amounts[at].copy(), float(evaluated.merit[at])
+            self.amounts, self._merit = amounts[at].copy(), float(evaluated.merit[at])
             self.objective, self.violation = float(evaluated.objective[at]), float(evaluated.violation[at])
         self.evaluations += len(amounts)
         return evaluated
@@ -90,19 +90,19 @@ def reference(problem: ModificationProblem) -> Optimum:
     Both searches narrow a grid down around its best point, by comparison alone. So kinks, bounds and corners of the
     constraints need no care, and an optimum is missed only if it hides between the points of the first grid, 33 × 33.
     """
-    tally = Tally(problem)
+    best = BestPoint(problem)
 
     def best_by_shift(equidistants: Float[np.ndarray, "1 p"]) -> Float[np.ndarray, "1 p"]:
         def merit(shifts: Float[np.ndarray, "n p"]) -> Float[np.ndarray, "n p"]:
             amounts = np.stack(np.broadcast_arrays(equidistants.T, shifts), axis=-1)
-            return tally(amounts.reshape(-1, 2)).merit.reshape(shifts.shape)
+            return best(amounts.reshape(-1, 2)).merit.reshape(shifts.shape)
 
         bounds = np.repeat([[problem.lower[1]], [problem.upper[1]]], equidistants.size, axis=1)
         return _smallest(merit, *bounds)[np.newaxis]
 
     _smallest(best_by_shift, problem.lower[:1], problem.upper[:1])
     return Optimum(
-        amounts=tally.best, objective=tally.objective, violation=tally.violation, evaluations=tally.evaluations
+        amounts=best.amounts, objective=best.objective, violation=best.violation, evaluations=best.evaluations
     )
 
 
