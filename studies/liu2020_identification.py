@@ -7,33 +7,31 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-from liu2020_tables import BOUNDS, printed_section
+from published.liu2020_searches import MethodRuns, compare, methods_section, on_polynomials, search
+from published.liu2020_swarm import ASSUMED, ImprovedPSO, SwarmSettings
+from published.liu2020_tables import BOUNDS, printed_section
+from published.recovery import Recovery, recovery
+from published.simulated_bench import Bench, random_units, simulated_bench
 
-from tolalloc.bench.identification.answer.document import identification_document
-from tolalloc.bench.identification.answer.results import IdentificationResults
+from tolalloc.bench.identification.answer import IdentificationAnswer
 from tolalloc.bench.identification.data import data_of
 from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.recovery import Recovery, recovery
-from tolalloc.bench.identification.searches import search
-from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.bench.identification.stand_in import StandIn
 from tolalloc.bench.identification.study import IdentificationStudy, identify
-from tolalloc.bench.identification.swarm import ImprovedPSO, SwarmSettings
 from tolalloc.bench.measurement.records import Measurements
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.progress import Progress
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit
-from tolalloc.study.stages import Progress
 from tolalloc.units import ARCSECOND
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}
@@ -62,12 +60,10 @@ CURVES_AND_LOOPS = Bench(
 """Curves in both directions at a small torque, loops up to the rated one; noises are assumed."""
 
 
-def settings_section(results: IdentificationResults, seeds: int) -> Section:
+def settings_section(answer: IdentificationAnswer, methods: tuple[MethodRuns, ...], seeds: int) -> Section:
     """Return how the improved swarm depends on what liu2020 does not print."""
-    stand_in = StandIn(results.parameters, results.parameters, results.stand_in, results.data)
-    units = np.ones(len(results.measurements.units))
-    problem = IdentificationProblem(parameters=results.parameters, data=results.data, predictor=stand_in, weight=units)
-    least = min(float(item.objectives.min()) for item in results.comparison)
+    problem = on_polynomials(answer)
+    least = min(float(item.objectives.min()) for item in methods)
     rows = []
     for settings in SETTINGS:
         runs = [
@@ -183,9 +179,10 @@ def build(quick: bool) -> Document:
     true = replace(given, stiffness=replace(given.stiffness, **TRUTH))
     errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
     with UnitProgress() as progress:
-        first = _peak_to_peaks(given, true, errors, seeds, quick, progress)
+        first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
         second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
-    document, curves = identification_document(first), identification_document(second)
+    document, curves = first.document, second.document
+    compared = methods_section(methods, first.data.measured.size)
     printed, repeated = printed_section(), recovery_section(again, second.logarithms)
     truth = ", ".join(f"{SYMBOLS[name]} = {value:.4g}" for name, value in TRUTH.items())
     return replace(
@@ -201,20 +198,22 @@ def build(quick: bool) -> Document:
         warnings=tuple(f"Peak-to-peaks: {sentence}" for sentence in document.warnings),
         sections=(
             replace(printed, paragraphs=()),
-            *renamed(document.sections, "peaks", "50 simulated units"),
-            settings_section(first, _seeds(quick)),
+            *renamed((*document.sections, compared), "peaks", "50 simulated units"),
+            settings_section(first, methods, _seeds(quick)),
             kinds_section(true, second.parameters, _every_kind(true, errors, seeds)),
             *renamed(curves.sections, "curves", "Curves and loops of five units"),
             repeated,
         ),
         assumptions=(
             *document.assumptions,
+            f"improved particle swarm: ω = {ASSUMED.inertia:g}, C1 = C2 = {ASSUMED.acceleration:g}, "
+            f"{ASSUMED.neighbours} neighbour to either side on a ring, stop at the bounds; liu2020 prints none",
             f"50 simulated units: {LIKE_TABLE_7:g} times the zones of the tolerance table, so that their mean "
             "peak-to-peak is that of Table 7; five units: its own zones",
             "noise of peak-to-peaks and curves 1″, of loops 0.2″; true stiffness chosen inside the bounds of Table 5",
         ),
         summary={
-            "peak-to-peaks": document.summary,
+            "peak-to-peaks": {**document.summary, "methods": [item.summary for item in methods]},
             "curves and loops": curves.summary,
             "repetitions [-]": again.error.shape[0],
             "within three standard errors [-]": again.recovered,
@@ -229,7 +228,7 @@ def _seeds(quick: bool) -> int:
 
 def _peak_to_peaks(
     given: Reducer, true: Reducer, errors: ErrorModel, seeds: SeedTree, quick: bool, progress: Progress
-) -> IdentificationResults:
+) -> tuple[IdentificationAnswer, tuple[MethodRuns, ...]]:
     """Identify from peak-to-peaks of 50 units within the bounds of Table 5, all methods compared."""
     nothing = np.empty(0)
     bench = Bench(peak_to_peak_torque=-1.0, peak_to_peak_noise=ARCSECOND, curve_angles=nothing, loop_torques=nothing)
@@ -237,10 +236,10 @@ def _peak_to_peaks(
     measured = simulated_bench(true, units, bench).measured(seeds.child("noise"))
     study = IdentificationStudy(
         parameters=tuple(parameter(name, given, BOUNDS[name]) for name in LIU2020),
-        compare=_seeds(quick),
         data="50 simulated units",
     )
-    return identify(study, measured, given, progress)
+    answer = identify(study, measured, given, progress)
+    return answer, compare(answer, _seeds(quick), progress)
 
 
 def _five_units(errors: ErrorModel, seeds: SeedTree) -> tuple[BuiltUnit, ...]:
@@ -255,7 +254,7 @@ def _every_kind(true: Reducer, errors: ErrorModel, seeds: SeedTree) -> Measureme
 
 def _curves_and_loops(
     given: Reducer, true: Reducer, errors: ErrorModel, seeds: SeedTree, quick: bool, progress: Progress
-) -> tuple[IdentificationResults, Recovery]:
+) -> tuple[IdentificationAnswer, Recovery]:
     """Identify from curves in both directions and torque loops of five units, then again with fresh noise."""
     exact = simulated_bench(true, _five_units(errors, seeds), CURVES_AND_LOOPS)
     parameters = tuple(parameter(name, given) for name in LIU2020)

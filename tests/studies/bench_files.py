@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from studies.published.measurement_folder import write_measurements
+from studies.published.simulated_bench import Bench, random_units, simulated_bench
 from tests.studies.command import tolalloc
-from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.bench.measurement.folder import write_measurements
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table
@@ -28,12 +28,6 @@ NOISE = {"curve": 0.2, "loop": 0.1}
 TORQUES = 167.0 * np.array([-1.0, -0.6, -0.2, 0.2, 0.6, 1.0])
 READINGS = {"curve": 6 * 72, "loop": 6 * TORQUES.size}
 NOTHING = np.empty(0)
-METHODS = {
-    "gauss_newton": "Gauss–Newton",
-    "improved_pso": "improved particle swarm",
-    "pso": "particle swarm",
-    "ga": "genetic algorithm",
-}
 CURVES_AND_LOOPS = Bench(
     curve_torques=(-167.0,),
     curve_angles=2 * pi * np.arange(72) / 72,

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tolalloc.bench.identification.baseline import BiasOnly, improvement
-
-SCRIPT = Path(__file__).parents[2] / "studies" / "liu2020_tables.py"
-
-
-@pytest.fixture(scope="module")
-def printed():
-    spec = importlib.util.spec_from_file_location("liu2020_tables", SCRIPT)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from studies.published import liu2020_tables as printed
+from studies.published.liu2020_tables import BiasOnly, improvement
 
 
-def test_the_gain_of_table_7_is_a_share_of_a_constant_difference(printed):
+def test_the_gain_of_table_7_is_a_share_of_a_constant_difference():
     """9.99 % in liu2020's text; its own column has the mean 9.995 %, the rounded readings give 9.997 %."""
     measured, before, after, gain = printed.TABLE_7.T
     again = 100 * improvement(before - measured, after - measured)
@@ -32,7 +18,7 @@ def test_the_gain_of_table_7_is_a_share_of_a_constant_difference(printed):
     assert 9.99 <= again.mean() <= 10.0
 
 
-def test_the_differences_are_all_positive_and_nearly_constant(printed):
+def test_the_differences_are_all_positive_and_nearly_constant():
     measured, before, after, _ = printed.TABLE_7.T
     for model, mean, spread in ((before, 2.80, 0.16), (after, 2.52, 0.14)):
         assert (model > measured).all()
@@ -40,7 +26,7 @@ def test_the_differences_are_all_positive_and_nearly_constant(printed):
         assert BiasOnly(difference=model - measured).spread == pytest.approx(spread, abs=0.005)
 
 
-def test_one_constant_leaves_less_than_identification(printed):
+def test_one_constant_leaves_less_than_identification():
     measured, before, after, _ = printed.TABLE_7.T
     constant = BiasOnly(difference=before - measured)
     assert constant.rms == pytest.approx(0.15, abs=0.005)
@@ -50,7 +36,7 @@ def test_one_constant_leaves_less_than_identification(printed):
     assert constant.leave_one_out < 0.1 * np.sqrt(((after - measured) ** 2).mean())
 
 
-def test_table_6_leaves_two_stiffnesses_open(printed):
+def test_table_6_leaves_two_stiffnesses_open():
     spread = np.ptp(printed.TABLE_6, axis=0)
     bounds = np.array([high - low for low, high in printed.BOUNDS.values()]) / 1e10
     assert spread[0] / bounds[0] < 0.001  # one value to four digits
@@ -58,6 +44,6 @@ def test_table_6_leaves_two_stiffnesses_open(printed):
     assert (printed.TABLE_6[:, 2] >= 7.99995).sum() == 6  # on the upper bound
 
 
-def test_the_report_says_plainly_what_a_constant_explains(printed):
+def test_the_report_says_plainly_what_a_constant_explains():
     text = " ".join(printed.printed_section().paragraphs)
     assert "A constant explains the printed residual better than any stiffness" in text

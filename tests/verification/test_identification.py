@@ -10,21 +10,20 @@ import pytest
 from scipy.stats import binom, norm
 from scipy.stats import t as student
 
-from tolalloc.bench.identification.baseline import BiasOnly, improvement
-from tolalloc.bench.identification.data import Block, Data, data_of
-from tolalloc.bench.identification.estimate import as_stiffness, estimates
+from studies.published.liu2020_searches import ALGORITHMS, search
+from studies.published.liu2020_swarm import best_neighbours, velocity, weights
+from studies.published.liu2020_tables import BiasOnly, improvement
+from studies.published.recovery import recovery
+from studies.published.simulated_bench import Bench, random_units, simulated_bench
+from tolalloc.bench.identification.data import AllReadings, ReadingBlock, data_of
 from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
 from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import LIU2020, Parameter, parameter
 from tolalloc.bench.identification.prediction import KernelPredictor, Prediction
 from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
-from tolalloc.bench.identification.profile import profile
-from tolalloc.bench.identification.recovery import recovery
+from tolalloc.bench.identification.profile import as_stiffness, estimates, profile
 from tolalloc.bench.identification.resampling import bootstrap, judged, simplest
-from tolalloc.bench.identification.searches import ALGORITHMS, search
-from tolalloc.bench.identification.simulation import Bench, random_units, simulated_bench
-from tolalloc.bench.identification.stand_in import StandIn, anchored, fit_stand_in
-from tolalloc.bench.identification.swarm import best_neighbours, velocity, weights
+from tolalloc.bench.identification.stand_in import StandIn, fit_stand_in
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.tolerance_table import load_tolerance_table
@@ -107,11 +106,11 @@ def straight_problem(readings: int, noise_stated: bool = True, prior: float = in
     generator = np.random.default_rng(7)
     slopes = generator.normal(size=(readings, 2))
     truth = np.array([0.1, -0.2])
-    data = Data(
+    data = AllReadings(
         measured=slopes @ truth + generator.normal(0, 0.3, readings),
         noise=np.full(readings, 0.3),
         unit=np.arange(readings),
-        blocks=(Block(kind="peak-to-peak", number=0, rows=slice(0, readings), centred=False),),
+        blocks=(ReadingBlock(kind="peak-to-peak", number=0, rows=slice(0, readings), centred=False),),
         noise_stated=noise_stated,
     )
     parameters = tuple(
@@ -243,7 +242,7 @@ def test_a_stand_in_is_moved_onto_the_model():
     stand_in = fitted_straight(problem)
     at = np.array([0.2, 0.3])
     model = Prediction(values=stand_in.values(at[np.newaxis])[0] + 7.0, by_coordinate=np.zeros((10, 2)))
-    moved = anchored(stand_in, at, model)
+    moved = stand_in.anchored(at, model)
     np.testing.assert_allclose(moved(at).values, model.values)
     np.testing.assert_allclose(moved.values(at[np.newaxis])[0], model.values)
 
@@ -253,7 +252,7 @@ def test_bootstrap_spreads_as_least_squares_says():
     problem = straight_problem(40)
     found = gauss_newton(problem, problem.start[np.newaxis])
     own = information(problem, problem.predictor(found.coordinates), found.coordinates)
-    drawn = bootstrap(problem, found.coordinates, SeedTree(1)).coordinates
+    drawn = bootstrap(problem, found.coordinates, SeedTree(1))
     np.testing.assert_allclose(drawn.std(axis=0), own.standard_errors, rtol=0.4)
 
 
@@ -349,7 +348,7 @@ def test_every_search_ends_where_gauss_newton_does(algorithm):
     assert np.sqrt(found.objective) <= (1 + 1e-4) * np.sqrt(least.objective)
     assert least.evaluations <= found.evaluations / 20
     np.testing.assert_array_equal(found.coordinates, search(problem, algorithm, 0).coordinates)
-    assert (np.diff(found.history.best) <= 0).all()
+    assert (np.diff(found.least) <= 0).all()
     assert ((found.coordinates >= problem.lower) & (found.coordinates <= problem.upper)).all()
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.published.measurement_folder import write_measurements
 from tolalloc.bench.measurement.cleaning import clean_curve, clean_loop
 from tolalloc.bench.measurement.files import load_measurements
-from tolalloc.bench.measurement.folder import write_measurements
 from tolalloc.bench.measurement.readings import Readings
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled

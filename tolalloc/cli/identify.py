@@ -23,7 +23,6 @@ from tolalloc.exceptions import InputError
 from tolalloc.files import require_new
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 
 PLACE = "tolalloc identify"
 
@@ -31,7 +30,6 @@ PLACE = "tolalloc identify"
 def identify(
     data: Annotated[Path, typer.Argument(help="Measurement file (TOML): units and their readings.")],
     reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv20e",
-    method: Annotated[str, typer.Option(help="gauss_newton, improved_pso, pso or ga.")] = "gauss_newton",
     asked: Annotated[
         list[str] | None,
         typer.Option(
@@ -44,7 +42,6 @@ def identify(
         list[str] | None,
         typer.Option("--prior", help="Known beforehand, as NAME=RELATIVE standard deviation (bias: arcsec)."),
     ] = None,
-    compare: Annotated[int, typer.Option(help="Seeds over which all methods are compared.")] = 0,
     seed: Annotated[int, typer.Option(help="Seed of every random number.")] = 1,
     stiffness: Annotated[Path | None, typer.Option(help="Write the stiffnesses to this new .toml file.")] = None,
     out: ReportFolder = None,
@@ -52,19 +49,15 @@ def identify(
 ) -> None:
     """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
-    from tolalloc.bench.identification.answer.document import identification_document
-    from tolalloc.bench.identification.answer.tables import estimates_table, short_choices_table
+    from tolalloc.bench.identification.exhibits import estimates_table
     from tolalloc.bench.identification.study import IdentificationStudy
     from tolalloc.bench.identification.study import identify as identified
     from tolalloc.bench.measurement.files import load_measurements
-    from tolalloc.cli.document_script import written
     from tolalloc.report.folder import require_usable
 
     design = load_reducer(reducer)
     study = IdentificationStudy(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
-        method=method,
-        compare=compare,
         seed=seed,
         data=str(data),
     )
@@ -81,40 +74,24 @@ def identify(
     measurements = load_measurements(data)
     announce_compilation()
     with UnitProgress() as progress:
-        results = identified(study, measurements, design, progress)
-    document, answer = identification_document(results), results.stiffness
+        answer = identified(study, measurements, design, progress)
     if out:
-        written(out, lambda: document, lambda folder: _write(answer, folder / "identified.stiffness.toml"))
-    if stiffness:
-        _write(answer, stiffness)
+        messages.print(f"Report: {answer.save(out) / 'report.html'}", soft_wrap=True, markup=False)
+    if stiffness and answer.stiffness:
+        write_identified_stiffness(answer.stiffness, stiffness)
+        messages.print(f"Stiffness file: {stiffness}", soft_wrap=True, markup=False)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    print_table(estimates_table(results), f"{design.name}: {measurements.name}")
-    if results.candidates:
-        print_table(short_choices_table(results), "Simpler explanations")
-    say(document)
-
-
-def _write(answer: IdentifiedStiffness | None, path: Path) -> None:
-    """Write the stiffness file, if a stiffness was asked for."""
-    if answer is None:
-        return
-    write_identified_stiffness(answer, path)
-    messages.print(f"Stiffness file: {path}", soft_wrap=True, markup=False)
+    print_table(estimates_table(answer), f"{design.name}: {measurements.name}")
+    if answer.choices:
+        short = ["fitted", "units left out, over noise [-]", "chosen"]
+        print_table(answer.to_frame("choices")[short], "Simpler explanations")
+    say(answer.document)
 
 
 def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> tuple[Parameter, ...]:
-    """Return the unknowns as written on the command line.
-
-    Parameters
-    ----------
-    reducer
-        Where stiffnesses begin.
-    asked
-        ``NAME`` or ``NAME=LOW:HIGH``.
-    priors
-        ``NAME=DEVIATION``.
+    """Return the unknowns as written on the command line: ``NAME`` or ``NAME=LOW:HIGH``, and ``NAME=DEVIATION``.
 
     Raises
     ------

@@ -13,10 +13,11 @@ from tolalloc.exceptions import InputError
 from tolalloc.units import ARCSECOND
 
 PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
+"""Kinds of readings."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block:
+class ReadingBlock:
     """Readings that belong together.
 
     Parameters
@@ -38,8 +39,8 @@ class Block:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Data:
-    """All readings.
+class AllReadings:
+    """All readings of all units in one row.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Data:
     measured: Float[np.ndarray, " datum"]
     noise: Float[np.ndarray, " datum"]
     unit: Int[np.ndarray, " datum"]
-    blocks: tuple[Block, ...]
+    blocks: tuple[ReadingBlock, ...]
     noise_stated: bool
 
     @property
@@ -76,8 +77,19 @@ class Data:
         """Whether there is nothing else."""
         return all(block.kind == PEAK_TO_PEAK for block in self.blocks)
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of readings that there are."""
+        return tuple(dict.fromkeys(block.kind for block in self.blocks))
 
-def centred(values: Float[np.ndarray, "..."], blocks: tuple[Block, ...]) -> Float[np.ndarray, "..."]:
+    def rows(self, kind: str) -> Int[np.ndarray, " row"]:
+        """Return where the readings of one kind stand."""
+        return np.concatenate(
+            [np.arange(self.measured.size)[block.rows] for block in self.blocks if block.kind == kind]
+        )
+
+
+def centred(values: Float[np.ndarray, "..."], blocks: tuple[ReadingBlock, ...]) -> Float[np.ndarray, "..."]:
     """Return values, readings along the first axis, without the means of the blocks that have none."""
     found = np.array(values)
     for block in blocks:
@@ -86,15 +98,8 @@ def centred(values: Float[np.ndarray, "..."], blocks: tuple[Block, ...]) -> Floa
     return found
 
 
-def data_of(measurements: Measurements, place: str) -> Data:
-    """Return the readings of all units in one row.
-
-    Parameters
-    ----------
-    measurements
-        What was measured.
-    place
-        Where it was read, for errors.
+def data_of(measurements: Measurements, place: str) -> AllReadings:
+    """Return the readings of all units in one row; the place where they were read stands in errors.
 
     Raises
     ------
@@ -113,10 +118,10 @@ def data_of(measurements: Measurements, place: str) -> Data:
     blocks, start = [], 0
     for kind, number, values, _, _ in parts:
         rows = slice(start, start + values.size)
-        blocks.append(Block(kind=kind, number=number, rows=rows, centred=kind != PEAK_TO_PEAK))
+        blocks.append(ReadingBlock(kind=kind, number=number, rows=rows, centred=kind != PEAK_TO_PEAK))
         start = rows.stop
     noise = [np.full(values.size, ARCSECOND if own is None else own) for _, _, values, _, own in parts]
-    return Data(
+    return AllReadings(
         measured=centred(np.concatenate([values for _, _, values, _, _ in parts]), tuple(blocks)),
         noise=np.concatenate(noise),
         unit=np.concatenate([unit for _, _, _, unit, _ in parts]),

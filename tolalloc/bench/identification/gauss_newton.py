@@ -2,54 +2,90 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.optimize import least_squares
 
 from tolalloc.bench.identification.prediction import Prediction
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.result import Identified, Tally
 from tolalloc.drawing.seeds import SeedTree
 
 NAME = "Gauss–Newton"
 
 _STEPS = 40
 
-
-class _Evaluations:
-    """Residuals and derivatives of one and the same prediction; the solver asks for them one after the other."""
-
-    def __init__(self, problem: IdentificationProblem, tally: Tally) -> None:
-        self._problem, self._tally = problem, tally
-        self._at = np.full(len(problem.parameters), np.nan)
-        self._prediction: Prediction | None = None
-
-    def _predict(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
-        if self._prediction is None or not np.array_equal(coordinates, self._at):
-            self._prediction, self._at = self._problem.predictor(coordinates), coordinates.copy()
-            own = self._problem.residuals(self._prediction, coordinates)
-            self._tally.add(coordinates[np.newaxis], np.array([0.5 * own @ own]))
-        return self._prediction
-
-    def residuals(self, coordinates: Float[np.ndarray, " parameter"]) -> Float[np.ndarray, " row"]:
-        return self._problem.residuals(self._predict(coordinates), coordinates)
-
-    def jacobian(self, coordinates: Float[np.ndarray, " parameter"]) -> Float[np.ndarray, "row parameter"]:
-        return self._problem.jacobian(self._predict(coordinates))
+Batch = tuple[Float[np.ndarray, "point parameter"], Float[np.ndarray, " point"]]
+"""Points that were tried together, and the objective at each [-]."""
 
 
-def starts(problem: IdentificationProblem, count: int, seeds: SeedTree) -> Float[np.ndarray, "start parameter"]:
-    """Return the reducer as it was given, then random points inside the bounds.
+@dataclass(frozen=True, kw_only=True)
+class Identified:
+    """Answer of one run of one method, and how it got there.
 
     Parameters
     ----------
-    problem
-        What is minimised.
-    count
-        Number of starts [-].
-    seeds
-        Node of the seed tree.
+    method
+        Name of the method.
+    seed
+        Seed of the run; none if nothing is random [-].
+    coordinates
+        Where the least objective was found [-].
+    objective
+        Half the weighted sum of squares there [-].
+    evaluated
+        How often all readings were predicted up to the end of each batch [-].
+    least
+        Least objective until then [-].
+    status
+        Why it ended.
     """
+
+    method: str
+    seed: int | None
+    coordinates: Float[np.ndarray, " parameter"]
+    objective: float
+    evaluated: Int[np.ndarray, " batch"]
+    least: Float[np.ndarray, " batch"]
+    status: str
+
+    @classmethod
+    def among(cls, batches: Sequence[Batch], method: str, seed: int | None, status: str) -> Identified:
+        """Return the best of all points that a method tried."""
+        coordinates, objective, least = np.zeros(batches[0][0].shape[1]), np.inf, []
+        for points, objectives in batches:
+            at = int(objectives.argmin())
+            if objectives[at] < objective:
+                coordinates, objective = points[at], float(objectives[at])
+            least.append(objective)
+        return cls(
+            method=method,
+            seed=seed,
+            coordinates=coordinates,
+            objective=objective,
+            evaluated=np.cumsum([objectives.size for _, objectives in batches]),
+            least=np.array(least),
+            status=status,
+        )
+
+    @property
+    def evaluations(self) -> int:
+        """How often all readings were predicted [-]."""
+        return int(self.evaluated[-1])
+
+    def after(self, before: Identified) -> Identified:
+        """Return the answer with the way of the run that it started from."""
+        return replace(
+            self,
+            evaluated=np.concatenate([before.evaluated, before.evaluated[-1] + self.evaluated]),
+            least=np.concatenate([before.least, self.least]),
+        )
+
+
+def starts(problem: IdentificationProblem, count: int, seeds: SeedTree) -> Float[np.ndarray, "start parameter"]:
+    """Return the reducer as it was given, then random points inside the bounds, in all so many."""
     scattered = seeds.generator().random((count - 1, len(problem.parameters)))
     return np.concatenate([problem.start[np.newaxis], problem.lower + scattered * (problem.upper - problem.lower)])
 
@@ -77,22 +113,46 @@ def gauss_newton(
     ----------
     Branch, Coleman and Li 1999, the trust region with bounds that SciPy implements.
     """
-    tally = Tally(problem)
-    inside = 1e-6 * (problem.upper - problem.lower)  # the method walks in the interior
-    status = ""
+    batches: list[Batch] = []
+    status, least = "", np.inf
     for row in start:
-        before, evaluations = tally.objective, _Evaluations(problem, tally)
-        found = least_squares(
-            evaluations.residuals,
-            np.clip(row, problem.lower + inside, problem.upper - inside),
-            jac=evaluations.jacobian,
-            bounds=(problem.lower, problem.upper),
-            x_scale=problem.upper - problem.lower,
-            ftol=1e-8,
-            xtol=1e-6,
-            gtol=1e-8,
-            max_nfev=_STEPS,
-        )
-        if tally.objective < before:
-            status = "converged" if found.status > 0 else f"stopped after {_STEPS} steps"
-    return tally.result(NAME, seed, status)
+        begun = len(batches)
+        converged = _descend(problem, row, batches)
+        reached = min(float(objectives[0]) for _, objectives in batches[begun:])
+        if reached < least:
+            least, status = reached, "converged" if converged else f"stopped after {_STEPS} steps"
+    return Identified.among(batches, NAME, seed, status)
+
+
+def _descend(problem: IdentificationProblem, start: Float[np.ndarray, " parameter"], batches: list[Batch]) -> bool:
+    """Add the points that one start leads to, and return whether they converged."""
+    predicted = _remembered(problem, batches)
+    inside = 1e-6 * (problem.upper - problem.lower)  # the method walks in the interior
+    found = least_squares(
+        lambda at: problem.residuals(predicted(at), at),
+        np.clip(start, problem.lower + inside, problem.upper - inside),
+        jac=lambda at: problem.jacobian(predicted(at)),
+        bounds=(problem.lower, problem.upper),
+        x_scale=problem.upper - problem.lower,
+        ftol=1e-8,
+        xtol=1e-6,
+        gtol=1e-8,
+        max_nfev=_STEPS,
+    )
+    return bool(found.status > 0)
+
+
+def _remembered(
+    problem: IdentificationProblem, batches: list[Batch]
+) -> Callable[[Float[np.ndarray, " parameter"]], Prediction]:
+    """Return the predictor with its last answer kept: the solver asks for residuals and derivatives at one point."""
+    last: list[Prediction] = []
+
+    def predicted(coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
+        if not last or not np.array_equal(coordinates, batches[-1][0][0]):
+            last[:] = [problem.predictor(coordinates)]
+            own = problem.residuals(last[0], coordinates)
+            batches.append((coordinates[np.newaxis].copy(), np.array([0.5 * own @ own])))
+        return last[0]
+
+    return predicted

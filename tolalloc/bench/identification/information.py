@@ -36,18 +36,18 @@ class Direction:
         Share of each coordinate, of length 1, its largest positive [-].
     deviation
         Standard deviation that the readings leave along it [-].
-    room
+    half_width
         Half the box's extent along it: the standard deviation must be well below for the readings to say anything [-].
     """
 
     loading: Float[np.ndarray, " parameter"]
     deviation: float
-    room: float
+    half_width: float
 
     @property
     def is_fixed(self) -> bool:
         """Whether the 95 % interval is no longer than half of what the bounds allow."""
-        return 1.96 * self.deviation < 0.5 * self.room
+        return 1.96 * self.deviation < 0.5 * self.half_width
 
     def sentence(self, symbols: tuple[str, ...]) -> str:
         """Return the direction in words."""
@@ -61,9 +61,9 @@ class Direction:
         if self.is_fixed:
             return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%} as standard error"
         left = (
-            f"±{self.deviation:.2%} as standard error, where the bounds alone leave ±{self.room:.2%}"
-            if self.deviation < self.room
-            else f"they leave no less than the bounds alone, ±{self.room:.2%}"
+            f"±{self.deviation:.2%} as standard error, where the bounds alone leave ±{self.half_width:.2%}"
+            if self.deviation < self.half_width
+            else f"they leave no less than the bounds alone, ±{self.half_width:.2%}"
         )
         return f"these data leave {combination} (relative changes) open: {left}"
 
@@ -114,9 +114,9 @@ class Information:
         found = []
         for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
             loading = vector * np.sign(vector[np.abs(vector).argmax()])
-            room = 0.5 * float(np.abs(loading) @ width)
+            half_width = 0.5 * float(np.abs(loading) @ width)
             deviation = sqrt(1.0 / value) if value > _NOTHING * max(values[-1], _TINY) else np.inf
-            found.append(Direction(loading=loading, deviation=deviation, room=room))
+            found.append(Direction(loading=loading, deviation=deviation, half_width=half_width))
         return tuple(found)
 
     @property
@@ -164,16 +164,7 @@ class Information:
 def information(
     problem: IdentificationProblem, prediction: Prediction, coordinates: Float[np.ndarray, " parameter"]
 ) -> Information:
-    """Return what the readings say around a point.
-
-    Parameters
-    ----------
-    problem
-        The data.
-    prediction
-        What should have been read there.
-    coordinates
-        The point [-].
+    """Return what the readings say around a point, given what should have been read there.
 
     Notes
     -----

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, Block, Data, centred
+from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, AllReadings, ReadingBlock, centred
 from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, bias_of, torque_factor_of, with_parameters
 from tolalloc.bench.measurement.records import Measurements
 from tolalloc.rv.equivalent.answers import Derivatives
@@ -21,9 +21,9 @@ from tolalloc.units import ARCSECOND
 _SAMPLES_AT_ONCE = 16
 """Curves solved together; each takes some 3 kB an angle for its derivatives [-]."""
 
-_Answer = tuple[tuple[Block, ...], Float[np.ndarray, " reading"], Float[np.ndarray, "reading parameter"]]
+_Answer = tuple[tuple[ReadingBlock, ...], Float[np.ndarray, " reading"], Float[np.ndarray, "reading parameter"]]
 
-Observer = Callable[[int], None]
+UnitObserver = Callable[[int], None]
 """Told how many units have been answered for: a progress bar, a counter."""
 
 
@@ -77,8 +77,8 @@ class KernelPredictor:
     reducer: Reducer
     parameters: tuple[Parameter, ...]
     measurements: Measurements
-    data: Data
-    observe: Observer = lambda _: None
+    data: AllReadings
+    observe: UnitObserver = lambda _: None
 
     def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
         """Return readings and derivatives at one point."""
@@ -154,9 +154,9 @@ class KernelPredictor:
         return slopes
 
 
-def _with_same_angles(blocks: tuple[Block, ...], measured: Measurements) -> list[tuple[Block, ...]]:
+def _with_same_angles(blocks: tuple[ReadingBlock, ...], measured: Measurements) -> list[tuple[ReadingBlock, ...]]:
     """Return the blocks in groups that share their carrier angles, and so their tables."""
-    groups: dict[tuple[object, ...], list[Block]] = {}
+    groups: dict[tuple[object, ...], list[ReadingBlock]] = {}
     for block in blocks:
         angles: object = None
         if block.kind == CURVE:

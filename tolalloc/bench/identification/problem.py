@@ -1,4 +1,4 @@
-"""The weighted least squares that every method minimises: measured against predicted readings, and what was known."""
+"""The weighted least squares that identification minimises: measured against predicted readings, and what was known."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.identification.data import Data
+from tolalloc.bench.identification.data import AllReadings
 from tolalloc.bench.identification.parameters import Parameter, box, prior_weights
 from tolalloc.bench.identification.prediction import Prediction, Predictor
 from tolalloc.exceptions import InputError, SolveError
@@ -39,7 +39,7 @@ class IdentificationProblem:
     """
 
     parameters: tuple[Parameter, ...]
-    data: Data
+    data: AllReadings
     predictor: Predictor
     weight: Float[np.ndarray, " unit"]
     evenly: bool = False

@@ -1,7 +1,8 @@
-"""Profile likelihood: how much worse the best fit gets as one parameter is held at each value between its bounds."""
+"""Profile likelihood, and with it the answer as other studies take it: every parameter, what is open said as such."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,16 +11,18 @@ from scipy.optimize import brentq
 
 from tolalloc.bench.identification.gauss_newton import gauss_newton
 from tolalloc.bench.identification.information import Information
+from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.prediction import Prediction, Predictor
 from tolalloc.bench.identification.problem import IdentificationProblem
+from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 
 BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
 """Values at which a parameter is held: evenly between its bounds, and within so many standard errors of its best."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Profile:
-    """Profile of one parameter.
+class ParameterProfile:
+    """How much worse the best fit gets as one parameter is held at each value between its bounds.
 
     Parameters
     ----------
@@ -38,7 +41,7 @@ class Profile:
     threshold: float
     interval: tuple[float, float]
 
-    def widened(self, interval: Float[np.ndarray, " 2"]) -> Profile:
+    def widened(self, interval: Float[np.ndarray, " 2"]) -> ParameterProfile:
         """Return the profile with an interval that holds another one, cut at the bounds."""
         low, high = np.clip(interval, self.coordinate[0], self.coordinate[-1])
         return replace(self, interval=(min(self.interval[0], float(low)), max(self.interval[1], float(high))))
@@ -73,7 +76,7 @@ class _Held:
         return self.predictor.values(self._whole(coordinates))
 
 
-class _Fits:
+class _HeldFits:
     """Least objectives with one coordinate held, each begun where its nearest neighbour ended."""
 
     def __init__(self, problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int) -> None:
@@ -99,7 +102,7 @@ class _Fits:
 
 def profile(
     problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], place: int, found: Information
-) -> Profile:
+) -> ParameterProfile:
     """Return the profile of one parameter, the others fitted anew at each of its values.
 
     Parameters
@@ -122,16 +125,16 @@ def profile(
     box = np.linspace(lower, upper, BOX_POINTS)
     near = middle + reach * np.linspace(-1.0, 1.0, NEAR_POINTS)
     values = np.unique(np.concatenate([box, near[(near > lower) & (near < upper)], [middle]]))
-    fits = _Fits(problem, best, place)
+    fits = _HeldFits(problem, best, place)
     for at in sorted(values, key=lambda value: abs(value - middle)):
         fits(float(at))
     ends = tuple(_crossing(fits, values, found.threshold, side) for side in (-1, 1))
     held = np.array(sorted(fits.objective))
     rise = 2.0 * (np.array([fits.objective[float(at)] for at in held]) - min(fits.objective.values()))
-    return Profile(coordinate=held, rise=rise, threshold=found.threshold, interval=(ends[0], ends[1]))
+    return ParameterProfile(coordinate=held, rise=rise, threshold=found.threshold, interval=(ends[0], ends[1]))
 
 
-def _crossing(fits: _Fits, values: Float[np.ndarray, " value"], threshold: float, side: int) -> float:
+def _crossing(fits: _HeldFits, values: Float[np.ndarray, " value"], threshold: float, side: int) -> float:
     """Return where the rise crosses the threshold beyond the outermost value inside, or the bound."""
     least = min(fits.objective.values())
 
@@ -145,3 +148,108 @@ def _crossing(fits: _Fits, values: Float[np.ndarray, " value"], threshold: float
         return inner
     outer = float(outward.max() if side < 0 else outward.min())
     return float(brentq(beyond, inner, outer, xtol=1e-4 * abs(outer - inner)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterEstimate:
+    """One parameter as the answer states it.
+
+    Parameters
+    ----------
+    parameter
+        Which one.
+    value
+        Most probable if the bounds count as an even distribution: next to the least objective where the data say much,
+        the middle of the bounds where they say nothing [as parameter].
+    uncertainty
+        Its standard uncertainty, of the logarithm but for the bias [-, arcsec].
+    interval
+        95 % profile interval [as parameter].
+    identified
+        Whether the interval keeps away from at least one bound.
+    on_bound
+        Whether the least objective stands on a bound.
+    """
+
+    parameter: Parameter
+    value: float
+    uncertainty: float
+    interval: tuple[float, float]
+    identified: bool
+    on_bound: bool
+
+    @property
+    def sentence(self) -> str:
+        """What to make of it."""
+        item = self.parameter
+        low, high = (f"{value:.4g}" for value in self.interval)
+        if not self.identified:
+            spanned = item.written(f"{low}…{high}")
+            return f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {spanned}."
+        bound = "; the least objective is on a bound" if self.on_bound else ""
+        value, interval = item.written(f"{self.value:.4g}"), item.written(f"{low}…{high}")
+        return f"{item.symbol} = {value}, 95 % interval {interval}{bound}."
+
+
+def estimates(
+    parameters: Sequence[Parameter],
+    found: Information,
+    written: Information,
+    profiles: Sequence[ParameterProfile],
+) -> tuple[ParameterEstimate, ...]:
+    """Return all parameters.
+
+    Parameters
+    ----------
+    parameters
+        The unknowns.
+    found, profiles
+        What the readings say around the least objective.
+    written
+        The same where readings and bounds together put the parameters.
+    """
+    deviations = np.sqrt(np.diag(written.covariance))
+    return tuple(
+        ParameterEstimate(
+            parameter=item,
+            value=item.value(float(written.coordinates[at])),
+            uncertainty=float(deviations[at]),
+            interval=(item.value(own.interval[0]), item.value(own.interval[1])),
+            identified=own.is_identified,
+            on_bound=bool(found.on_bound[at]),
+        )
+        for at, (item, own) in enumerate(zip(parameters, profiles, strict=True))
+    )
+
+
+def as_stiffness(
+    estimated: Sequence[ParameterEstimate], written: Information, source: str, notes: Sequence[str]
+) -> IdentifiedStiffness | None:
+    """Return the stiffnesses for a stiffness file; none if no stiffness was asked for.
+
+    Parameters
+    ----------
+    estimated
+        All parameters.
+    written
+        Their information, whose covariance links them: what is fixed is often a combination.
+    source
+        Where the readings come from.
+    notes
+        What a reader must know.
+    """
+    places = [at for at, item in enumerate(estimated) if item.parameter.is_stiffness]
+    if not places:
+        return None
+    covariance = written.covariance
+    spread = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(spread, spread)
+    np.fill_diagonal(correlation, 1.0)
+    chosen = [estimated[at] for at in places]
+    return IdentifiedStiffness(
+        source=source,
+        values={item.parameter.name: item.value for item in chosen},
+        standard_uncertainty={item.parameter.name: item.value * item.uncertainty for item in chosen},
+        correlation=correlation[np.ix_(places, places)],
+        notes=(*notes, *(item.sentence for item in estimated if not item.identified or item.on_bound)),
+    )

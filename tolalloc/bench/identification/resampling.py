@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.bench.identification.data import Data
+from tolalloc.bench.identification.data import AllReadings
 from tolalloc.bench.identification.gauss_newton import gauss_newton
-from tolalloc.bench.identification.information import LEVEL
 from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.stand_in import StandIn
@@ -21,47 +20,21 @@ FEWEST_UNITS = 5
 """Units below which neither a bootstrap nor leaving one out says anything [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bootstrap:
-    """The least objective of resampled units.
-
-    Parameters
-    ----------
-    coordinates
-        One row for each resample [-].
-    """
-
-    coordinates: Float[np.ndarray, "resample parameter"]
-
-    @property
-    def interval(self) -> Float[np.ndarray, "2 parameter"]:
-        """95 % percentile interval of the coordinates [-]."""
-        return np.asarray(np.quantile(self.coordinates, (0.5 - LEVEL / 2, 0.5 + LEVEL / 2), axis=0))
-
-
-def bootstrap(problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], seeds: SeedTree) -> Bootstrap:
-    """Return the fits to units drawn with replacement.
-
-    Parameters
-    ----------
-    problem
-        The data; a stand-in should predict.
-    best
-        Where each fit begins [-].
-    seeds
-        Node of the seed tree.
-    """
+def bootstrap(
+    problem: IdentificationProblem, best: Float[np.ndarray, " parameter"], seeds: SeedTree
+) -> Float[np.ndarray, "resample parameter"]:
+    """Return the least coordinates for units drawn with replacement, each fit begun at the best [-]."""
     units = problem.data.units
     drawn = seeds.generator().integers(0, units.size, (RESAMPLES, units.size))
     rows = []
     for draw in drawn:
         weight = np.bincount(units[draw], minlength=problem.weight.size).astype(float)
         rows.append(gauss_newton(problem.weighed(weight), best[np.newaxis]).coordinates)
-    return Bootstrap(coordinates=np.array(rows))
+    return np.array(rows)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class ParameterChoice:
     """One choice of what is fitted, judged by the units that it has not seen.
 
     Parameters
@@ -100,36 +73,16 @@ class Candidate:
         """Root of the mean over units of the squared unseen residual over noise [-]."""
         return float(np.sqrt(self.by_unit.mean()))
 
-    def rms(self, data: Data, kind: str, *, unseen: bool) -> float:
-        """Return the root-mean-square residual of one kind of reading [rad].
-
-        Parameters
-        ----------
-        data
-            The readings.
-        kind
-            One of `tolalloc.bench.identification.data.PEAK_TO_PEAK`, ``CURVE``, ``LOOP``.
-        unseen
-            Whether each unit is judged by the fit without it.
-        """
-        rows = np.concatenate(
-            [np.arange(data.measured.size)[block.rows] for block in data.blocks if block.kind == kind]
-        )
-        values = (self.unseen if unseen else self.left)[rows]
+    def rms(self, data: AllReadings, kind: str, *, unseen: bool) -> float:
+        """Return the root-mean-square residual of one kind of reading, of seen or of unseen units [rad]."""
+        values = (self.unseen if unseen else self.left)[data.rows(kind)]
         return float(np.sqrt((values**2).mean()))
 
 
-def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequence[Parameter]) -> Candidate:
-    """Return how well a choice of parameters predicts units that it has not seen.
+def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequence[Parameter]) -> ParameterChoice:
+    """Return how well a choice of parameters predicts units that it has not seen; the rest keeps the reducer's value.
 
-    Parameters
-    ----------
-    problem
-        The data, all units counted.
-    stand_in
-        Polynomials of at least these parameters.
-    parameters
-        What is fitted; the rest keeps the reducer's value.
+    The stand-in holds polynomials of at least these parameters.
     """
     own = tuple(parameters)
     asked, data = problem.of(own, stand_in.of(own)), problem.data
@@ -140,7 +93,7 @@ def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequen
         weight[unit] = 0.0
         rows = data.unit == unit
         unseen[rows] = _left(asked, _fit(asked.weighed(weight)))[rows]
-    return Candidate(parameters=own, left=everywhere, unseen=unseen, noise=data.noise, unit=data.unit)
+    return ParameterChoice(parameters=own, left=everywhere, unseen=unseen, noise=data.noise, unit=data.unit)
 
 
 def _fit(problem: IdentificationProblem) -> Float[np.ndarray, " parameter"]:
@@ -153,21 +106,16 @@ def _left(problem: IdentificationProblem, coordinates: Float[np.ndarray, " param
     return np.asarray(problem.predictor.values(coordinates[np.newaxis])[0] - problem.data.measured)
 
 
-def simplest(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the candidate with the fewest parameters that is as good as the best within a standard error.
-
-    Parameters
-    ----------
-    candidates
-        All of the same data.
+def simplest(choices: Sequence[ParameterChoice]) -> ParameterChoice:
+    """Return the choice with the fewest parameters that is as good as the best within a standard error.
 
     Notes
     -----
-    Differences of squared residuals are taken unit by unit, so what all candidates share cancels.
+    Differences of squared residuals are taken unit by unit, so what all choices of the same data share cancels.
     """
-    best = min(candidates, key=lambda item: item.score)
+    best = min(choices, key=lambda item: item.score)
     good = []
-    for item in candidates:
+    for item in choices:
         worse = item.by_unit - best.by_unit
         error = worse.std(ddof=1) / np.sqrt(worse.size) if worse.size > 1 else 0.0
         if worse.mean() <= error:

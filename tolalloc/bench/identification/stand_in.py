@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.identification.data import Data
+from tolalloc.bench.identification.data import AllReadings
 from tolalloc.bench.identification.parameters import BIAS, Parameter, box
 from tolalloc.bench.identification.prediction import KernelPredictor, Prediction
 from tolalloc.drawing.seeds import SeedTree
@@ -35,16 +35,23 @@ class StandIn:
         The fitted polynomial of all readings.
     data
         The readings.
+    offset
+        Added to every reading, so that they are the model's at one point; 0 unless `anchored` [rad].
     """
 
     parameters: tuple[Parameter, ...]
     fitted: tuple[Parameter, ...]
     polynomial: BoxPolynomial
-    data: Data
+    data: AllReadings
+    offset: float | Float[np.ndarray, " datum"] = 0.0
 
     def of(self, parameters: tuple[Parameter, ...]) -> StandIn:
         """Return the stand-in for fewer unknowns, or with a bias."""
-        return StandIn(parameters, self.fitted, self.polynomial, self.data)
+        return replace(self, parameters=parameters)
+
+    def anchored(self, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> StandIn:
+        """Return the stand-in moved onto what the model predicts at one point."""
+        return replace(self, offset=model.values - self.values(coordinates[np.newaxis])[0])
 
     def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
         """Return readings and derivatives at one point."""
@@ -64,7 +71,7 @@ class StandIn:
             if item.name == BIAS:
                 bias = (item.start + coordinates[:, at]) * ARCSECOND
                 found[:, self.data.peak_to_peak or slice(0)] += bias[:, np.newaxis]
-        return found
+        return np.asarray(found + self.offset)
 
     @property
     def _place(self) -> dict[str, int]:
@@ -80,51 +87,9 @@ class StandIn:
 
 
 def fit_stand_in(kernel: KernelPredictor, seeds: SeedTree) -> StandIn:
-    """Return polynomials of all readings inside the bounds, their error measured on runs that the fit did not see.
-
-    Parameters
-    ----------
-    kernel
-        The model; its bias is left to the stand-in.
-    seeds
-        Node of the seed tree.
-    """
+    """Return polynomials of all readings inside the bounds, their error measured on runs that the fit did not see."""
     fitted = tuple(item for item in kernel.parameters if item.name != BIAS)
-    own = KernelPredictor(kernel.reducer, fitted, kernel.measurements, kernel.data, kernel.observe)
-    degree = _DEGREES.get(len(fitted), 2)
-    polynomial = fit_box_polynomial(own.values, *box(fitted), degree, seeds)
+    polynomial = fit_box_polynomial(
+        replace(kernel, parameters=fitted).values, *box(fitted), _DEGREES.get(len(fitted), 2), seeds
+    )
     return StandIn(kernel.parameters, fitted, polynomial, kernel.data)
-
-
-@dataclass(frozen=True)
-class Anchored:
-    """A stand-in whose readings are moved, so that they are the model's at one point.
-
-    Parameters
-    ----------
-    stand_in
-        The polynomials.
-    offset
-        Model less polynomials at that point, without the bias's part [rad].
-    """
-
-    stand_in: StandIn
-    offset: Float[np.ndarray, " datum"]
-
-    def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
-        """Return readings and derivatives at one point."""
-        found = self.stand_in(coordinates)
-        return Prediction(values=found.values + self.offset, by_coordinate=found.by_coordinate)
-
-    def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
-        """Return the readings at many points [rad]."""
-        return np.asarray(self.stand_in.values(coordinates) + self.offset)
-
-    def of(self, parameters: tuple[Parameter, ...]) -> Anchored:
-        """Return the same for fewer unknowns, or with a bias."""
-        return Anchored(self.stand_in.of(parameters), self.offset)
-
-
-def anchored(stand_in: StandIn, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> Anchored:
-    """Return the stand-in moved onto what the model predicts at one point."""
-    return Anchored(stand_in, model.values - stand_in.values(coordinates[np.newaxis])[0])

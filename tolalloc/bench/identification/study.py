@@ -7,85 +7,67 @@ from math import isfinite
 
 import numpy as np
 
-from tolalloc.bench.identification.answer.results import IdentificationResults
-from tolalloc.bench.identification.data import LOOP, Data, data_of
-from tolalloc.bench.identification.estimate import estimates
-from tolalloc.bench.identification.gauss_newton import NAME as GAUSS_NEWTON
-from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
+from tolalloc.bench.identification.answer import IdentificationAnswer
+from tolalloc.bench.identification.data import LOOP, AllReadings, data_of
+from tolalloc.bench.identification.gauss_newton import Identified, gauss_newton, starts
 from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
-from tolalloc.bench.identification.profile import profile
-from tolalloc.bench.identification.resampling import FEWEST_UNITS, Candidate, bootstrap, judged, simplest
-from tolalloc.bench.identification.result import Comparison, Identified
-from tolalloc.bench.identification.searches import ALGORITHMS, search
-from tolalloc.bench.identification.stand_in import LARGE_DRIFT, StandIn, anchored, fit_stand_in
+from tolalloc.bench.identification.profile import estimates, profile
+from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoice, bootstrap, judged, simplest
+from tolalloc.bench.identification.stand_in import LARGE_DRIFT, StandIn, fit_stand_in
 from tolalloc.bench.measurement.records import Measurements
 from tolalloc.drawing.seeds import SeedTree
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress
+from tolalloc.report.answer import Header
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND
 
-METHODS = {
-    "gauss_newton": GAUSS_NEWTON,
-    "improved_pso": "improved particle swarm",
-    "pso": "particle swarm",
-    "ga": "genetic algorithm",
-}
-"""Name on the command line → method."""
-
 _ANY_BIAS = (-3600.0, 3600.0)
-_STARTS = 8
+STARTS = 8
 """Starts of Gauss–Newton: flat directions end in several corners of the box [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationStudy:
-    """What is to be identified, and how.
+    """What is to be identified.
 
     Parameters
     ----------
     parameters
         The unknowns.
-    method
-        One of `METHODS`.
-    compare
-        Seeds over which every method is compared; none if 0 [-].
     seed
         Seed of every random number [-].
     data
         Where the data were read, for errors.
+
+    Raises
+    ------
+    InputError
+        No unknown besides the bias, one of them twice, or a negative seed.
     """
 
     parameters: tuple[Parameter, ...]
-    method: str = "gauss_newton"
-    compare: int = 0
     seed: int = 1
     data: str = "measurements"
 
     def __post_init__(self) -> None:
         place = "tolalloc identify"
-        if self.method not in METHODS:
-            raise UnknownNameError.among(place, "method", self.method, METHODS)
         names = [item.name for item in self.parameters]
         if not set(names) - {BIAS}:
             raise InputError.at(place, "parameters", names, "one or more besides the bias, which is the baseline")
         for name in names:
             if names.count(name) > 1:
                 raise InputError.at(place, "parameter", name, "each parameter once")
-        for name, value, good, allowed in (
-            ("compare", self.compare, 0 <= self.compare <= 1000, "0 to 1000 seeds"),
-            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
-        ):
-            if not good:
-                raise InputError.at(place, name, value, allowed)
+        if self.seed < 0:
+            raise InputError.at(place, "seed", self.seed, "0 or a positive integer")
 
 
 def identify(
     study: IdentificationStudy, measurements: Measurements, reducer: Reducer, progress: Progress
-) -> IdentificationResults:
+) -> IdentificationAnswer:
     """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
 
     Parameters
@@ -121,15 +103,15 @@ def identify(
     stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
     _require_close(study, data, stand_in)
     quick = problem.of(study.parameters, stand_in)
-    progress.begin(METHODS[study.method])
-    found = _found(study, problem, quick, seeds)
+    progress.begin("Gauss–Newton")
+    found = _found(problem, quick, study.seed, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
     widened = problem.widened(own.variance_factor)
     written = gauss_newton(replace(widened, evenly=True), found.coordinates[np.newaxis]).coordinates
     at_written = kernel(written)
     progress.begin("what the data fix")
-    here = widened.of(study.parameters, anchored(stand_in, found.coordinates, prediction))
+    here = widened.of(study.parameters, stand_in.anchored(found.coordinates, prediction))
     near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
     profiles = tuple(profile(here, near, at, own) for at in range(len(study.parameters)))
     drift = float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max())
@@ -137,9 +119,10 @@ def identify(
         profiles = tuple(item.widened(own.interval[:, at]) for at, item in enumerate(profiles))
     several = data.units.size >= FEWEST_UNITS
     progress.begin("other choices")
-    candidates = judged_candidates(quick, stand_in, reducer) if several else ()
+    choices = judged_choices(quick, stand_in, reducer) if several else ()
     spread = information(widened, at_written, written)
-    return IdentificationResults(
+    return IdentificationAnswer(
+        header=Header(name=measurements.name, model=reducer.name, seed=study.seed),
         measurements=measurements,
         reducer=reducer,
         data=data,
@@ -154,15 +137,13 @@ def identify(
         drift=drift,
         estimates=estimates(study.parameters, own, spread, profiles),
         bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
-        candidates=candidates,
-        chosen=simplest(candidates) if candidates else None,
-        stand_in=stand_in.polynomial,
-        comparison=compare(problem, quick, study, progress) if study.compare else (),
-        seed=study.seed,
+        choices=choices,
+        chosen=simplest(choices) if choices else None,
+        polynomial=stand_in.polynomial,
     )
 
 
-def _require_visible(study: IdentificationStudy, data: Data) -> None:
+def _require_visible(study: IdentificationStudy, data: AllReadings) -> None:
     """Refuse a bias or a torque where no reading shows one, and a prior against readings without a stated noise."""
     names = [item.name for item in study.parameters]
     if BIAS in names and data.peak_to_peak is None:
@@ -177,7 +158,7 @@ def _require_visible(study: IdentificationStudy, data: Data) -> None:
         )
 
 
-def _require_close(study: IdentificationStudy, data: Data, stand_in: StandIn) -> None:
+def _require_close(study: IdentificationStudy, data: AllReadings, stand_in: StandIn) -> None:
     """Refuse bounds within which polynomials are no stand-in for the model."""
     off = stand_in.polynomial.rms_error
     if off > data.noise.min():
@@ -189,33 +170,19 @@ def _require_close(study: IdentificationStudy, data: Data, stand_in: StandIn) ->
         )
 
 
-def _found(
-    study: IdentificationStudy, problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree
-) -> Identified:
-    """Return the answer of the chosen method on polynomials, finished on the model by Gauss–Newton from there.
+def _found(problem: IdentificationProblem, quick: IdentificationProblem, seed: int, seeds: SeedTree) -> Identified:
+    """Return the least objective on polynomials, finished on the model from there.
 
     The reducer as given is another start on the model, should polynomials lead astray.
     """
-    name = METHODS[study.method]
-    if name == GAUSS_NEWTON:
-        near = gauss_newton(quick, starts(quick, _STARTS, seeds.child("starts")), study.seed)
-    else:
-        near = search(quick, name, study.seed)
-    found = gauss_newton(problem, np.stack([near.coordinates, problem.start]), study.seed)
-    return replace(found, method=name, history=near.history.then(found.history))
+    near = gauss_newton(quick, starts(quick, STARTS, seeds.child("starts")), seed)
+    return gauss_newton(problem, np.stack([near.coordinates, problem.start]), seed).after(near)
 
 
-def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[Candidate, ...]:
+def judged_choices(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[ParameterChoice, ...]:
     """Return nothing, a bias, each parameter alone, all, and all with a bias, each judged by units not seen.
 
-    Parameters
-    ----------
-    quick
-        The data, predicted by the stand-in.
-    stand_in
-        Polynomials of all parameters.
-    reducer
-        Nominal design.
+    The problem is that of the stand-in, which holds polynomials of all parameters.
     """
     asked = tuple(item for item in quick.parameters if item.name != BIAS)
     choices: list[tuple[Parameter, ...]] = [(), *((item,) for item in asked)]
@@ -227,33 +194,3 @@ def judged_candidates(quick: IdentificationProblem, stand_in: StandIn, reducer: 
         choices.append((*asked, bias))
     most = quick.data.units.size - 2 if quick.data.only_peak_to_peak else quick.readings
     return tuple(judged(quick, stand_in, choice) for choice in choices if len(choice) <= most)
-
-
-def compare(
-    problem: IdentificationProblem, quick: IdentificationProblem, study: IdentificationStudy, progress: Progress
-) -> tuple[Comparison, ...]:
-    """Return every method's answers from many seeds, on the same stand-in; the best of each is put to the model.
-
-    Parameters
-    ----------
-    problem, quick
-        The data, predicted by the model and by the stand-in.
-    study
-        Seeds.
-    progress
-        Told of every method.
-    """
-    methods = []
-    for name in (GAUSS_NEWTON, *ALGORITHMS):
-        progress.begin(f"{name}, {study.compare} seeds")
-        runs = []
-        for seed in range(study.seed, study.seed + study.compare):
-            if name == GAUSS_NEWTON:  # from random starts, as every other method
-                begin = starts(quick, _STARTS + 1, SeedTree(seed).child("identification", name))[1:]
-                runs.append(gauss_newton(quick, begin, seed))
-            else:
-                runs.append(search(quick, name, seed))
-        best = min(runs, key=lambda run: run.objective)
-        on_model = float(problem.objectives(best.coordinates[np.newaxis])[0])
-        methods.append(Comparison(runs=tuple(runs), on_model=on_model))
-    return tuple(methods)

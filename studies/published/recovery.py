@@ -14,10 +14,11 @@ from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.simulation import SimulatedBench
 from tolalloc.capability.monte_carlo import Yield, proportion
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.rv.reducer.design import Reducer
+
+from .simulated_bench import SimulatedBench
 
 
 @dataclass(frozen=True, kw_only=True)
