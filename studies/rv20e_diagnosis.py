@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from tolalloc.bench.diagnosis.diagnosis import DiagnosisEffort, diagnose
-from tolalloc.bench.diagnosis.dominance import dominant, reductions
-from tolalloc.bench.diagnosis.problem import CurveProblem
-from tolalloc.bench.diagnosis.readings import Noise, thinned
-from tolalloc.bench.diagnosis.result import Diagnosis
+from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
+from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
+from tolalloc.bench.diagnosis.search import DiagnosisEffort
+from tolalloc.bench.diagnosis.sources import dominant, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.chunks import one_thread
 from tolalloc.cli.document_script import run_document

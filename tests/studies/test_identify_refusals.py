@@ -217,6 +217,8 @@ def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.Completed
     for option, name in (("--out", "report"), ("--stiffness", "found.toml")):
         if option not in options:
             options += [option, str(folder / name)]
+    if "--reducer" not in options:
+        options += ["--reducer", "rv20e"]
     before = files(folder)
     result = tolalloc("identify", folder / "measurement.toml", *options)
     refused(result)
@@ -234,6 +236,13 @@ def test_bad_input_is_refused_in_one_sentence(curves, peak_to_peaks, tmp_path, c
         if word.startswith("Error: "):
             assert word == sentence
     assert "Gauss–Newton  " not in result.stderr, "refused only after the long part"
+
+
+@pytest.mark.parametrize(("option", "name"), [("--out", "report"), ("--stiffness", "found.toml")])
+def test_no_file_is_about_a_reducer_that_nobody_named(curves, tmp_path, option, name):
+    result = tolalloc("identify", curves / "measurement.toml", option, tmp_path / name)
+    refused(result, "--reducer is missing", "rv20e")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):

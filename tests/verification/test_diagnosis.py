@@ -7,20 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.bench.diagnosis.bridge import Moves, Neighbourhood, bridge
-from tolalloc.bench.diagnosis.diagnosis import DiagnosisEffort, diagnose
-from tolalloc.bench.diagnosis.dominance import dominant, named_set, reductions
-from tolalloc.bench.diagnosis.groups import groups
-from tolalloc.bench.diagnosis.half_turn import exchanged, half_turn, has_half_turn
-from tolalloc.bench.diagnosis.posterior import SampleEffort, with_twins
-from tolalloc.bench.diagnosis.problem import CurveProblem
-from tolalloc.bench.diagnosis.readings import Noise, thinned
-from tolalloc.bench.diagnosis.result import Diagnosis
-from tolalloc.bench.diagnosis.search import SearchEffort, climb
+from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
+from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
+from tolalloc.bench.diagnosis.half_turn import exchanged, half_turn, has_half_turn, with_twins
+from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
+from tolalloc.bench.diagnosis.search import DiagnosisEffort, climb
+from tolalloc.bench.diagnosis.sources import dominant, groups, named_set, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.sources import limited_measure
 from tolalloc.exceptions import InputError
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.study.definition import Prepared, Study, prepare
 from tolalloc.units import ARCSECOND, DEGREE
@@ -28,15 +25,8 @@ from tolalloc.units import ARCSECOND, DEGREE
 NOISE = Noise()
 ANGLES = 2 * np.pi * np.arange(480) / 480
 ROOT = np.linalg.cholesky(NOISE.left_out(ANGLES) + NOISE.reading**2 * np.eye(ANGLES.size))
-EFFORT = DiagnosisEffort(
-    angles=160, search=SearchEffort(scouts=256, climbers=12), sample=SampleEffort(particles=256), judged=48
-)
-LITTLE = DiagnosisEffort(
-    angles=48,
-    search=SearchEffort(scouts=64, climbers=4, attempts=1, nearby=1),
-    sample=SampleEffort(particles=72),
-    judged=8,
-)
+EFFORT = DiagnosisEffort(angles=160, scouts=256, climbers=12, particles=256, judged=48)
+LITTLE = DiagnosisEffort(angles=48, scouts=64, climbers=4, attempts=1, nearby=1, particles=72, judged=8)
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +101,42 @@ def test_a_half_turn_needs_two_cranks_two_discs_and_an_even_number_of_pins() -> 
     assert not has_half_turn(replace(reducer, crank_count=3), columns)
 
 
+@pytest.mark.parametrize(
+    "kind",
+    ["planet", "mesh", "phase", "rotation", "tilt", "each_pin", "each_tooth", "sun", ""],
+    ids=lambda kind: kind or "all",
+)
+def test_every_column_of_the_model_has_its_image_in_the_twin(kind: str) -> None:
+    """Whatever a drawing may list, the unit turned by half a turn has the same curve."""
+    reducer = load_reducer("rv20e")
+    model = EquivalentModel(reducer)
+    turn = half_turn(model.columns, reducer)
+    assert has_half_turn(reducer, model.columns)
+    assert np.allclose(turn @ turn, np.eye(len(turn)), atol=1e-12)
+    chosen = np.array([kind in name and not name.startswith("modification") for name in model.columns])
+    angular = np.array(["tilt" in name or "phase" in name or "rotation" in name for name in model.columns])
+    size = np.where(chosen, np.where(angular, 2e-5, 2e-6), 0.0)
+    units = size * SeedTree(5).child("image").generator().standard_normal((2, len(model.columns)))
+    curves = [
+        model.equilibria(np.ascontiguousarray(one), -167.0, ANGLES[::8] + 0.01).transmission_error
+        for one in (units, units @ turn.T)
+    ]
+    assert np.abs(curves[0] - curves[1]).max() < 1e-9 * ARCSECOND
+    still = model.equilibria(np.zeros((1, len(model.columns))), -167.0, ANGLES[::8] + 0.01).transmission_error
+    assert np.abs(curves[0] - still).max() > 1e-3 * ARCSECOND
+
+
+def test_a_drawing_that_lists_one_of_two_has_no_twins() -> None:
+    reducer = load_reducer("rv20e")
+    both = ("planet1.eccentricity.x", "planet2.eccentricity.x", "disc1.tilt.x", "disc2.tilt.x")
+    assert has_half_turn(reducer, both)
+    for name in both:
+        assert not has_half_turn(reducer, [one for one in both if one != name])
+    assert not has_half_turn(reducer, ["each_pin.diameter.1"])
+    assert has_half_turn(reducer, ["each_pin.diameter.1", "each_pin.diameter.21"])
+    assert has_half_turn(reducer, ["disc1.each_tooth.pitch.1", "disc2.each_tooth.pitch.21"])
+
+
 def test_twins_are_as_likely_as_their_drawings_say(problem: CurveProblem, prepared: Prepared) -> None:
     generator = SeedTree(5).child("as likely").generator()
     same = with_twins(problem, np.repeat(drawn(prepared, 1, "one"), 400, axis=0), generator)
@@ -138,7 +164,7 @@ def test_the_bridge_reaches_a_normal_density() -> None:
         lambda x: -0.5 * (((x - 0.5) / deviation) ** 2).sum(axis=1),
         particles,
         generator,
-        Moves(settling=20),
+        settling=20,
     )
     # Resampled particles are alike: a third of them counts as independent. Four standard errors.
     standard_error = deviation / np.sqrt(particles / 3)
@@ -153,7 +179,8 @@ def test_the_bridge_keeps_out_of_what_is_forbidden() -> None:
         lambda x: np.where(x[:, 0] > 0.0, -0.5 * (x**2).sum(axis=1), -np.inf),
         1500,
         generator,
-        Moves(effective=0.3, settling=20),
+        effective=0.3,
+        settling=20,
     )
     assert np.all(sample[:, 0] > 0.0)
     # Half-normal mean √(2/π) with deviation 0.60; four standard errors of 500.

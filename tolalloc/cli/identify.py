@@ -19,6 +19,7 @@ from tolalloc.cli.console import (
     print_table,
     say,
 )
+from tolalloc.cli.options import ReducerOption, named_reducer
 from tolalloc.exceptions import InputError
 from tolalloc.files import require_new
 from tolalloc.rv.reducer.design import Reducer
@@ -29,7 +30,7 @@ PLACE = "tolalloc identify"
 
 def identify(
     data: Annotated[Path, typer.Argument(help="Measurement file (TOML): units and their readings.")],
-    reducer: Annotated[str, typer.Option(help="Preset name or TOML file.")] = "rv20e",
+    reducer: ReducerOption = None,
     asked: Annotated[
         list[str] | None,
         typer.Option(
@@ -55,7 +56,7 @@ def identify(
     from tolalloc.bench.measurement.files import load_measurements
     from tolalloc.report.folder import require_usable
 
-    design = load_reducer(reducer)
+    design = load_reducer(named_reducer(reducer, stiffness, out))
     study = IdentificationStudy(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
         seed=seed,

@@ -11,6 +11,15 @@ from jaxtyping import Float, Int
 from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 
+_CORRELATION = 0.4
+"""A step ends when the particles' correlation with where they stood before has fallen this far [-]."""
+
+_ACCEPTED = 0.25
+"""Share of moves that the length of a move is adapted to [-]."""
+
+_INFLATION = 1.3
+"""Covariance of the moves over that of the particles, so that the tails are reached [-]."""
+
 LogDensity = Callable[[Float[np.ndarray, "particle column"]], Float[np.ndarray, " particle"]]
 
 
@@ -43,36 +52,15 @@ class Neighbourhood:
         return np.asarray(-0.5 * (((where - self.centre) @ self._root) ** 2).sum(axis=1))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Moves:
-    """How the particles move at each step of the way.
-
-    Parameters
-    ----------
-    effective
-        Effective share of the particles that each step leaves, which sets its length [-].
-    most
-        Most moves per step [-].
-    correlation
-        A step ends when the particles' correlation with where they stood before has fallen this far [-].
-    settling
-        Moves at the end of the way [-].
-    accepted
-        Share of moves that the length of a move is adapted to [-].
-    inflation
-        Covariance of the moves over that of the particles, so that the tails are reached [-].
-    """
-
-    effective: float = 0.5
-    most: int = 20
-    correlation: float = 0.4
-    settling: int = 0
-    accepted: float = 0.25
-    inflation: float = 1.3
-
-
 def bridge(
-    start: Neighbourhood, target: LogDensity, particles: int, generator: np.random.Generator, moves: Moves
+    start: Neighbourhood,
+    target: LogDensity,
+    particles: int,
+    generator: np.random.Generator,
+    *,
+    effective: float = 0.5,
+    most: int = 20,
+    settling: int = 0,
 ) -> Float[np.ndarray, "particle column"]:
     """Return particles of the target density from particles of the start density.
 
@@ -86,8 +74,12 @@ def bridge(
         Number of particles [-].
     generator
         Random numbers.
-    moves
-        How the particles move.
+    effective
+        Effective share of the particles that each step leaves, which sets its length [-].
+    most
+        Most moves per step [-].
+    settling
+        Moves at the end of the way [-].
 
     Notes
     -----
@@ -102,52 +94,37 @@ def bridge(
     where, time, length = start.drawn(particles, generator), 0.0, 0.5
     own, wanted = start(where), target(where)
     while time < 1.0:
-        time, weight = _next_time(time, wanted - own, moves.effective)
-        cloud = _Cloud.of(where, weight, moves.inflation)
+        time, weight = _next_time(time, wanted - own, effective)
+        mean, root = _cloud(where, weight)
         chosen = _resampled(weight, generator)
         where, own, wanted = where[chosen], own[chosen], wanted[chosen]
-        before = cloud.standard(where)
+        before = np.asarray(solve_triangular(root, (where - mean).T, lower=True).T)
         reference = before
-        for _ in range(moves.most + (moves.settling if time == 1.0 else 0)):
+        for _ in range(most + (settling if time == 1.0 else 0)):
             step = np.minimum(length * np.exp(0.5 * generator.standard_normal(len(where))), 1.0)[:, np.newaxis]
             to = np.sqrt(1.0 - step**2) * before + step * generator.standard_normal(where.shape)
-            there = cloud.place(to)
+            there = np.asarray(mean + to @ root.T)
             own_there, wanted_there = start(there), target(there)
             gain = (1.0 - time) * (own_there - own) + time * (wanted_there - wanted)
             gain += 0.5 * ((to**2).sum(axis=1) - (before**2).sum(axis=1))
             taken = np.log(generator.random(len(where))) < gain
             where, before = np.where(taken[:, None], there, where), np.where(taken[:, None], to, before)
             own, wanted = np.where(taken, own_there, own), np.where(taken, wanted_there, wanted)
-            length = float(np.clip(length * np.exp(taken.mean() - moves.accepted), 0.02, 0.9))
-            if time < 1.0 and (before * reference).sum() < moves.correlation * (reference**2).sum():
+            length = float(np.clip(length * np.exp(taken.mean() - _ACCEPTED), 0.02, 0.9))
+            if time < 1.0 and (before * reference).sum() < _CORRELATION * (reference**2).sum():
                 break
     return where
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Cloud:
-    """Mean and root of the covariance of the particles, in which their moves are made."""
-
-    mean: Float[np.ndarray, " column"]
-    root: Float[np.ndarray, "column column"]
-
-    @classmethod
-    def of(
-        cls, where: Float[np.ndarray, "particle column"], weight: Float[np.ndarray, " particle"], inflation: float
-    ) -> _Cloud:
-        mean = weight @ where
-        apart = where - mean
-        covariance = inflation * (apart.T * weight) @ apart
-        ridge = 1e-9 * np.trace(covariance) / mean.size  # so that few particles still span all columns
-        return cls(mean=mean, root=np.linalg.cholesky(covariance + ridge * np.eye(mean.size)))
-
-    def standard(self, where: Float[np.ndarray, "particle column"]) -> Float[np.ndarray, "particle column"]:
-        """Return the particles as standard numbers of the cloud."""
-        return np.asarray(solve_triangular(self.root, (where - self.mean).T, lower=True).T)
-
-    def place(self, standard: Float[np.ndarray, "particle column"]) -> Float[np.ndarray, "particle column"]:
-        """Return where standard numbers of the cloud are."""
-        return np.asarray(self.mean + standard @ self.root.T)
+def _cloud(
+    where: Float[np.ndarray, "particle column"], weight: Float[np.ndarray, " particle"]
+) -> tuple[Float[np.ndarray, " column"], Float[np.ndarray, "column column"]]:
+    """Return mean and root of the covariance of the particles, in which their moves are made."""
+    mean = weight @ where
+    apart = where - mean
+    covariance = _INFLATION * (apart.T * weight) @ apart
+    ridge = 1e-9 * np.trace(covariance) / mean.size  # so that few particles still span all columns
+    return mean, np.linalg.cholesky(covariance + ridge * np.eye(mean.size))
 
 
 def _weight(gain: Float[np.ndarray, " particle"]) -> Float[np.ndarray, " particle"]:

@@ -2,60 +2,107 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
-from tolalloc.bench.diagnosis.dominance import dominant, named_set, reductions
-from tolalloc.bench.diagnosis.groups import groups
-from tolalloc.bench.diagnosis.half_turn import exchanged, has_half_turn
-from tolalloc.bench.diagnosis.posterior import SampleEffort, posterior, with_twins
-from tolalloc.bench.diagnosis.problem import CurveProblem
-from tolalloc.bench.diagnosis.readings import Noise, thinned
-from tolalloc.bench.diagnosis.result import IMPLAUSIBLE, TAILS, Diagnosis, Fit
-from tolalloc.bench.diagnosis.search import SearchEffort, explain
+from tolalloc.bench.diagnosis.half_turn import exchanged, has_half_turn, with_twins
+from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
+from tolalloc.bench.diagnosis.search import DiagnosisEffort, explain, posterior
+from tolalloc.bench.diagnosis.sources import InseparableColumns, dominant, groups, named_set, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.drawing.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Observer
 from tolalloc.rv.response.kernel import KernelResponse
+
+IMPLAUSIBLE = 0.001
+"""Probability of residuals as large, were the model true, below which a curve is not explained [-]."""
+
+TAILS = (0.025, 0.975)
+"""Shares below the ends of the intervals [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagnosisEffort:
-    """How much a diagnosis may compute.
+class CurveFit:
+    """How the curve is explained.
 
     Parameters
     ----------
-    angles
-        Most readings of a turn that are used [-].
-    search, sample
-        Effort of the search and of the sampling.
-    judged
-        Sampled units whose dominant source is looked for [-].
+    carrier_angle
+        Angles of the readings that were used [rad].
+    measured, fitted
+        Readings, and mean curve of the errors that they allow, each without its mean [rad].
+    band
+        95 % interval of those curves [rad].
+    chi_square, freedom
+        Mean sum of squared residuals in standard deviations, and what it would be on average, were the model true [-].
+    explained
+        Whether residuals as large have a probability of `IMPLAUSIBLE` or more.
     """
 
-    angles: int = 240
-    search: SearchEffort = field(default_factory=SearchEffort)
-    sample: SampleEffort = field(default_factory=SampleEffort)
-    judged: int = 128
+    carrier_angle: Float[np.ndarray, " angle"]
+    measured: Float[np.ndarray, " angle"]
+    fitted: Float[np.ndarray, " angle"]
+    band: Float[np.ndarray, "2 angle"]
+    chi_square: float
+    freedom: int
+    explained: bool
 
 
-@dataclass
-class _Tally:
-    """Counts what passes on its way to the observer."""
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """What the curve of a unit tells of its parts.
 
-    observe: Observer
-    solved: int = 0
-    failed: int = 0
+    Parameters
+    ----------
+    sources, columns
+        Names of the sources and of their columns.
+    deviations
+        Columns of units that have this curve, all equally likely [m, angles rad].
+    reading_mean, reading_interval
+        What the gauge of each source would show, mean and 95 % interval [m].
+    dominant_probability
+        Probability that each source is the dominant one; 0 for all where the curve is not explained [-].
+    named
+        Fewest sources that contain the dominant one at the level asked for, likeliest first; none where the curve is
+        not explained.
+    twins
+        Pairs of sources that no curve tells apart: a unit turned by half a turn is the same reducer.
+    groups
+        Columns that this curve does not tell apart, and what it tells of them together; for one of two twins.
+    fit
+        Measured and fitted curve.
+    evaluations, failed
+        Curves solved, and those among them that failed [-].
+    """
 
-    def __call__(self, status: UInt8[np.ndarray, " sample"]) -> None:
-        self.solved, self.failed = self.solved + status.size, self.failed + int((status != 0).sum())
-        self.observe(status)
+    sources: tuple[str, ...]
+    columns: tuple[str, ...]
+    deviations: Float[np.ndarray, "particle column"]
+    reading_mean: Float[np.ndarray, " source"]
+    reading_interval: Float[np.ndarray, "2 source"]
+    dominant_probability: Float[np.ndarray, " source"]
+    named: tuple[str, ...]
+    twins: tuple[tuple[str, str], ...]
+    groups: tuple[InseparableColumns, ...]
+    fit: CurveFit
+    evaluations: int
+    failed: int
+
+    @property
+    def column_mean(self) -> Float[np.ndarray, " column"]:
+        """Mean of every column [m, angles rad]."""
+        return np.asarray(self.deviations.mean(axis=0))
+
+    @property
+    def column_interval(self) -> Float[np.ndarray, "2 column"]:
+        """95 % interval of every column [m, angles rad]."""
+        return np.asarray(np.quantile(self.deviations, TAILS, axis=0))
 
 
 def diagnose(
@@ -109,15 +156,20 @@ def diagnose(
         raise InputError.at("diagnosis", "level", level, "a number between 0 and 1")
     if errors.joint:
         raise InputError.at("diagnosis", "joint source", errors.joint[0].name, "none, sources of the drawings only")
-    tally = _Tally(kernel.observe)
+    solved: Counter[bool] = Counter()
+
+    def observe(status: UInt8[np.ndarray, " sample"]) -> None:
+        solved.update({True: int((status == 0).sum()), False: int((status != 0).sum())})
+        kernel.observe(status)
+
     problem = CurveProblem(
-        kernel=replace(kernel, torque=curve.torque, observe=tally),
+        kernel=replace(kernel, torque=curve.torque, observe=observe),
         errors=errors,
         zones=zones,
         readings=thinned(curve, noise, effort.angles),
     )
-    explanation = explain(problem, seeds.child("search"), effort.search)
-    numbers = posterior(problem, explanation, seeds.child("posterior").generator(), effort.sample)
+    explanation = explain(problem, seeds.child("search"), effort)
+    numbers = posterior(problem, explanation, seeds.child("posterior").generator(), effort)
     deviations = with_twins(problem, problem.deviations(numbers), seeds.child("twins").generator())
     judged = deviations[seeds.child("judged").generator().permutation(len(deviations))[: effort.judged]]
     fit = _fit(problem, numbers, judged)
@@ -125,8 +177,8 @@ def diagnose(
     if fit.explained:
         falls = reductions(problem, judged, largest_failed_share)
         probability = np.bincount(dominant(falls), minlength=len(names)) / len(falls)
-    if tally.failed > largest_failed_share * tally.solved:
-        raise SolveError(f"{tally.failed} of {tally.solved} curves of a diagnosis failed to solve.")
+    if solved[False] > largest_failed_share * solved.total():
+        raise SolveError(f"{solved[False]} of {solved.total()} curves of a diagnosis failed to solve.")
     gauge = np.stack(
         [limited_measure(source, deviations[:, _places(errors, source.name)]) for source in errors.active], axis=1
     )
@@ -141,8 +193,8 @@ def diagnose(
         twins=_twins(names) if has_half_turn(kernel.model.reducer, errors.columns) else (),
         groups=groups(numbers, errors.columns, errors.source_of_column),
         fit=fit,
-        evaluations=tally.solved,
-        failed=tally.failed,
+        evaluations=solved.total(),
+        failed=solved[False],
     )
 
 
@@ -156,12 +208,12 @@ def _twins(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
 
 def _fit(
     problem: CurveProblem, numbers: Float[np.ndarray, "particle column"], judged: Float[np.ndarray, "unit column"]
-) -> Fit:
+) -> CurveFit:
     """Return the measured curve beside those of the errors that it allows."""
     readings, misfit, curves = problem.readings, problem.misfit(numbers), problem.curves(judged)
     curves -= curves.mean(axis=1, keepdims=True)
     square = 2.0 * float(misfit.mean())
-    return Fit(
+    return CurveFit(
         carrier_angle=readings.carrier_angle,
         measured=readings.values - readings.values.mean(),
         fitted=curves.mean(axis=0),

@@ -1,4 +1,7 @@
-"""Errors that explain a curve: scouts find the neighbourhoods, damped Gauss–Newton steps climb down in each."""
+"""Errors that explain a curve: scouts find the neighbourhoods, damped Gauss–Newton steps climb down in each.
+
+Around the best explanation a population says what is known of the errors and what is not.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from tolalloc.bench.diagnosis.bridge import Moves, Neighbourhood, bridge
+from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
 from tolalloc.bench.diagnosis.problem import CurveProblem
 from tolalloc.drawing.seeds import SeedTree
 
@@ -26,11 +29,13 @@ _SAME_DEPTH = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchEffort:
-    """How much the search for an explanation may compute.
+class DiagnosisEffort:
+    """How much a diagnosis may compute.
 
     Parameters
     ----------
+    angles
+        Most readings of a turn that are used [-].
     scouts
         Particles led from the drawings' distribution to one that knows the curve roughly [-].
     rough
@@ -41,13 +46,26 @@ class SearchEffort:
         Most attempts from fresh scouts [-].
     nearby
         Most searches around the best so far in each attempt [-].
+    particles
+        Size of the population that is sampled around the explanation [-].
+    weight
+        Weight of the readings in the normal distribution that the population starts from [-].
+    settling
+        Moves of the population at the end [-].
+    judged
+        Sampled units whose dominant source is looked for [-].
     """
 
+    angles: int = 240
     scouts: int = 320
     rough: float = 1.0
     climbers: int = 16
     attempts: int = 5
     nearby: int = 8
+    particles: int = 512
+    weight: float = 0.01
+    settling: int = 20
+    judged: int = 128
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,20 +95,12 @@ class Explanation:
 
 
 def explain(
-    problem: CurveProblem, seeds: SeedTree, effort: SearchEffort, enough: float = 0.05, least: float = 0.001
+    problem: CurveProblem, seeds: SeedTree, effort: DiagnosisEffort, enough: float = 0.05, least: float = 0.001
 ) -> Explanation:
     """Return the best explanation of some attempts, ended early by one that is plausible.
 
-    Parameters
-    ----------
-    problem
-        Curve and sources.
-    seeds
-        Node of the seed tree.
-    effort
-        How much may be computed.
-    enough, least
-        Plausibility that ends an attempt once nothing better was found nearby, and that ends the attempts [-].
+    An attempt ends once nothing better was found nearby and its plausibility is enough; the attempts end with one that
+    has the least.
     """
     everywhere = Neighbourhood(centre=np.zeros(problem.size), precision=np.eye(problem.size))
     rough = _rough_weight(problem, everywhere, seeds.child("spread").generator(), effort)
@@ -107,7 +117,7 @@ def _attempt(
     everywhere: Neighbourhood,
     rough: float,
     seeds: SeedTree,
-    effort: SearchEffort,
+    effort: DiagnosisEffort,
     enough: float,
 ) -> Explanation:
     """Search among all errors, then around the best so far, in a wider neighbourhood after each search in vain."""
@@ -123,7 +133,7 @@ def _attempt(
 
 
 def _rough_weight(
-    problem: CurveProblem, everywhere: Neighbourhood, generator: np.random.Generator, effort: SearchEffort
+    problem: CurveProblem, everywhere: Neighbourhood, generator: np.random.Generator, effort: DiagnosisEffort
 ) -> float:
     """Return the weight of the readings, were they as wrong as the curves of all allowed errors differ [-]."""
     curves = problem.curves(problem.deviations(everywhere.drawn(64, generator)))
@@ -132,7 +142,7 @@ def _rough_weight(
 
 
 def _search(
-    problem: CurveProblem, start: Neighbourhood, weight: float, generator: np.random.Generator, effort: SearchEffort
+    problem: CurveProblem, start: Neighbourhood, weight: float, generator: np.random.Generator, effort: DiagnosisEffort
 ) -> Explanation:
     """Lead scouts from the start towards the curve, taken with this weight, and climb from some of them."""
     rough = weight
@@ -141,7 +151,7 @@ def _search(
         lambda numbers: -0.5 * (numbers**2).sum(axis=1) - rough * problem.misfit(numbers),
         effort.scouts,
         generator,
-        Moves(most=10),
+        most=10,
     )
     climbers = scouts[generator.permutation(effort.scouts)[: effort.climbers]]
     while weight < 1.0:
@@ -167,16 +177,7 @@ def climb(
 ) -> Float[np.ndarray, "sample column"]:
     """Return the samples after some damped Gauss–Newton steps, each with the best of several dampings.
 
-    Parameters
-    ----------
-    problem
-        Curve and sources.
-    numbers
-        Where the steps begin [-].
-    weight
-        Weight of the readings against what is known of the errors; below 1 the valleys are wide [-].
-    steps
-        Number of steps [-].
+    The weight is that of the readings against what is known of the errors; below 1 the valleys are wide.
     """
     samples, damping = np.arange(len(numbers)), np.ones(len(numbers))
     objective = weight * problem.misfit(numbers) + 0.5 * (numbers**2).sum(axis=1)
@@ -196,3 +197,16 @@ def climb(
         objective = np.where(better, reached[samples, best], objective)
         damping = np.clip(np.where(better, tried[samples, best], 30.0 * damping), 1e-6, 1e9)
     return numbers
+
+
+def posterior(
+    problem: CurveProblem, explanation: Explanation, generator: np.random.Generator, effort: DiagnosisEffort
+) -> Float[np.ndarray, "particle column"]:
+    """Return standard normal numbers drawn from all errors near the explanation that the curve allows [-]."""
+    return bridge(
+        explanation.neighbourhood(effort.weight),
+        lambda numbers: -0.5 * (numbers**2).sum(axis=1) - problem.misfit(numbers),
+        effort.particles,
+        generator,
+        settling=effort.settling,
+    )

@@ -5,22 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tolalloc.bench.diagnosis.answer.results import DiagnosisResults
-from tolalloc.bench.diagnosis.diagnosis import DiagnosisEffort, diagnose
-from tolalloc.bench.diagnosis.readings import Noise
+from tolalloc.bench.diagnosis.answer import DiagnosisAnswer
+from tolalloc.bench.diagnosis.diagnosis import diagnose
+from tolalloc.bench.diagnosis.problem import Noise
+from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.measurement.cleaning import clean_curve
 from tolalloc.bench.measurement.readings import ANGLE, TRANSMISSION_ERROR, load_readings
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.blas import one_blas_thread
+from tolalloc.drawing.error_model import ErrorModel
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
+from tolalloc.report.answer import Header
+from tolalloc.rv.bound import bind
 from tolalloc.rv.equivalent.status import OUTCOMES
-from tolalloc.study.definition import Study, prepare
+from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND, DEGREE
 
 LARGEST_NOISE = 60.0
 """Largest error of a reading that is believed [arcsec]."""
+
+PLACE = "tolalloc diagnose"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,8 +37,12 @@ class DiagnosisStudy:
     ----------
     curve
         CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``.
-    study
-        Reducer, tolerance table, torque and seed; its limit plays no part.
+    reducer
+        Nominal design, with the stiffness in use.
+    errors
+        What the drawings say of its parts.
+    torque_nm
+        Torque on the carrier, negative where it resists the rotation; the test torque unless given [N·m].
     noise_arcsec
         Standard deviation of one reading [arcsec].
     discrepancy_arcsec
@@ -41,16 +51,21 @@ class DiagnosisStudy:
         Added to every angle of the bench [deg].
     level
         Probability that the named sources must have of containing the dominant one [-].
+    seed
+        Seed of every random number [-].
     effort
         How much may be computed.
     """
 
     curve: Path
-    study: Study
+    reducer: Reducer
+    errors: ErrorModel
+    torque_nm: float | None = None
     noise_arcsec: float = 0.5
     discrepancy_arcsec: float = 0.5
     angle_offset_deg: float = 0.0
     level: float = 0.97
+    seed: int = 1
     effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)
 
     def __post_init__(self) -> None:
@@ -59,20 +74,14 @@ class DiagnosisStudy:
             ("--discrepancy", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
             ("--angle-offset", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
             ("--level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
+            ("--seed", self.seed, self.seed >= 0, "0 or a positive integer"),
         ):
             if not good:
-                raise InputError.at("tolalloc diagnose", name, value, allowed)
+                raise InputError.at(PLACE, name, value, allowed)
 
 
-def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisResults:
-    """Return what the curve of a unit tells of its parts.
-
-    Parameters
-    ----------
-    asked
-        The unit.
-    progress
-        Told how far the work has come.
+def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
+    """Return what the curve of a unit tells of its parts, and tell how far the work has come.
 
     Raises
     ------
@@ -81,9 +90,9 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisResults
     SolveError
         Too many curves failed.
     """
-    prepared, record = prepare(asked.study), Record(progress, OUTCOMES)
+    bound, record = bind(asked.reducer, asked.errors, asked.torque_nm, PLACE), Record(progress, OUTCOMES)
     cleaned = clean_curve(load_readings(asked.curve, ANGLE, TRANSMISSION_ERROR), asked.angle_offset_deg * DEGREE)
-    kernel, errors = replace(prepared.kernel, observe=record.observe), prepared.space.errors
+    kernel, errors = replace(bound.kernel, observe=record.observe), asked.errors
     curve = MeasuredCurve(
         unit=0,
         torque=kernel.torque,
@@ -95,27 +104,22 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisResults
         reading=asked.noise_arcsec * cleaned.noise_factor * ARCSECOND, discrepancy=asked.discrepancy_arcsec * ARCSECOND
     )
     with one_blas_thread(), record.stage("diagnosis"):
-        found = diagnose(
-            curve,
-            kernel,
-            errors,
-            errors.zones,
-            noise,
-            SeedTree(asked.study.seed).child("diagnosis"),
-            asked.effort,
-            asked.level,
-            asked.study.largest_failed_share,
-        )
-    return DiagnosisResults(
-        name=asked.curve.stem,
-        reducer=prepared.reducer,
+        seeds = SeedTree(asked.seed).child("diagnosis")
+        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, asked.effort, asked.level)
+    return DiagnosisAnswer(
+        header=Header(
+            name=asked.curve.stem,
+            model=asked.reducer.name,
+            seed=asked.seed,
+            assumptions=bound.assumptions,
+            statuses=record.counts,
+            stages=record.stages,
+        ),
+        reducer=asked.reducer,
         torque=kernel.torque,
         errors=errors,
         curve=curve,
         noise=noise,
         level=asked.level,
-        seed=asked.study.seed,
         diagnosis=found,
-        neglected=prepared.neglected,
-        statuses=record.counts,
     )
