@@ -10,7 +10,7 @@ import pytest
 from studies.published.measurement_folder import write_measurements
 from tolalloc.bench.measurement.cleaning import clean_curve, clean_loop
 from tolalloc.bench.measurement.files import load_measurements
-from tolalloc.bench.measurement.readings import Readings
+from tolalloc.bench.measurement.readings import RawReadings
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
 from tolalloc.exceptions import InputError
@@ -27,8 +27,8 @@ def curve(angle: np.ndarray) -> np.ndarray:
     return ARCSECOND * sum(5.0 * np.cos(order * angle + order) for order in ORDERS)
 
 
-def readings(along: np.ndarray, values: np.ndarray | None = None, header: str = "angle [deg]") -> Readings:
-    return Readings(
+def readings(along: np.ndarray, values: np.ndarray | None = None, header: str = "angle [deg]") -> RawReadings:
+    return RawReadings(
         path=Path("curve.csv"),
         header=header,
         factor=1.0 if header == "angle [rad]" or "torque" in header else DEGREE,

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.measurement.readings import Readings, counted, require_readings
+from tolalloc.bench.measurement.readings import RawReadings, counted, require_readings
 from tolalloc.exceptions import InputError
 from tolalloc.units import DEGREE
 
@@ -33,7 +33,7 @@ RADIANS_SPAN, RADIANS_READINGS = 7.0, 50
 DEGREES_SPAN = 50.0
 
 
-def in_stated_unit(readings: Readings) -> tuple[Readings, str]:
+def in_stated_unit(readings: RawReadings) -> tuple[RawReadings, str]:
     """Refuse angles that look as if the header named the wrong unit; nothing is repaired."""
     require_readings(readings, "reading")
     span = float(np.ptp(readings.along)) / readings.factor
@@ -49,18 +49,18 @@ def in_stated_unit(readings: Readings) -> tuple[Readings, str]:
     )
 
 
-def _median_step(readings: Readings) -> float:
+def _median_step(readings: RawReadings) -> float:
     """Return the median length of the steps that are not 0 [rad]."""
     steps = np.abs(np.diff(readings.along))
     return float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
 
 
-def _direction(readings: Readings) -> float:
+def _direction(readings: RawReadings) -> float:
     """Return 1 where most steps go up, −1 where most go down."""
     return -1.0 if np.sign(np.diff(readings.along)).sum() < 0 else 1.0
 
 
-def carried_on(readings: Readings) -> tuple[Readings, str]:
+def carried_on(readings: RawReadings) -> tuple[RawReadings, str]:
     """Count angles on that an encoder starts anew after each turn."""
     direction, median = _direction(readings), _median_step(readings)
     passes = np.abs(direction * np.diff(readings.along) + TURN) <= 5.0 * median  # a few readings may be lost there
@@ -72,14 +72,14 @@ def carried_on(readings: Readings) -> tuple[Readings, str]:
     return replace(readings, along=along), f"angles that start anew {times} counted on"
 
 
-def upwards(readings: Readings) -> tuple[Readings, str]:
+def upwards(readings: RawReadings) -> tuple[RawReadings, str]:
     """Turn round angles that run downwards."""
     if _direction(readings) < 0:
         return readings.chosen(np.arange(readings.along.size)[::-1]), "angles run downwards: turned round"
     return readings, ""
 
 
-def without_ends(readings: Readings, start_stop: float) -> tuple[Readings, str]:
+def without_ends(readings: RawReadings, start_stop: float) -> tuple[RawReadings, str]:
     """Leave out what stands within an angle [rad] from either end."""
     low, high = float(readings.along.min()) + start_stop, float(readings.along.max()) - start_stop
     inside = (readings.along >= low) & (readings.along <= high)
@@ -88,7 +88,7 @@ def without_ends(readings: Readings, start_stop: float) -> tuple[Readings, str]:
     return readings.chosen(inside), f"{counted(out, 'reading')} of start and stop left out" if out else ""
 
 
-def in_order(readings: Readings) -> tuple[Readings, str]:
+def in_order(readings: RawReadings) -> tuple[RawReadings, str]:
     """Sort angles of which a few step back a little; refuse those that turn back."""
     steps, median = np.diff(readings.along), _median_step(readings)
     back = steps < 0
@@ -96,7 +96,7 @@ def in_order(readings: Readings) -> tuple[Readings, str]:
     if count == 0:
         return readings, ""
     if count > BACKWARD_SHARE * steps.size or steps.min() < -1.01 * median:
-        # Readings that were turned round stand in the reverse order of the file.
+        # RawReadings that were turned round stand in the reverse order of the file.
         pairs = np.flatnonzero(back)
         rows = np.maximum(readings.row[pairs], readings.row[pairs + 1])
         row = int(rows.min())
@@ -116,7 +116,7 @@ def turns_covered(angle: Float[np.ndarray, " reading"]) -> int:
     return int((angle[-1] - angle[0] + 1.5 * float(np.median(np.diff(angle)))) // TURN)
 
 
-def whole_turns(readings: Readings) -> tuple[Readings, str]:
+def whole_turns(readings: RawReadings) -> tuple[RawReadings, str]:
     """Keep whole turns from the middle, folded onto one; a piece of a turn is kept as it is and noted."""
     require_readings(readings, "reading")
     angle = readings.along

@@ -21,7 +21,7 @@ from tolalloc.bench.measurement.angles import (
     whole_turns,
     without_ends,
 )
-from tolalloc.bench.measurement.readings import Readings, counted, require_readings
+from tolalloc.bench.measurement.readings import RawReadings, counted, require_readings
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.units import DEGREE
@@ -48,7 +48,7 @@ class Cleaned:
     along
         Angles or torques, ascending [rad or N·m].
     values
-        Readings without their mean [rad].
+        RawReadings without their mean [rad].
     noise_factor
         Standard deviation of one of these over that of a reading of the instrument, root mean square [-].
     repairs
@@ -61,26 +61,19 @@ class Cleaned:
     repairs: tuple[str, ...]
 
 
-Step = Callable[[Readings], tuple[Readings, str]]
+Step = Callable[[RawReadings], tuple[RawReadings, str]]
 """One kind of repair: the mended readings, and what was done, empty for nothing."""
 
 
-def clean_curve(readings: Readings, offset: float = 0.0, start_stop: float = 0.0) -> Cleaned:
+def clean_curve(readings: RawReadings, offset: float = 0.0, start_stop: float = 0.0) -> Cleaned:
     """Return a transmission error curve with ascending angles: whole turns folded onto one, or a piece of a turn.
 
-    Parameters
-    ----------
-    readings
-        Angle and transmission error as read.
-    offset
-        Added to every angle [rad].
-    start_stop
-        Angle that is left out at each end [rad].
+    An offset [rad] is added to every angle, an angle of start and stop [rad] left out at each end.
 
     Raises
     ------
     InputError
-        Readings that cannot be mended without a guess.
+        RawReadings that cannot be mended without a guess.
     """
     readings, repairs = _in_turn(
         readings,
@@ -110,18 +103,13 @@ def clean_curve(readings: Readings, offset: float = 0.0, start_stop: float = 0.0
     return Cleaned(along=angle, values=_without_mean(readings, values), noise_factor=factor, repairs=repairs)
 
 
-def clean_loop(readings: Readings) -> Cleaned:
+def clean_loop(readings: RawReadings) -> Cleaned:
     """Return a torque–twist loop with ascending torques, both branches averaged where they share a torque.
-
-    Parameters
-    ----------
-    readings
-        Torque and twist as read.
 
     Raises
     ------
     InputError
-        Readings that cannot be mended without a guess.
+        RawReadings that cannot be mended without a guess.
     """
     readings, repairs = _in_turn(
         readings,
@@ -141,7 +129,7 @@ def clean_loop(readings: Readings) -> Cleaned:
     )
 
 
-def _in_turn(readings: Readings, steps: tuple[Step, ...]) -> tuple[Readings, tuple[str, ...]]:
+def _in_turn(readings: RawReadings, steps: tuple[Step, ...]) -> tuple[RawReadings, tuple[str, ...]]:
     repairs = []
     for step in steps:
         readings, repair = step(readings)
@@ -149,7 +137,7 @@ def _in_turn(readings: Readings, steps: tuple[Step, ...]) -> tuple[Readings, tup
     return readings, tuple(repair for repair in repairs if repair)
 
 
-def _without_mean(readings: Readings, values: Float[np.ndarray, " reading"]) -> Float[np.ndarray, " reading"]:
+def _without_mean(readings: RawReadings, values: Float[np.ndarray, " reading"]) -> Float[np.ndarray, " reading"]:
     """Return the values less their mean, or refuse a range that no reducer has."""
     if np.ptp(values) > LARGEST_RANGE:
         raise InputError.at(
@@ -161,7 +149,7 @@ def _without_mean(readings: Readings, values: Float[np.ndarray, " reading"]) -> 
     return np.asarray(values - values.mean())
 
 
-def without_missing(readings: Readings) -> tuple[Readings, str]:
+def without_missing(readings: RawReadings) -> tuple[RawReadings, str]:
     """Leave out readings without a number."""
     there = np.isfinite(readings.along) & np.isfinite(readings.values)
     missing = int((~there).sum())
@@ -173,7 +161,7 @@ def without_missing(readings: Readings) -> tuple[Readings, str]:
     return readings.chosen(there), f"{counted(missing, 'reading')} without a number left out" if missing else ""
 
 
-def without_repeats(readings: Readings, tolerance: float) -> tuple[Readings, str]:
+def without_repeats(readings: RawReadings, tolerance: float) -> tuple[RawReadings, str]:
     """Average readings at one angle or torque, which must be ascending; the tolerance has its unit."""
     new = np.concatenate([[True], np.diff(readings.along) > tolerance])
     repeats = int((~new).sum())
@@ -189,7 +177,7 @@ def without_repeats(readings: Readings, tolerance: float) -> tuple[Readings, str
     )
 
 
-def without_zero_torque(readings: Readings) -> tuple[Readings, str]:
+def without_zero_torque(readings: RawReadings) -> tuple[RawReadings, str]:
     """Leave out readings at a torque of exactly 0, where no pin carries and any twist inside the play is true."""
     loaded = readings.along != 0.0
     out = int((~loaded).sum())

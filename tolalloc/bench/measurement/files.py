@@ -41,7 +41,7 @@ def _as_list(names: object) -> object:
 
 Text = Annotated[str, Field(min_length=1)]
 Torque = Annotated[float, Field(ge=-1e5, le=1e5), AfterValidator(_loaded)]
-Noise = Annotated[float, Field(gt=0, le=3600)]
+NoiseArcsec = Annotated[float, Field(gt=0, le=3600)]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 
 
@@ -50,7 +50,7 @@ class PeakToPeakRecord(Record):
 
     file: Text
     torque_nm: Torque
-    noise_arcsec: Noise | None = None
+    noise_arcsec: NoiseArcsec | None = None
 
 
 class CurveRecord(Record):
@@ -59,7 +59,7 @@ class CurveRecord(Record):
     unit: Text
     file: Text
     torque_nm: Torque
-    noise_arcsec: Noise | None = None
+    noise_arcsec: NoiseArcsec | None = None
     angle_offset_deg: Degrees = 0.0
     start_stop_deg: Annotated[float, Field(ge=0, le=180)] = 0.0
 
@@ -70,7 +70,7 @@ class LoopRecord(Record):
     unit: Text
     file: Text
     carrier_angle_deg: Degrees
-    noise_arcsec: Noise | None = None
+    noise_arcsec: NoiseArcsec | None = None
 
 
 class MeasurementRecord(Record):

@@ -1,4 +1,4 @@
-"""Readings of an instrument: two columns of a CSV file, units in its header, into arrays in SI units."""
+"""RawReadings of an instrument: two columns of a CSV file, units in its header, into arrays in SI units."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ TORQUE = Quantity(name="torque", units={"N·m": 1.0, "Nm": 1.0})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Readings:
-    """Readings in the order of the file; not a number where the instrument gave none.
+class RawReadings:
+    """RawReadings in the order of the file; not a number where the instrument gave none.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Readings:
     values
         What the instrument showed [rad].
     averaged
-        Readings that each value is the mean of [-].
+        RawReadings that each value is the mean of [-].
     """
 
     path: Path
@@ -82,9 +82,9 @@ class Readings:
     values: Float[np.ndarray, " reading"]
     averaged: Float[np.ndarray, " reading"]
 
-    def chosen(self, which: np.ndarray) -> Readings:
+    def chosen(self, which: np.ndarray) -> RawReadings:
         """Return the readings that a mask or a list of positions names, in its order."""
-        return Readings(
+        return RawReadings(
             path=self.path,
             header=self.header,
             factor=self.factor,
@@ -141,7 +141,7 @@ def _same_name(header: str, name: str) -> bool:
     return split_header(header)[0].lower().replace("_", " ") == name.replace("_", " ")
 
 
-def load_readings(path: Path, along: Quantity, values: Quantity) -> Readings:
+def load_readings(path: Path, along: Quantity, values: Quantity) -> RawReadings:
     """Return the two columns of a file in SI units; columns of other names are not read.
 
     Parameters
@@ -168,7 +168,7 @@ def load_readings(path: Path, along: Quantity, values: Quantity) -> Readings:
                 f"{path}: all {finite.size} values of column {name!r} are {finite[0] / unit:.6g}; an instrument that "
                 "does not move is no measurement."
             )
-    return Readings(
+    return RawReadings(
         path=path,
         header=header,
         factor=factor,
@@ -184,7 +184,7 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
-def require_readings(readings: Readings, what: str) -> None:
+def require_readings(readings: RawReadings, what: str) -> None:
     """Raise unless enough readings are left for a shape."""
     if readings.along.size < FEWEST:
         raise InputError.at(readings.path, f"the number of {what}s", readings.along.size, f"{FEWEST} or more")

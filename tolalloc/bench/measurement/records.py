@@ -23,7 +23,7 @@ class MeasuredCurve:
     carrier_angle
         Angles of the readings, ascending [rad].
     transmission_error
-        Readings without their mean, output side [rad].
+        RawReadings without their mean, output side [rad].
     noise
         Standard deviation of one reading as it stands here, None where the file does not state it [rad].
     repairs
@@ -51,11 +51,9 @@ class MeasuredLoop:
     torque
         Torques on the carrier, ascending, none of them 0 [N·m].
     twist
-        Readings without their mean, output side [rad].
-    noise
-        Standard deviation of one reading as it stands here, None where the file does not state it [rad].
-    repairs
-        What was mended, prefixed by the file.
+        RawReadings without their mean, output side [rad].
+    noise, repairs
+        As of a curve [rad].
     """
 
     unit: int
