@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
 DOORS = {
     "SALib": ("sensitivity/",),
-    "pymoo": ("allocation/", "bench/identification/"),
+    "pymoo": ("allocation/",),
     "cvxpy": ("allocation/",),
     "sklearn": ("surrogate/", "rv/stand_ins.py"),
     "plotly": ("report/",),
