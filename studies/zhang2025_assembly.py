@@ -18,8 +18,8 @@ from zhang2025_sections import (
     priced_section,
 )
 
-from tolalloc.assembly.answer.document import assembly_document
-from tolalloc.assembly.study import AssemblyStudy, assemble, prepare_assembly
+from tolalloc.assembly.files import load_plan
+from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.cli.console import UnitProgress
 from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document
@@ -36,12 +36,15 @@ def parts_drawn() -> np.ndarray:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    asked = AssemblyStudy(chain="bx40e", assemblies=10_000 if quick else 100_000, seed=1)
-    prepared = replace(prepare_assembly(asked), name="Parts drawn within ±60″", errors=parts_drawn())
+    study = AssemblyStudy(
+        plan=load_plan("bx40e"),
+        name="Parts drawn within ±60″",
+        errors=parts_drawn(),
+        assemblies=10_000 if quick else 100_000,
+    )
     with UnitProgress("assemblies") as progress:
-        results = assemble(prepared, progress)
-    document = assembly_document(results)
-    plan = results.plan
+        answer = assemble(study, progress)
+    document, plan = answer.document, answer.plan
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)
     mounting, mounted = mounting_section(3 if quick else 100)
     genetic, searched = genetic_section(plan, 2 if quick else 10)
@@ -53,7 +56,7 @@ def build(quick: bool) -> Document:
         sections=(
             *document.sections,
             drawn,
-            pattern_section(prepared.plan, parts_drawn(), PRECISIONS),
+            pattern_section(plan, parts_drawn(), PRECISIONS),
             priced,
             exponential_section(plan),
             genetic,

@@ -10,18 +10,16 @@ import pandas as pd
 import pytest
 
 from tolalloc.assembly.answer import tables, tolerance_tables, transmission
+from tolalloc.assembly.answer.answer import AssemblyAnswer, TransmissionEffect
 from tolalloc.assembly.answer.cautions import assumptions, warnings
 from tolalloc.assembly.answer.characteristics import characteristic_table, larger
-from tolalloc.assembly.answer.document import assembly_document
 from tolalloc.assembly.answer.plan_record import plan_record
-from tolalloc.assembly.answer.results import AssemblyResults, TransmissionEffect
-from tolalloc.assembly.answer.sentences import answer
 from tolalloc.assembly.answer.summary import summary
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves
 from tolalloc.assembly.steps import Efforts, steps_in_order
-from tolalloc.assembly.study import AssemblyStudy, PreparedAssembly, assemble
+from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.report.plots import as_html
 from tolalloc.rv.equivalent.line_load import ContactPattern
@@ -76,9 +74,8 @@ class Silent:
     def advance(self, units: int) -> None: ...
 
 
-def run(plan, errors=None) -> AssemblyResults:
-    asked = AssemblyStudy(chain="pump", assemblies=2000)
-    return assemble(PreparedAssembly(asked=asked, plan=plan, name="seven", errors=errors), Silent())
+def run(plan, errors=None) -> AssemblyAnswer:
+    return assemble(AssemblyStudy(plan=plan, name="seven", errors=errors, assemblies=2000), Silent())
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +86,12 @@ def plan(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def expected(plan) -> AssemblyResults:
+def expected(plan) -> AssemblyAnswer:
     return run(plan)
 
 
 @pytest.fixture(scope="module")
-def measured(plan) -> AssemblyResults:
+def measured(plan) -> AssemblyAnswer:
     return run(plan, ERRORS)
 
 
@@ -150,8 +147,8 @@ def effect(samples: int) -> TransmissionEffect:
     )
 
 
-def said(results: AssemblyResults) -> str:
-    return " ".join(answer(results))
+def said(results: AssemblyAnswer) -> str:
+    return " ".join(results.sentences)
 
 
 def test_the_norm_of_measured_parts_is_said_before_and_after(measured):
@@ -168,14 +165,14 @@ def test_a_weighted_norm_is_called_so(plan):
 def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     sweep, at = expected.sweep, tables.at_precision(expected)
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
-    sentence = answer(expected)[0]
+    sentence = expected.sentences[0]
     assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
     assert f"however large the precision, this plan leaves {floor:.2f}″" in sentence
     assert "noise" not in sentence
 
 
-def text(results: AssemblyResults, heading: str) -> str:
-    sections = {section.heading: section.paragraphs for section in assembly_document(results).sections}
+def text(results: AssemblyAnswer, heading: str) -> str:
+    sections = {section.heading: section.paragraphs for section in results.document.sections}
     return " ".join(sections[heading])
 
 
@@ -246,7 +243,7 @@ def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expecte
     same = replace(expected, tolerances=replace(expected.tolerances, retuned=first, verified=first.best))
     assert "Tuning the filter to what is allocated gains nothing here." in said(same)
     assert "random assemblies with the tolerances for a precision of 5, " in said(same)
-    document = assembly_document(same)
+    document = same.document
     assert "re-tuned" not in " ".join([*document.warnings, *document.answer])
     for _, frame in document.sections[-1].tables:
         assert not any("re-tuned" in column for column in frame.columns)
@@ -356,7 +353,7 @@ def test_a_part_without_a_limit_is_neither_kept_nor_missed(expected):
     assert set(frame.loc[free, "OK"]) == {""} and set(frame.loc[~free, "OK"]) == {"yes"}
 
 
-def limited(results: AssemblyResults, limit: float) -> AssemblyResults:
+def limited(results: AssemblyAnswer, limit: float) -> AssemblyAnswer:
     """Return measured parts of which only the tilt of the bracket is limited [arcsec]."""
     free = np.full(3, np.inf)
     asked = replace(
@@ -442,7 +439,7 @@ def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
     errors = ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]])
     weighted = run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), errors)
     assert "The weighted norm of all angles falls, a single angle need not" in " ".join(
-        assembly_document(weighted).sections[0].paragraphs
+        weighted.document.sections[0].paragraphs
     )
 
 
@@ -497,7 +494,7 @@ def test_digits_that_mean_nothing_are_cut(measured, expected):
     frame = tables.rounded(pd.DataFrame({"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}))
     assert list(map(repr, frame["x"].tolist())) == ["0.0", "0.0", "14.0", "0.0"]
     for results, samples in ((measured, 1), (expected, 10)):
-        for section in assembly_document(replace(results, transmission=effect(samples))).sections:
+        for section in replace(results, transmission=effect(samples)).document.sections:
             for name, table in section.tables:
                 for column in table.select_dtypes("float"):
                     values = table[column].dropna().to_numpy()
@@ -509,7 +506,7 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
     free = np.full(3, np.inf)
     asked = replace(expected.plan.requirements, tilt_limit=free, rotation_limit=free)
     unlimited = replace(expected, plan=replace(expected.plan, requirements=asked))
-    document = assembly_document(unlimited)
+    document = unlimited.document
     assert "Angular tolerances" not in [section.heading for section in document.sections]
     assert "cost units" not in " ".join(document.answer)
     assert document.summary["tolerances"] is None
@@ -520,7 +517,7 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
 @pytest.mark.parametrize("errors", [None, ERRORS])
 def test_limits_that_no_tolerances_keep_leave_everything_else(plan, errors):
     tight = replace(plan.requirements, tilt_limit=ARCSECOND * np.array([0.2, np.inf, np.inf]))
-    document = assembly_document(run(replace(plan, requirements=tight), errors))
+    document = run(replace(plan, requirements=tight), errors).document
     assert any(warning.startswith("No angular tolerances are given. pump: ") for warning in document.warnings)
     assert "Angular tolerances" not in [section.heading for section in document.sections]
     json.dumps(document.summary, allow_nan=False)
@@ -540,7 +537,7 @@ def test_differences_from_perfect_parts_are_in_percent():
 
 @pytest.mark.parametrize("samples", [1, 10])
 def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured, samples):
-    document = assembly_document(replace(measured if samples == 1 else expected, transmission=effect(samples)))
+    document = replace(measured if samples == 1 else expected, transmission=effect(samples)).document
     for section in document.sections:
         for name, frame in section.tables:
             for column in frame.columns:
@@ -558,7 +555,7 @@ def test_only_pins_that_carry_are_shown(measured):
 
 
 def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
-    document = assembly_document(run(replace(plan, requirements=None)))
+    document = run(replace(plan, requirements=None)).document
     assert [section.heading for section in document.sections] == [
         "How errors build up and are adjusted",
         "Precision against effort",
@@ -577,7 +574,7 @@ def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, e
 def test_a_single_angle_that_rises_is_counted(plan):
     # The rotor's own error, about axes turned by 90°, cancels what the bracket hands on about x.
     results = run(plan, ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]]))
-    paragraphs = " ".join(assembly_document(results).sections[0].paragraphs)
+    paragraphs = " ".join(results.document.sections[0].paragraphs)
     found = results.measured
     rose = int((np.abs(found.adjusted) > np.abs(found.unadjusted)).sum())
     assert rose > 0

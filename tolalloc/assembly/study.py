@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles, verify_angles
 from tolalloc.assembly.angular.program import angular_limits
 from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts
+from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.assembly.gains import expected_angles, tuned_gains
@@ -22,6 +22,7 @@ from tolalloc.assembly.transmission import transmission_effect
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
+from tolalloc.report.answer import Header
 from tolalloc.rv.equivalent.status import OUTCOMES
 
 SWEPT = (
@@ -60,87 +61,63 @@ class AssemblyStudy:
 
     Parameters
     ----------
-    chain
-        Shipped name or chain file.
-    measured
-        CSV file with the measured errors of its parts, if there is one.
-    precision
-        Q in place of the chain's own [-].
+    plan
+        The chain at the precision that was asked for.
+    name
+        Where the errors of the parts come from; empty if they are not measured.
+    errors
+        Measured errors of its parts, if there are any [rad].
     assemblies
         Random assemblies that verify the tolerances [-].
     draws
         Random assemblies whose transmission is solved where the parts are not measured [-].
     seed
         Seed of every random number [-].
-
-    Raises
-    ------
-    InputError
-        A precision or a seed out of range.
     """
 
-    chain: str | Path
-    measured: Path | None = None
-    precision: float | None = None
+    plan: AssemblyPlan
+    name: str = ""
+    errors: Float[np.ndarray, "part 3"] | None = None
     assemblies: int = 100_000
     draws: int = 50
     seed: int = 1
 
-    def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise InputError.at("tolalloc assemble", "--seed", self.seed, "0 or a positive integer")
-        if self.precision is not None and not 0 <= self.precision <= LARGEST_PRECISION:
-            raise InputError.at("tolalloc assemble", "--precision", self.precision, f"0 to {LARGEST_PRECISION:g}")
 
-
-@dataclass(frozen=True, kw_only=True)
-class PreparedAssembly:
-    """A checked assembly.
+def prepare_assembly(
+    chain: str | Path, measured: Path | None = None, precision: float | None = None, seed: int = 1
+) -> AssemblyStudy:
+    """Return an assembly with its files read and checked.
 
     Parameters
     ----------
-    asked
-        What was asked.
-    plan
-        The chain at the precision that was asked for.
-    name
-        Where the errors of the parts come from.
-    errors
-        Measured errors of its parts, if there are any [rad].
-    """
-
-    asked: AssemblyStudy
-    plan: AssemblyPlan
-    name: str
-    errors: Float[np.ndarray, "part 3"] | None
-
-
-def prepare_assembly(asked: AssemblyStudy) -> PreparedAssembly:
-    """Return an assembly with its files read and checked.
+    chain
+        Shipped name or chain file.
+    measured
+        CSV file with the measured errors of its parts, if there is one.
+    precision
+        Q in place of the chain's own [-].
+    seed
+        As in `AssemblyStudy`.
 
     Raises
     ------
     InputError, UnknownNameError
-        The file, row, field and value that are not allowed.
+        The option, or the file, row, field and value that are not allowed.
     """
-    plan = load_plan(asked.chain)
-    if asked.precision is not None:
-        plan = replace(plan, precision=asked.precision)
-    errors = None if asked.measured is None else load_errors(asked.measured, plan)
-    return PreparedAssembly(
-        asked=asked, plan=plan, name="" if asked.measured is None else asked.measured.stem, errors=errors
-    )
+    if seed < 0:
+        raise InputError.at("tolalloc assemble", "--seed", seed, "0 or a positive integer")
+    if precision is not None and not 0 <= precision <= LARGEST_PRECISION:
+        raise InputError.at("tolalloc assemble", "--precision", precision, f"0 to {LARGEST_PRECISION:g}")
+    plan = load_plan(chain)
+    if precision is not None:
+        plan = replace(plan, precision=precision)
+    if measured is None:
+        return AssemblyStudy(plan=plan, seed=seed)
+    return AssemblyStudy(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
 
 
-def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
+def assemble(study: AssemblyStudy, progress: Progress) -> AssemblyAnswer:
     """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
-
-    Parameters
-    ----------
-    prepared
-        The assembly.
-    progress
-        Told how far the work has come.
 
     Raises
     ------
@@ -149,24 +126,31 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
     SolveError
         A unit without equilibrium.
     """
-    plan, record, seeds = prepared.plan, Record(progress, OUTCOMES), SeedTree(prepared.asked.seed).child("assembly")
+    plan, record, seeds = study.plan, Record(progress, OUTCOMES), SeedTree(study.seed).child("assembly")
     with record.stage("adjustment"):
         gains = tuned_gains(plan, plan.precision, plan.tolerances)
         swept = np.array(sorted({*SWEPT, plan.precision}))
         sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
         fewer = _fewer(plan)
-        measured = None if prepared.errors is None else _measured(plan, prepared.name, prepared.errors, swept)
+        measured = None if study.errors is None else _measured(plan, study.name, study.errors, swept)
     with record.stage("tolerances"):
-        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), prepared.asked.assemblies)
+        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), study.assemblies)
     with record.stage("transmission"):
         shown = np.array(sorted({*SHOWN, plan.precision}))
         transmission = None
         if plan.reducer:
-            draws = prepared.asked.draws
             transmission = transmission_effect(
-                plan, prepared.errors, shown, draws, seeds.child("transmission"), record.observe
+                plan, study.errors, shown, study.draws, seeds.child("transmission"), record.observe
             )
-    return AssemblyResults(
+    return AssemblyAnswer(
+        header=Header(
+            name=plan.name,
+            model=transmission.reducer.name if transmission else "",
+            seed=study.seed,
+            assumptions=(*plan.assumptions, *(transmission.reducer.assumptions if transmission else ())),
+            statuses=record.counts,
+            stages=record.stages,
+        ),
         plan=plan,
         gains=gains,
         sweep=sweep,
@@ -176,17 +160,15 @@ def assemble(prepared: PreparedAssembly, progress: Progress) -> AssemblyResults:
         transmission=transmission,
         tolerances=tolerances,
         unreachable=unreachable,
-        seed=prepared.asked.seed,
-        statuses=record.counts,
     )
 
 
 def _measured(
     plan: AssemblyPlan, name: str, errors: Float[np.ndarray, "part 3"], precisions: Float[np.ndarray, " precision"]
-) -> MeasuredParts:
+) -> AdjustedParts:
     sequence = foreseen(plan.space, regulator(plan.space, plan.final_weight()), errors.ravel())
     turned = plan.space.adjusting * (sequence.adjustments != 0)[:, np.newaxis]
-    return MeasuredParts(
+    return AdjustedParts(
         name=name,
         errors=errors,
         sequence=sequence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.results import TransmissionEffect
+from tolalloc.assembly.answer.answer import TransmissionEffect
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import OrientationResponse, transmission_curves

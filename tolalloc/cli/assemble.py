@@ -24,35 +24,30 @@ def assemble(
 ) -> None:
     """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.assembly.answer.characteristics import characteristic_table
-    from tolalloc.assembly.answer.document import assembly_document
-    from tolalloc.assembly.answer.tables import step_table
-    from tolalloc.assembly.study import AssemblyStudy, prepare_assembly
     from tolalloc.assembly.study import assemble as assembled
+    from tolalloc.assembly.study import prepare_assembly
     from tolalloc.cli.document_script import written
     from tolalloc.report.folder import require_usable
 
-    prepared = prepare_assembly(AssemblyStudy(chain=chain, measured=measured, precision=precision, seed=seed))
+    study = prepare_assembly(chain, measured, precision, seed)
     if out:
         require_usable(out)
-    if prepared.plan.reducer:
+    if study.plan.reducer:
         announce_compilation()
     with UnitProgress("assemblies") as progress:
-        results = assembled(prepared, progress)
-    document = assembly_document(results)
+        answer = assembled(study, progress)
     if out:
-        written(out, lambda: document)
+        written(out, lambda: answer.document)
     if as_json:
-        print_json(document.summary)
+        print_json(answer.summary)
         return
-    name = prepared.name or prepared.plan.name
-    listed = step_table(results)
+    listed = answer.tables["steps"]
     said = [name for name in ("step [-]", "mount", "measure") if name in listed]
     for (step, *done), rows in listed.groupby(said, sort=False):
         work = ", ".join(f"{verb} {what}" for verb, what in zip(said[1:], done, strict=True))
         print_table(rows.drop(columns=said), f"Step {step}: {work}, turn about own axes")
     print_table(
-        characteristic_table(results),
-        f"{name}: final angles against {prepared.plan.chain.datum}, before and after adjusting",
+        answer.characteristics,
+        f"{study.name or study.plan.name}: final angles against {study.plan.chain.datum}, before and after adjusting",
     )
-    say(document)
+    say(answer.document)

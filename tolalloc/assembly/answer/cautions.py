@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.assembly.answer.characteristics import MISSED, characteristic_table, has_limits, larger
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts
+from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
+from tolalloc.assembly.answer.characteristics import MISSED, has_limits, larger
 from tolalloc.assembly.answer.tables import at_precision
 from tolalloc.assembly.answer.tolerance_tables import is_retuned, limited_tolerances
 from tolalloc.assembly.answer.transmission import risen
@@ -24,56 +24,56 @@ _SAME = 1e-6
 """Share by which totals may differ by rounding [-]."""
 
 
-def warnings(results: AssemblyResults) -> tuple[str, ...]:
+def warnings(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
-    rose, tolerances = larger(results), limited_tolerances(results)
+    rose, tolerances = larger(answer), limited_tolerances(answer)
     return (
-        *_not_there(results),
-        *_beyond(results),
-        *_missed(results),
+        *_not_there(answer),
+        *_beyond(answer),
+        *_missed(answer),
         *((f"Adjusting leaves larger than unadjusted: {', '.join(rose)}.",) if rose else ()),
-        *_fewer(results),
-        *_risen(results),
-        *_failed(results),
-        *_unlimited(results),
-        *((f"No angular tolerances are given. {results.unreachable}",) if results.unreachable else ()),
+        *_fewer(answer),
+        *_risen(answer),
+        *_failed(answer),
+        *_unlimited(answer),
+        *((f"No angular tolerances are given. {answer.unreachable}",) if answer.unreachable else ()),
         *(_of_tolerances(tolerances) if tolerances else ()),
     )
 
 
-def _not_there(results: AssemblyResults) -> tuple[str, ...]:
+def _not_there(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return which steps turn parts that are mounted later."""
-    order = [step.mount for step in results.plan.steps]
-    steps = [str(at + 1) for at, step in enumerate(results.plan.steps) if set(step.adjust) - set(order[: at + 1])]
+    order = [step.mount for step in answer.plan.steps]
+    steps = [str(at + 1) for at, step in enumerate(answer.plan.steps) if set(step.adjust) - set(order[: at + 1])]
     return (f"Turns of parts that are mounted later cannot be made: steps {', '.join(steps)}.",) if steps else ()
 
 
-def _beyond(results: AssemblyResults) -> tuple[str, ...]:
+def _beyond(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return which measured errors are larger than their tolerance."""
-    if results.measured is None:
+    if answer.measured is None:
         return ()
-    tolerances = results.plan.tolerances
+    tolerances = answer.plan.tolerances
     # Both come from decimals of an arcsecond; an error equal to its tolerance is not beyond it.
-    beyond = np.abs(results.measured.errors) > tolerances * (1 + 1e-12)
+    beyond = np.abs(answer.measured.errors) > tolerances * (1 + 1e-12)
     found = [
-        f"{name} about {'xyz'[axis]} ({results.measured.errors[at, axis] / ARCSECOND:+.2f}″, "
+        f"{name} about {'xyz'[axis]} ({answer.measured.errors[at, axis] / ARCSECOND:+.2f}″, "
         f"±{tolerances[at, axis] / ARCSECOND:g}″)"
-        for (at, name), axis in product(enumerate(results.plan.chain.names), range(3))
+        for (at, name), axis in product(enumerate(answer.plan.chain.names), range(3))
         if beyond[at, axis]
     ]
     return (f"Beyond their stated tolerance: {', '.join(found)}.",) if found else ()
 
 
-def _missed(results: AssemblyResults) -> tuple[str, ...]:
+def _missed(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return which limits are not kept, by the measured parts or by the stated tolerances, and what would keep them."""
-    frame = characteristic_table(results)
+    frame = answer.characteristics
     if "OK" not in frame:
         return ()
     missed, doubted = (
         ", ".join(map(_limited, frame[frame["OK"] == word].to_dict("records"))) for word in ("no", "in doubt")
     )
-    by = "Adjusted, these parts" if results.measured else "Three standard deviations under the stated tolerances"
-    remedy = f" {_remedy(results.measured)}" if results.measured else ""
+    by = "Adjusted, these parts" if answer.measured else "Three standard deviations under the stated tolerances"
+    remedy = f" {_remedy(answer.measured)}" if answer.measured else ""
     doubt = "Kept as listed, but three standard deviations of what the turns miss reach beyond the limit"
     return (
         *((f"{by} miss limits: {missed}.{remedy}",) if missed else ()),
@@ -87,45 +87,45 @@ def _limited(row: dict[Hashable, Any]) -> str:
     return f"{row['angle']} of {row['characteristic']} ({after:.2f}{missed}″, limit {row['limit [arcsec]']:g}″)"
 
 
-def _remedy(measured: MeasuredParts) -> str:
+def _remedy(measured: AdjustedParts) -> str:
     if measured.keeping is None:
         return "No precision that was tried keeps them all."
     return f"Turned as listed for a precision of {measured.keeping:.4g}, they keep them all."
 
 
-def _fewer(results: AssemblyResults) -> tuple[str, ...]:
+def _fewer(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return whether it is better to leave alone what was adjusted before."""
-    total = results.sweep.total[at_precision(results)]
-    if results.fewer is None or results.fewer >= total * (1 - _SAME):
+    total = answer.sweep.total[at_precision(answer)]
+    if answer.fewer is None or answer.fewer >= total * (1 - _SAME):
         return ()
-    noise = results.plan.adjustment_noise / ARCSECOND
+    noise = answer.plan.adjustment_noise / ARCSECOND
     why = f": every further adjustment misses by {noise:g}″ itself" if noise else ""
     return (
-        f"Turning at every step only the part just mounted leaves {results.fewer / ARCSECOND:.2f}″ rms instead of "
+        f"Turning at every step only the part just mounted leaves {answer.fewer / ARCSECOND:.2f}″ rms instead of "
         f"{total / ARCSECOND:.2f}″{why}.",
     )
 
 
-def _risen(results: AssemblyResults) -> tuple[str, ...]:
+def _risen(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return which outputs of the transmission adjusting leaves larger, and how that can be."""
-    effect = results.transmission
-    rose = risen(effect, results.plan.precision) if effect else ()
+    effect = answer.transmission
+    rose = risen(effect, answer.plan.precision) if effect else ()
     if effect is None or not rose:
         return ()
     of_them = "" if effect.good.size == 1 else f", medians of {int(effect.good.sum())} random assemblies"
     return (f"Adjusting leaves larger than unadjusted{of_them}: {', '.join(rose)}. {WHY_LARGER}",)
 
 
-def _unlimited(results: AssemblyResults) -> tuple[str, ...]:
+def _unlimited(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return that costs alone make no tolerances."""
-    if results.plan.requirements is None or has_limits(results):
+    if answer.plan.requirements is None or has_limits(answer):
         return ()
     return ("No limits are stated, so no angular tolerances are given.",)
 
 
-def _failed(results: AssemblyResults) -> tuple[str, ...]:
+def _failed(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return how many random assemblies are left out."""
-    failed = int((~results.transmission.good).sum()) if results.transmission else 0
+    failed = int((~answer.transmission.good).sum()) if answer.transmission else 0
     return (f"Assemblies without equilibrium, left out of the transmission: {failed}.",) if failed else ()
 
 
@@ -144,12 +144,11 @@ def _of_tolerances(tolerances: AngularTolerances) -> tuple[str, ...]:
     return tuple(found)
 
 
-def assumptions(results: AssemblyResults) -> tuple[str, ...]:
+def assumptions(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return what no source states."""
-    transmission = results.transmission
+    transmission = answer.transmission
     return (
-        *results.plan.assumptions,
-        *(transmission.reducer.assumptions if transmission else ()),
+        *answer.header.assumptions,
         "angles are small: they add up as vectors; what finite rotations change is stated",
         "errors of parts, readings and adjustments are normal and independent; a tolerance is three standard "
         "deviations",
@@ -160,12 +159,12 @@ def assumptions(results: AssemblyResults) -> tuple[str, ...]:
                 "all parts are measured before the first is mounted, exactly, and turned as listed, without measuring "
                 "again",
             )
-            if results.measured
+            if answer.measured
             else ()
         ),
         *(
             ("the certificates hold for fixed gains; the filter of the adjusted tolerances expects the stated ones",)
-            if limited_tolerances(results)
+            if limited_tolerances(answer)
             else ()
         ),
         *(("every error of the reducer but these angles is zero",) if transmission else ()),

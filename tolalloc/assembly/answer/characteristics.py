@@ -6,39 +6,39 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.results import AssemblyResults, MeasuredParts
+from tolalloc.assembly.answer.answer import AdjustedParts, AssemblyAnswer
 from tolalloc.assembly.answer.tables import READ, at_precision, rounded, tilt_and_rotation
 from tolalloc.units import ARCSECOND
 
 MISSED = "turns miss, 3σ [arcsec]"
 
 
-def has_limits(results: AssemblyResults) -> bool:
+def has_limits(answer: AssemblyAnswer) -> bool:
     """Return whether any angle is limited; costs may be stated without."""
-    required = results.plan.requirements
+    required = answer.plan.requirements
     return required is not None and bool(np.isfinite([required.tilt_limit, required.rotation_limit]).any())
 
 
-def characteristic_table(results: AssemblyResults) -> pd.DataFrame:
+def characteristic_table(answer: AssemblyAnswer) -> pd.DataFrame:
     """Return tilt and rotation of every characteristic before and after adjusting, and its limits if any are stated."""
-    if results.measured:
-        columns = _measured_finals(results.measured)
+    if answer.measured:
+        columns = _measured_finals(answer.measured)
     else:
-        sweep, at = results.sweep, at_precision(results)
+        sweep, at = answer.sweep, at_precision(answer)
         finals = 3 * np.concatenate([sweep.tilt, sweep.rotation], axis=1) / ARCSECOND
         columns = {
             "before, 3σ [arcsec]": finals[0],
             "after, 3σ [arcsec]": finals[at],
-            "noise, 3σ [arcsec]": _noise_alone(results),
+            "noise, 3σ [arcsec]": _noise_alone(answer),
         }
-    names = results.plan.chain.names
+    names = answer.plan.chain.names
     frame = rounded(
         pd.DataFrame(
             {"characteristic": names * 2, "angle": ["tilt"] * len(names) + ["rotation"] * len(names)} | columns
         )
     )
-    required = results.plan.requirements
-    if required is None or not has_limits(results):
+    required = answer.plan.requirements
+    if required is None or not has_limits(answer):
         return frame
     limits = np.concatenate([required.tilt_limit, required.rotation_limit]) / ARCSECOND
     limited = rounded(frame.assign(**{"limit [arcsec]": np.where(np.isfinite(limits), limits, np.nan)}))
@@ -56,13 +56,13 @@ def _kept(row: pd.Series) -> str:
     return "in doubt" if after + row.get(MISSED, 0.0) > limit else "yes"
 
 
-def _noise_alone(results: AssemblyResults) -> Float[np.ndarray, " characteristic"]:
+def _noise_alone(answer: AssemblyAnswer) -> Float[np.ndarray, " characteristic"]:
     """Return three standard deviations of tilts, then of rotations, that perfect parts would be left with [arcsec]."""
-    errors = results.gains.errors
+    errors = answer.gains.errors
     return np.concatenate(tilt_and_rotation(3 * np.sqrt(np.diag(errors.noise_covariance)))) / ARCSECOND
 
 
-def _measured_finals(measured: MeasuredParts) -> dict[str, Float[np.ndarray, " characteristic"]]:
+def _measured_finals(measured: AdjustedParts) -> dict[str, Float[np.ndarray, " characteristic"]]:
     """Return tilts before rotations, unadjusted, adjusted and what the turns miss [arcsec]."""
     before, after = (
         np.concatenate(tilt_and_rotation(each.ravel())) for each in (measured.unadjusted, measured.adjusted)
@@ -73,8 +73,8 @@ def _measured_finals(measured: MeasuredParts) -> dict[str, Float[np.ndarray, " c
     return {name: values / ARCSECOND for name, values in columns.items()}
 
 
-def larger(results: AssemblyResults) -> tuple[str, ...]:
+def larger(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return which tilts and rotations adjusting leaves larger, with both values."""
-    frame = characteristic_table(results)
+    frame = answer.characteristics
     rose = frame.iloc[:, 3].abs().round(READ) > frame.iloc[:, 2].abs().round(READ)
     return tuple(f"{row[1]} of {row[0]} ({row[2]:.2f} → {row[3]:.2f}″)" for row in frame[rose].itertuples(index=False))

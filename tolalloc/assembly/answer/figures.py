@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults
+from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.tables import at_precision, norm_of, states, tilt_and_rotation
 from tolalloc.assembly.answer.tolerance_tables import is_priced
 from tolalloc.assembly.plan import AssemblyPlan
@@ -13,18 +13,18 @@ from tolalloc.report.figure import Figure, Series
 from tolalloc.units import ARCSECOND
 
 
-def step_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
+def step_figures(answer: AssemblyAnswer) -> tuple[Figure, Figure]:
     """Return tilt and rotation of every characteristic from the step that mounts it."""
-    tilt, rotation = tilt_and_rotation(states(results))
-    kind = "" if results.measured else ", three standard deviations"
+    tilt, rotation = tilt_and_rotation(states(answer))
+    kind = "" if answer.measured else ", three standard deviations"
     return (
-        _over_steps(results, "tilt", f"tilt{kind} [arcsec]", tilt),
-        _over_steps(results, "rotation", f"rotation{kind} [arcsec]", rotation),
+        _over_steps(answer, "tilt", f"tilt{kind} [arcsec]", tilt),
+        _over_steps(answer, "rotation", f"rotation{kind} [arcsec]", rotation),
     )
 
 
-def _over_steps(results: AssemblyResults, name: str, y_label: str, angles: Float[np.ndarray, "step 2 part"]) -> Figure:
-    mounted = [step.mount for step in results.plan.steps]
+def _over_steps(answer: AssemblyAnswer, name: str, y_label: str, angles: Float[np.ndarray, "step 2 part"]) -> Figure:
+    mounted = [step.mount for step in answer.plan.steps]
     where = np.arange(1, len(mounted) + 1)[:, np.newaxis] + [0.0, 0.5]
     return Figure(
         name=name,
@@ -38,22 +38,22 @@ def _over_steps(results: AssemblyResults, name: str, y_label: str, angles: Float
                 x=list(where[mounted.index(part) :].ravel()),
                 y=list(angles[mounted.index(part) :, :, at].ravel() / ARCSECOND),
             )
-            for at, part in enumerate(results.plan.chain.names)
+            for at, part in enumerate(answer.plan.chain.names)
         ),
     )
 
 
-def sweep_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
+def sweep_figures(answer: AssemblyAnswer) -> tuple[Figure, Figure]:
     """Return what is left over the precision, and against the effort."""
-    sweep = results.sweep
+    sweep = answer.sweep
     total, floor = sweep.total / ARCSECOND, (sweep.noise_floor / ARCSECOND, "")
     turned = sweep.precisions > 0
     expected = Series(
         label="to be expected of all angles, rms", kind="line", x=list(sweep.precisions[turned]), y=list(total[turned])
     )
     measured: tuple[Series, ...] = ()
-    if results.measured:
-        name, norms = f"{norm_of(results)} of {results.measured.name}", results.measured.norms[turned] / ARCSECOND
+    if answer.measured:
+        name, norms = f"{norm_of(answer)} of {answer.measured.name}", answer.measured.norms[turned] / ARCSECOND
         measured = (Series(label=name, kind="line", x=expected.x, y=list(norms)),)
     return (
         Figure(
@@ -61,7 +61,7 @@ def sweep_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
             title="What is left of the angles over the precision; dashed: to be expected however large it is",
             x_label="precision Q [-]",
             y_label="all final angles together [arcsec]",
-            series=(expected, *measured, *_asked(results)),
+            series=(expected, *measured, *_asked(answer)),
             horizontal=(floor,),
             logarithmic_x=True,
         ),
@@ -76,9 +76,9 @@ def sweep_figures(results: AssemblyResults) -> tuple[Figure, Figure]:
     )
 
 
-def _asked(results: AssemblyResults) -> tuple[Series, ...]:
+def _asked(answer: AssemblyAnswer) -> tuple[Series, ...]:
     """Return the precision that was asked for; 0 has no place on a logarithmic axis."""
-    precision, total = results.plan.precision, results.sweep.total[at_precision(results)] / ARCSECOND
+    precision, total = answer.plan.precision, answer.sweep.total[at_precision(answer)] / ARCSECOND
     return (Series(label=f"at Q = {precision:g}", kind="points", x=[precision], y=[total]),) if precision > 0 else ()
 
 

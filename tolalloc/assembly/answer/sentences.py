@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts, TransmissionEffect
+from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer, TransmissionEffect
 from tolalloc.assembly.answer.tables import at_precision, norm_of
 from tolalloc.assembly.answer.tolerance_tables import is_priced, is_retuned, limited_tolerances, verified_name
 from tolalloc.assembly.answer.transmission import LINE_LOAD, PIN_FORCE, RATED_PEAK_TO_PEAK, answers, change, perfect
@@ -15,42 +15,42 @@ LITTLE = 0.01
 """Share of all final angles below which another unit of precision buys little [-]."""
 
 
-def answer(results: AssemblyResults) -> tuple[str, ...]:
+def sentences(answer: AssemblyAnswer) -> tuple[str, ...]:
     """Return the answer in sentences."""
-    tolerances, effect = limited_tolerances(results), results.transmission
+    tolerances, effect = limited_tolerances(answer), answer.transmission
     return (
-        _measured(results, results.measured) if results.measured else _expected(results),
-        _diminishing(results),
-        *(_transmission(effect, results.plan.precision) if effect else ()),
-        *(_costs(results, tolerances) if tolerances else ()),
+        _measured(answer, answer.measured) if answer.measured else _expected(answer),
+        _diminishing(answer),
+        *(_transmission(effect, answer.plan.precision) if effect else ()),
+        *(_costs(answer, tolerances) if tolerances else ()),
     )
 
 
-def _measured(results: AssemblyResults, measured: MeasuredParts) -> str:
-    before, after = measured.norms[[0, at_precision(results)]] / ARCSECOND
+def _measured(answer: AssemblyAnswer, measured: AdjustedParts) -> str:
+    before, after = measured.norms[[0, at_precision(answer)]] / ARCSECOND
     return (
-        f"{measured.name}: adjusting at a precision of {results.plan.precision:g} takes the {norm_of(results)} of all "
+        f"{measured.name}: adjusting at a precision of {answer.plan.precision:g} takes the {norm_of(answer)} of all "
         f"final angles from {before:.2f}″ to {after:.2f}″, if every part is turned exactly as listed."
     )
 
 
-def _expected(results: AssemblyResults) -> str:
-    sweep, at = results.sweep, at_precision(results)
+def _expected(answer: AssemblyAnswer) -> str:
+    sweep, at = answer.sweep, at_precision(answer)
     before, after, floor = np.array([sweep.total[0], sweep.total[at], sweep.noise_floor]) / ARCSECOND
     return (
         f"Parts within the stated tolerances leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ "
-        f"adjusted at a precision of {results.plan.precision:g}; however large the precision, this plan leaves "
+        f"adjusted at a precision of {answer.plan.precision:g}; however large the precision, this plan leaves "
         f"{floor:.2f}″."
     )
 
 
-def _diminishing(results: AssemblyResults) -> str:
+def _diminishing(answer: AssemblyAnswer) -> str:
     """Return where another unit of precision buys little, and where it makes things worse."""
-    sweep = results.sweep
+    sweep = answer.sweep
     found = sweep.diminished(LITTLE)
     floor = (
         f"; however large the precision, this plan leaves {sweep.noise_floor / ARCSECOND:.2f}″ rms of it"
-        if results.measured
+        if answer.measured
         else ""
     )
     if found is None:
@@ -86,7 +86,7 @@ def _transmission(effect: TransmissionEffect, precision: float) -> tuple[str, ..
     )
 
 
-def _costs(results: AssemblyResults, tolerances: AngularTolerances) -> tuple[str, ...]:
+def _costs(answer: AssemblyAnswer, tolerances: AngularTolerances) -> tuple[str, ...]:
     """Return what the cheapest tolerances cost, with and without adjusting."""
     adjusted, best = tolerances.adjusted, tolerances.retuned.best
     without = (
@@ -105,31 +105,31 @@ def _costs(results: AssemblyResults, tolerances: AngularTolerances) -> tuple[str
         f"{adjusted.gains.precision:g}, {without}. Certified: with these gains no "
         f"tolerances that keep them cost less than {adjusted.bound:.2f} (gap {max(adjusted.gap, 0.0):.1g}).",
         tuned,
-        *_best_precision(results, tolerances),
-        _verified(results, tolerances),
+        *_best_precision(answer, tolerances),
+        _verified(answer, tolerances),
     )
 
 
-def _best_precision(results: AssemblyResults, tolerances: AngularTolerances) -> tuple[str, ...]:
+def _best_precision(answer: AssemblyAnswer, tolerances: AngularTolerances) -> tuple[str, ...]:
     """Return the precision that costs least, nothing where turning has no price."""
     found = tolerances.by_precision
-    if not is_priced(results.plan):
+    if not is_priced(answer.plan):
         return ()
     end = "" if found.interior else ", the end of the range that was searched"
     return (
         f"With effort priced, a precision of {found.best.gains.precision:.4g}{end} costs least: "
-        f"{found.best.total:.2f} cost units, {tolerances.adjusted.total:.2f} at {results.plan.precision:g}.",
+        f"{found.best.total:.2f} cost units, {tolerances.adjusted.total:.2f} at {answer.plan.precision:g}.",
     )
 
 
-def _verified(results: AssemblyResults, tolerances: AngularTolerances) -> str:
+def _verified(answer: AssemblyAnswer, tolerances: AngularTolerances) -> str:
     """Return how many random assemblies keep all limits, and with which of the tolerances."""
     share, precision = tolerances.verification.share, f"a precision of {tolerances.verified.gains.precision:.4g}"
     which = {
         "adjusted": f"the tolerances for {precision}",
         "re-tuned": f"the tolerances of the tuned filter at {precision}",
         "best precision": f"the tolerances for the best precision of {tolerances.verified.gains.precision:.4g}",
-    }[verified_name(results.plan, tolerances)]
+    }[verified_name(answer.plan, tolerances)]
     return (
         f"Of {tolerances.verification.assemblies} random assemblies with {which}, {share.estimate:.2%} are within all "
         f"limits at once (95 % interval {share.low:.2%}…{share.high:.2%})."

@@ -8,40 +8,38 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.assembly.answer import tables, tolerance_tables
-from tolalloc.assembly.answer.cautions import warnings
-from tolalloc.assembly.answer.characteristics import characteristic_table, has_limits
+from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer, TransmissionEffect
+from tolalloc.assembly.answer.characteristics import has_limits
 from tolalloc.assembly.answer.plan_record import plain, plan_record
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts, TransmissionEffect
-from tolalloc.assembly.answer.transmission import difference_table, fallen_table, value_table
 from tolalloc.units import ARCSECOND
 
 
-def summary(results: AssemblyResults) -> dict[str, Any]:
+def summary(answer: AssemblyAnswer) -> dict[str, Any]:
     """Return the whole answer."""
-    plan, sweep, at = results.plan, results.sweep, tables.at_precision(results)
-    tolerances = tolerance_tables.limited_tolerances(results)
+    plan, sweep, at = answer.plan, answer.sweep, tables.at_precision(answer)
+    tolerances, made = tolerance_tables.limited_tolerances(answer), answer.tables
     return {
         "assembly": plan.name,
         "source": plan.source,
-        "reducer": results.transmission.reducer.name if results.transmission else None,
+        "reducer": answer.transmission.reducer.name if answer.transmission else None,
         "precision [-]": plan.precision,
-        "seed": results.seed,
+        "seed": answer.header.seed,
         "plan": plan_record(plan),
         "expected rms unadjusted [arcsec]": plain(sweep.total[0], ARCSECOND),
         "expected rms adjusted [arcsec]": plain(sweep.total[at], ARCSECOND),
         "left however large the precision [arcsec]": plain(sweep.noise_floor, ARCSECOND),
         "turning only what was just mounted, rms [arcsec]": (
-            None if results.fewer is None else plain(results.fewer, ARCSECOND)
+            None if answer.fewer is None else plain(answer.fewer, ARCSECOND)
         ),
         "expected effort [arcsec²]": plain(sweep.effort[at], ARCSECOND**2),
         "diminished from precision [-]": sweep.diminished(),
-        "measured": _measured(results, results.measured) if results.measured else None,
-        "steps": _records(tables.step_table(results)),
-        "characteristics": _records(characteristic_table(results)),
-        "sweep": _records(tables.sweep_table(results)),
-        "transmission": _transmission(results.transmission) if results.transmission else None,
-        "tolerances": _tolerances(results, tolerances) if tolerances else None,
-        "warnings": list(warnings(results)),
+        "measured": _measured(answer, answer.measured) if answer.measured else None,
+        "steps": _records(made["steps"]),
+        "characteristics": _records(made["characteristics"]),
+        "sweep": _records(made["sweep"]),
+        "transmission": _transmission(answer.transmission, made) if answer.transmission else None,
+        "tolerances": _tolerances(answer, tolerances) if tolerances else None,
+        "warnings": list(answer.warnings),
     }
 
 
@@ -51,38 +49,38 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(name): value for name, value in row.items()} for row in rows]
 
 
-def _measured(results: AssemblyResults, measured: MeasuredParts) -> dict[str, Any]:
-    before, after = plain(measured.norms[[0, tables.at_precision(results)]], ARCSECOND)
+def _measured(answer: AssemblyAnswer, measured: AdjustedParts) -> dict[str, Any]:
+    before, after = plain(measured.norms[[0, tables.at_precision(answer)]], ARCSECOND)
     return {
         "name": measured.name,
-        f"{tables.norm_of(results)} unadjusted [arcsec]": before,
-        f"{tables.norm_of(results)} adjusted [arcsec]": after,
+        f"{tables.norm_of(answer)} unadjusted [arcsec]": before,
+        f"{tables.norm_of(answer)} adjusted [arcsec]": after,
         "largest difference by finite rotations [arcsec]": plain(finite_difference(measured)),
         **(
             {"smallest precision tried that keeps all limits [-]": measured.keeping and plain(measured.keeping)}
-            if has_limits(results)
+            if has_limits(answer)
             else {}
         ),
-        "angles": _records(tables.angle_table(results)),
+        "angles": _records(answer.tables["angles"]),
     }
 
 
-def finite_difference(measured: MeasuredParts) -> float:
+def finite_difference(measured: AdjustedParts) -> float:
     """Return the largest difference that finite rotations make in an angle that nobody adjusts [arcsec]."""
     return float(np.abs(measured.exact - measured.unadjusted).max()) / ARCSECOND
 
 
-def _transmission(effect: TransmissionEffect) -> dict[str, Any]:
+def _transmission(effect: TransmissionEffect, made: dict[str, pd.DataFrame]) -> dict[str, Any]:
     return {
         "assemblies [-]": int(effect.good.size),
         "failed [-]": int((~effect.good).sum()),
-        "values": _records(value_table(effect)),
-        "above perfect parts": _records(difference_table(effect)),
-        "smaller than unadjusted": _records(fallen_table(effect)),
+        "values": _records(made["transmission"]),
+        "above perfect parts": _records(made["above perfect parts"]),
+        "smaller than unadjusted": _records(made.get("smaller than unadjusted", pd.DataFrame())),
     }
 
 
-def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> dict[str, Any]:
+def _tolerances(answer: AssemblyAnswer, tolerances: AngularTolerances) -> dict[str, Any]:
     verified, unadjusted = tolerances.verification, tolerances.unadjusted
     return {
         "cost unadjusted [cost units]": None if isinstance(unadjusted, str) else plain(unadjusted.total),
@@ -91,14 +89,14 @@ def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> dict
         "cost re-tuned [cost units]": plain(tolerances.retuned.best.total),
         "re-tuning settled": tolerances.retuned.settled,
         "best precision [-]": (
-            plain(tolerances.by_precision.best.gains.precision) if tolerance_tables.is_priced(results.plan) else None
+            plain(tolerances.by_precision.best.gains.precision) if tolerance_tables.is_priced(answer.plan) else None
         ),
-        "verified": tolerance_tables.verified_name(results.plan, tolerances),
+        "verified": tolerance_tables.verified_name(answer.plan, tolerances),
         "assemblies [-]": verified.assemblies,
         "within all limits [-]": verified.share.estimate,
         "low 2.5 % [-]": verified.share.low,
         "high 97.5 % [-]": verified.share.high,
-        "parts": _records(tolerance_tables.tolerance_table(results.plan, tolerances)),
-        "limits": _records(tolerance_tables.limit_table(results.plan, tolerances)),
-        "certificates": _records(tolerance_tables.certificate_table(results.plan, tolerances)),
+        "parts": _records(answer.tables["angular tolerances"]),
+        "limits": _records(answer.tables["limits"]),
+        "certificates": _records(answer.tables["certificates"]),
     }

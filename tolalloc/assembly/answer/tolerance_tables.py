@@ -9,8 +9,8 @@ import pandas as pd
 
 from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem
+from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.characteristics import has_limits
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults
 from tolalloc.assembly.answer.tables import rounded
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.units import ARCSECOND
@@ -19,9 +19,9 @@ _NOTHING = 1e-6
 """Share of the cost below which one filter is as cheap as another; solvers differ by less [-]."""
 
 
-def limited_tolerances(results: AssemblyResults) -> AngularTolerances | None:
+def limited_tolerances(answer: AssemblyAnswer) -> AngularTolerances | None:
     """Return the cheapest tolerances; where nothing is limited, none mean anything."""
-    return results.tolerances if has_limits(results) else None
+    return answer.tolerances if has_limits(answer) else None
 
 
 def is_priced(plan: AssemblyPlan) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.results import TransmissionEffect
+from tolalloc.assembly.answer.answer import TransmissionEffect
 from tolalloc.assembly.answer.tables import rounded
 from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK

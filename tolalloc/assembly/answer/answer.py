@@ -1,9 +1,10 @@
-"""Everything a report on an assembly is made of."""
+"""The answer on an assembly, and everything that it is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,12 +16,17 @@ from tolalloc.assembly.orientations import TransmissionCurves
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import PrecisionSweep
 from tolalloc.assembly.trajectory import Trajectory
+from tolalloc.report.answer import Answer
+from tolalloc.report.document import Section
 from tolalloc.rv.equivalent.line_load import ContactPattern
 from tolalloc.rv.reducer.design import Reducer
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 @dataclass(frozen=True, kw_only=True)
-class MeasuredParts:
+class AdjustedParts:
     """Parts whose errors are known, and what is turned.
 
     Parameters
@@ -129,8 +135,8 @@ class AngularTolerances:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AssemblyResults:
-    """One assembly.
+class AssemblyAnswer(Answer):
+    """One assembly: what is turned, what it leaves, what that does, and what angular tolerances cost.
 
     Parameters
     ----------
@@ -154,20 +160,73 @@ class AssemblyResults:
         Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep.
     unreachable
         Why there are none; empty unless limits are out of reach.
-    seed
-        Seed of the random numbers [-].
-    statuses
-        Outcome → number of solved units [-].
     """
 
+    kind: ClassVar[str] = "assembly"
     plan: AssemblyPlan
     gains: Gains
     sweep: PrecisionSweep
     expected: Float[np.ndarray, "step 2 state"]
     fewer: float | None
-    measured: MeasuredParts | None
+    measured: AdjustedParts | None
     transmission: TransmissionEffect | None
     tolerances: AngularTolerances | None
     unreachable: str
-    seed: int
-    statuses: Mapping[str, int]
+
+    @property
+    def title(self) -> str:
+        """What is assembled."""
+        return f"Assembly of {self.plan.name}"
+
+    @property
+    def subtitle(self) -> str:
+        """How many parts on which datum, at which precision, and which parts."""
+        plan, parts = self.plan, self.measured.name if self.measured else "parts within the stated tolerances"
+        return f"{len(plan.chain.names)} parts on {plan.chain.datum}, precision {plan.precision:g}, {parts}"
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What adjusting is worth, each sentence no stronger than what was computed."""
+        from tolalloc.assembly.answer.sentences import sentences
+
+        return sentences(self)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        from tolalloc.assembly.answer.cautions import warnings
+
+        return warnings(self)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Steps, precision, transmission, tolerances, finite rotations."""
+        from tolalloc.assembly.answer.sections import sections
+
+        return sections(self)
+
+    @cached_property
+    def characteristics(self) -> pd.DataFrame:
+        """Tilt and rotation of every characteristic before and after adjusting."""
+        from tolalloc.assembly.answer.characteristics import characteristic_table
+
+        return characteristic_table(self)
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All tables by name, units in the headers."""
+        return {name: frame for section in self.sections for name, frame in section.tables}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        from tolalloc.assembly.answer.cautions import assumptions
+
+        return assumptions(self)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units in the names."""
+        from tolalloc.assembly.answer.summary import summary
+
+        return summary(self)

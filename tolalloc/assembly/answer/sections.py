@@ -1,16 +1,15 @@
-"""An assembly as a report: what is turned, what it leaves, what that does, and what angular tolerances cost."""
+"""The sections of the report on an assembly: steps, precision, transmission, tolerances, finite rotations."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tolalloc.assembly.answer import figures, tables, tolerance_tables, transmission
-from tolalloc.assembly.answer.cautions import WHY_LARGER, assumptions, warnings
-from tolalloc.assembly.answer.characteristics import characteristic_table, larger
-from tolalloc.assembly.answer.results import AngularTolerances, AssemblyResults, MeasuredParts, TransmissionEffect
-from tolalloc.assembly.answer.sentences import answer
-from tolalloc.assembly.answer.summary import finite_difference, summary
-from tolalloc.report.document import Document, Section
+from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer, TransmissionEffect
+from tolalloc.assembly.answer.cautions import WHY_LARGER
+from tolalloc.assembly.answer.characteristics import larger
+from tolalloc.assembly.answer.summary import finite_difference
+from tolalloc.report.document import Section
 from tolalloc.units import ARCSECOND
 
 _EXPECTED = (
@@ -25,60 +24,60 @@ _MISSED = (
 )
 
 
-def _steps(results: AssemblyResults) -> Section:
+def _steps(answer: AssemblyAnswer) -> Section:
     """Return how errors build up and are adjusted."""
-    measured = results.measured
-    angles = (("angles", tables.angle_table(results)),) if measured else ()
+    measured = answer.measured
+    angles = (("angles", tables.angle_table(answer)),) if measured else ()
     return Section(
         heading="How errors build up and are adjusted",
         paragraphs=(
             f"A part is mounted, {'' if measured else 'then measured, '}then the parts of that step are turned about "
             "their own axes, positive by the right hand. Tilt is √(x² + y²) and rotation z of a characteristic against "
-            f"{results.plan.chain.datum}.",
-            *((_MISSED, *_larger_angles(results, measured)) if measured else (_EXPECTED,)),
+            f"{answer.plan.chain.datum}.",
+            *((_MISSED, *_larger_angles(answer, measured)) if measured else (_EXPECTED,)),
         ),
-        figures=figures.step_figures(results),
+        figures=figures.step_figures(answer),
         tables=(
-            ("steps", tables.step_table(results)),
-            ("characteristics", characteristic_table(results)),
+            ("steps", tables.step_table(answer)),
+            ("characteristics", answer.characteristics),
             *angles,
-            ("gains", tables.gain_table(results)),
+            ("gains", tables.gain_table(answer)),
         ),
     )
 
 
-def _larger_angles(results: AssemblyResults, measured: MeasuredParts) -> tuple[str, ...]:
+def _larger_angles(answer: AssemblyAnswer, measured: AdjustedParts) -> tuple[str, ...]:
     """Return how many single angles adjusting leaves larger."""
     before, after = measured.unadjusted / ARCSECOND, measured.adjusted / ARCSECOND
     rose = np.argwhere(np.abs(after) > np.abs(before))
     if not rose.size:
         return ()
     named = ", ".join(
-        f"{results.plan.chain.names[at]} about {'xyz'[axis]} ({before[at, axis]:.2f} → {after[at, axis]:.2f}″)"
+        f"{answer.plan.chain.names[at]} about {'xyz'[axis]} ({before[at, axis]:.2f} → {after[at, axis]:.2f}″)"
         for at, axis in rose
     )
     return (
-        f"The {tables.norm_of(results)} of all angles falls, a single angle need not. Larger adjusted than unadjusted: "
+        f"The {tables.norm_of(answer)} of all angles falls, a single angle need not. Larger adjusted than unadjusted: "
         f"{len(rose)} of {before.size}, {named}.",
     )
 
 
-def _sweep(results: AssemblyResults) -> Section:
-    rose = larger(results)
+def _sweep(answer: AssemblyAnswer) -> Section:
+    rose = larger(answer)
     return Section(
         heading="Precision against effort",
         paragraphs=(
-            f"{_bought(results)} {len(rose) or 'None'} of {2 * len(results.plan.chain.names)} tilts and rotations "
-            f"{'is' if len(rose) == 1 else 'are'} larger than unadjusted at Q = {results.plan.precision:g}.",
+            f"{_bought(answer)} {len(rose) or 'None'} of {2 * len(answer.plan.chain.names)} tilts and rotations "
+            f"{'is' if len(rose) == 1 else 'are'} larger than unadjusted at Q = {answer.plan.precision:g}.",
         ),
-        figures=figures.sweep_figures(results),
-        tables=(("sweep", tables.sweep_table(results)),),
+        figures=figures.sweep_figures(answer),
+        tables=(("sweep", tables.sweep_table(answer)),),
     )
 
 
-def _bought(results: AssemblyResults) -> str:
+def _bought(answer: AssemblyAnswer) -> str:
     """Return what a larger precision does to all angles together, as far as the sweep shows."""
-    sweep = results.sweep
+    sweep = answer.sweep
     least = int(np.argmin(sweep.total))
     if (np.diff(sweep.total) <= 0).all() and sweep.total[least] < sweep.total[0]:
         each = "; each unit of Q buys less than the one before" if (np.diff(sweep.next_unit) <= 0).all() else ""
@@ -92,9 +91,9 @@ def _bought(results: AssemblyResults) -> str:
     )
 
 
-def _transmission(results: AssemblyResults, effect: TransmissionEffect) -> Section:
+def _transmission(answer: AssemblyAnswer, effect: TransmissionEffect) -> Section:
     fallen = transmission.fallen_table(effect)
-    which = "the measured parts" if results.measured else "the first random assembly; of others they look otherwise"
+    which = "the measured parts" if answer.measured else "the first random assembly; of others they look otherwise"
     return Section(
         heading="Transmission",
         paragraphs=(
@@ -107,7 +106,7 @@ def _transmission(results: AssemblyResults, effect: TransmissionEffect) -> Secti
         figures=(
             *transmission.curve_figures(effect),
             *transmission.precision_figures(effect),
-            transmission.pressure_map(effect, results.plan.precision),
+            transmission.pressure_map(effect, answer.plan.precision),
             transmission.deformation_figure(effect),
         ),
         tables=(
@@ -118,7 +117,7 @@ def _transmission(results: AssemblyResults, effect: TransmissionEffect) -> Secti
     )
 
 
-def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> Section:
+def _tolerances(answer: AssemblyAnswer, tolerances: AngularTolerances) -> Section:
     tuned = (
         "Re-tuned: it expects what is allocated with it."
         if tolerance_tables.is_retuned(tolerances)
@@ -126,7 +125,7 @@ def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> Sect
     )
     best = (
         " Best precision: the filter of the stated tolerances, at the precision that costs least."
-        if tolerance_tables.is_priced(results.plan)
+        if tolerance_tables.is_priced(answer.plan)
         else ""
     )
     return Section(
@@ -134,21 +133,21 @@ def _tolerances(results: AssemblyResults, tolerances: AngularTolerances) -> Sect
         paragraphs=(
             f"Adjusted: the filter expects parts of the stated tolerances. {tuned}{best} A lower bound takes no "
             "solver's word and holds for the gains of its own row.",
-            f"Verified is “{tolerance_tables.verified_name(results.plan, tolerances)}”. An assembly is within a limit "
+            f"Verified is “{tolerance_tables.verified_name(answer.plan, tolerances)}”. An assembly is within a limit "
             "where its own tilt or rotation is; three standard deviations of x and y together promise between 99.73 % "
             "and 99.99 % of that.",
         ),
-        figures=(figures.cost_figure(results.plan, tolerances),),
+        figures=(figures.cost_figure(answer.plan, tolerances),),
         tables=(
-            ("angular tolerances", tolerance_tables.tolerance_table(results.plan, tolerances)),
-            ("limits", tolerance_tables.limit_table(results.plan, tolerances)),
-            ("certificates", tolerance_tables.certificate_table(results.plan, tolerances)),
+            ("angular tolerances", tolerance_tables.tolerance_table(answer.plan, tolerances)),
+            ("limits", tolerance_tables.limit_table(answer.plan, tolerances)),
+            ("certificates", tolerance_tables.certificate_table(answer.plan, tolerances)),
             ("cost by precision", tolerance_tables.precision_table(tolerances)),
         ),
     )
 
 
-def _finite(measured: MeasuredParts) -> Section:
+def _finite(measured: AdjustedParts) -> Section:
     return Section(
         heading="Finite rotations",
         paragraphs=(
@@ -158,24 +157,13 @@ def _finite(measured: MeasuredParts) -> Section:
     )
 
 
-def assembly_document(results: AssemblyResults) -> Document:
-    """Return the report."""
-    plan, measured = results.plan, results.measured
-    tolerances = tolerance_tables.limited_tolerances(results)
-    parts = measured.name if measured else "parts within the stated tolerances"
-    return Document(
-        title=f"Assembly of {plan.name}",
-        subtitle=f"{len(plan.chain.names)} parts on {plan.chain.datum}, precision {plan.precision:g}, {parts}",
-        answer=answer(results),
-        warnings=warnings(results),
-        sections=(
-            _steps(results),
-            _sweep(results),
-            *((_transmission(results, results.transmission),) if results.transmission else ()),
-            *((_tolerances(results, tolerances),) if tolerances else ()),
-            *((_finite(measured),) if measured else ()),
-        ),
-        assumptions=assumptions(results),
-        summary=summary(results),
-        seed=results.seed,
+def sections(answer: AssemblyAnswer) -> tuple[Section, ...]:
+    """Return the sections of the report."""
+    tolerances = tolerance_tables.limited_tolerances(answer)
+    return (
+        _steps(answer),
+        _sweep(answer),
+        *((_transmission(answer, answer.transmission),) if answer.transmission else ()),
+        *((_tolerances(answer, tolerances),) if tolerances else ()),
+        *((_finite(answer.measured),) if answer.measured else ()),
     )
