@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Annotated
 
 import typer
@@ -50,6 +51,13 @@ def te(
         return
     print_table(answer.turn_table, answer.title)
     if attributed:
-        shown = answer.attribution_table.iloc[:, : 2 + _ORDERS].round(1)
-        print_table(shown, "What each source adds to the curve and to the main orders; minus cancels; all: --json")
+        shown = answer.attribution_table.iloc[:, : 2 + _ORDERS]
+        shown.columns = [str(name).removesuffix(" [arcsec]").removeprefix("order ") for name in shown]
+        words = "What each source adds to the curve and to the main orders [arcsec]; minus cancels; all: --json"
+        print_table(shown.map(_tenths), words)
     tell(answer)
+
+
+def _tenths(cell: str | float) -> str:
+    """Return a cell with one decimal; what is not there stays empty."""
+    return cell if isinstance(cell, str) else "" if isnan(cell) else f"{cell:.1f}"
