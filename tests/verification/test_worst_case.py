@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.worst_case import worst_case
+from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import DifferencedResponse
 from tolalloc.drawing.correlation import CorrelatedSource
 from tolalloc.drawing.error_model import ErrorModel
@@ -92,7 +92,7 @@ def test_of_a_linear_output_it_is_the_sum_of_the_worst_of_every_source(seed):
         largest_of_waves(slope[10:], 1.0),
     ]
     for sense in (1, -1):
-        found = worst_case(Experiment.of(linear(slope), MIXED, SEEDS), starts=8, steps=12, sense=sense)
+        found = worst_unit(Experiment.of(linear(slope), MIXED, SEEDS), starts=8, steps=12, sense=sense)
         np.testing.assert_allclose(found.by_zone[:4], sense * np.array(by_zone[:4]), rtol=1e-9)
         # 96 points of the shortest wave see at least cos(π/96) of its range.
         assert found.by_zone[4] == pytest.approx(sense * by_zone[4], rel=6e-4)
@@ -109,7 +109,7 @@ def test_of_a_convex_output_it_is_the_worst_corner(seed):
     root = generator.normal(size=(4, 4))
     response = Quadratic(errors.columns, generator.normal(size=4), root @ root.T)
     corners = np.array(list(product((-0.5, 0.5), repeat=4))) * errors.zones
-    found = worst_case(Experiment.of(response, errors, SEEDS))
+    found = worst_unit(Experiment.of(response, errors, SEEDS))
     assert found.value == pytest.approx(response(corners).values.max(), rel=1e-12)
     np.testing.assert_array_equal(found.x, corners[response(corners).values[:, 0].argmax()])
 
@@ -117,7 +117,7 @@ def test_of_a_convex_output_it_is_the_worst_corner(seed):
 def test_the_worst_size_may_lie_inside_its_zone():
     errors = ErrorModel((source("size", Feature.SIZE, 2.0), source("other", Feature.SIZE, 2.0)))
     response = Quadratic(errors.columns, np.array([-0.4, 0.0]), np.eye(2))
-    found = worst_case(Experiment.of(response, errors, SEEDS), sense=-1)
+    found = worst_unit(Experiment.of(response, errors, SEEDS), sense=-1)
     np.testing.assert_allclose(found.x, [0.4, 0.0], atol=0.02)
     assert found.value == pytest.approx(-0.08, abs=2e-4)
 
@@ -125,13 +125,13 @@ def test_the_worst_size_may_lie_inside_its_zone():
 def test_units_that_fail_stop_the_search_and_bad_questions_are_refused():
     slope = np.ones(len(MIXED.columns))
     with pytest.raises(SolveError, match="no usable answer"):
-        worst_case(Experiment.of(replace(linear(slope), failing=True), MIXED, SEEDS), starts=2, steps=2)
+        worst_unit(Experiment.of(replace(linear(slope), failing=True), MIXED, SEEDS), starts=2, steps=2)
     for starts, steps in ((0, 5), (5, 0)):
         with pytest.raises(InputError):
-            worst_case(Experiment.of(linear(slope), MIXED, SEEDS), starts=starts, steps=steps)
+            worst_unit(Experiment.of(linear(slope), MIXED, SEEDS), starts=starts, steps=steps)
     joint = CorrelatedSource(name="stiffness", columns=("stiffness",), covariance=np.eye(1))
     with pytest.raises(InputError, match="stiffness"):
-        worst_case(Experiment(linear(slope), ErrorModel(MIXED.sources, joint=(joint,)), MIXED.zones, SEEDS))
+        worst_unit(Experiment(linear(slope), ErrorModel(MIXED.sources, joint=(joint,)), MIXED.zones, SEEDS))
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +149,7 @@ def kernel(rv20e, errors) -> KernelResponse:
 
 @pytest.fixture(scope="module")
 def worst(kernel, errors):
-    return worst_case(Experiment.of(kernel, errors, SEEDS))
+    return worst_unit(Experiment.of(kernel, errors, SEEDS))
 
 
 def at_limit(errors: ErrorModel, units: int) -> np.ndarray:
@@ -171,12 +171,12 @@ def test_it_lies_inside_all_zones_and_beyond_every_random_unit_at_their_limits(k
 def test_its_change_with_the_zones_is_that_of_other_searches(kernel, errors, worst):
     # Searches from other starts differ by 0.3 %, so a difference over 40 % of the zones is good to 1.5 % of the value
     # over 40 %: 2 arcsec of all zones together, 240.
-    wide, narrow = (worst_case(Experiment(kernel, errors, errors.zones * by, SEEDS)).value for by in (1.2, 0.8))
+    wide, narrow = (worst_unit(Experiment(kernel, errors, errors.zones * by, SEEDS)).value for by in (1.2, 0.8))
     assert worst.by_zone @ errors.zones == pytest.approx((wide - narrow) / 0.4, rel=0.03)
 
 
 def test_it_is_the_same_again_and_for_seed_zero(kernel, errors):
-    found = [worst_case(Experiment.of(kernel, errors, SEEDS), starts=4, steps=4) for _ in range(2)]
+    found = [worst_unit(Experiment.of(kernel, errors, SEEDS), starts=4, steps=4) for _ in range(2)]
     np.testing.assert_array_equal(found[0].x, found[1].x)
     np.testing.assert_array_equal(found[0].ends, found[1].ends)
 
@@ -196,7 +196,7 @@ def test_other_outputs_have_a_worst_unit_by_differences(kernel, errors):
     outputs = OutputsResponse(kernel=kernel, readings=(REQUIREMENTS[-1],))
     output, steps = outputs.outputs[0], np.full(len(errors.columns), 1e-9)
     response = DifferencedResponse(response=outputs, output=output, steps=steps)
-    found = worst_case(Experiment.of(response, errors, SEEDS), starts=8, steps=20, sense=-1)
+    found = worst_unit(Experiment.of(response, errors, SEEDS), starts=8, steps=20, sense=-1)
     zones = {item.name: item.zone for item in errors.active}
     # Radii at their limits, and no less than the outermost pin at the outermost tooth if waves were half their range.
     radii = 8.0 - 1e6 * (zones["pin.diameter"] + zones["housing.groove.radius"]) / 2

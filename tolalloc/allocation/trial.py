@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.capability.worst_case import worst_case
+from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import DifferencedResponse
 from tolalloc.drawing.seeds import SeedTree
 from tolalloc.model import Evaluation
@@ -113,7 +113,7 @@ class FreshUnits:
         kernel = self._kernel_at(self.design)
         response = kernel if output == PEAK_TO_PEAK else self._differenced(output)
         zones = self.space.zones(self.design)
-        found = worst_case(Experiment(response, self.space.errors, zones, self.seeds.child(output)), sense=sense)
+        found = worst_unit(Experiment(response, self.space.errors, zones, self.seeds.child(output)), sense=sense)
         by_clearance = []
         for step in _CLEARANCE_STEP * np.eye(self.design.size)[-2:]:
             ends = [self._one(output, self.design + side * step, found.x) for side in (1, -1)]

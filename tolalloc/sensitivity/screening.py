@@ -11,9 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from SALib.analyze import pawn
-from SALib.analyze.delta import calc_delta
-from SALib.sample import morris
 
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
@@ -153,6 +150,8 @@ def elementary_effects(
         "groups": list(groups),
         "bounds": [[trim, 1.0 - trim]] * len(errors.columns),
     }
+    from SALib.sample import morris
+
     uniform = morris.sample(problem, trajectories, num_levels=levels, seed=seeds.child("sample").integer())
     evaluation = experiment.response(experiment.deviations(errors.standard_values(uniform)))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
@@ -284,12 +283,16 @@ def _pawn(
     columns: Float[np.ndarray, "unit measure"], y: Float[np.ndarray, " unit"], classes: int
 ) -> Float[np.ndarray, " measure"]:
     """Return SALib's PAWN index of every measure [-]."""
+    from SALib.analyze import pawn
+
     problem = {"num_vars": columns.shape[1], "names": [str(at) for at in range(columns.shape[1])]}
     return np.asarray(pawn.analyze(problem, columns, y, S=classes)["median"])
 
 
 def _delta(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]) -> float:
     """Return SALib's delta of one measure, with its bias [-]."""
+    from SALib.analyze.delta import calc_delta
+
     exponent = 2.0 / (7.0 + np.tanh((1500.0 - y.size) / 500.0))
     edges = np.linspace(0, y.size, min(int(np.ceil(y.size**exponent)), 48) + 1)
     return float(calc_delta(y, np.linspace(y.min(), y.max(), _CURVE_POINTS), column, edges))

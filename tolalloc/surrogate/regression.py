@@ -9,13 +9,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-from sklearn.linear_model import LassoCV, RidgeCV
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from tolalloc.model import Evaluation
 
@@ -109,6 +102,8 @@ class RegressionCandidate:
 
 def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
     """Return the fitted estimator."""
+    from sklearn.exceptions import ConvergenceWarning
+
     with warnings.catch_warnings():
         # A length or the noise at its bound only says that a column, or noise, does not matter; a path of weights that
         # ends early is judged by its error like every other.
@@ -118,11 +113,16 @@ def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.nd
 
 def on_products_of_two(regressor: Any) -> Any:
     """Return a linear regressor on the columns and all products of two of them."""
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
     return make_pipeline(StandardScaler(), PolynomialFeatures(2, include_bias=False), StandardScaler(), regressor)
 
 
 def quadratic_regression() -> Any:
     """Return a ridge regression on all products of two columns."""
+    from sklearn.linear_model import RidgeCV
+
     return on_products_of_two(RidgeCV(np.logspace(0, 5, 11)))
 
 
@@ -133,11 +133,21 @@ def sparse_quadratic_regression() -> Any:
 
 def lasso() -> Any:
     """Return a linear regressor that keeps few columns, how few found by cross-validation."""
+    from sklearn.compose import TransformedTargetRegressor
+    from sklearn.linear_model import LassoCV
+    from sklearn.preprocessing import StandardScaler
+
     return TransformedTargetRegressor(LassoCV(alphas=np.logspace(-2.5, 0, 14), cv=3), transformer=StandardScaler())
 
 
 def gaussian_process(columns: int) -> Any:
     """Return a Gaussian process of the logarithm of a positive output, one length per column, and noise."""
+    from sklearn.compose import TransformedTargetRegressor
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
     kernel = ConstantKernel(10.0) * RBF(np.full(columns, 3.0), (0.3, 1e3)) + WhiteKernel(1e-3, (1e-8, 1.0))
     process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=1))
     return TransformedTargetRegressor(process, func=np.log, inverse_func=np.exp)
