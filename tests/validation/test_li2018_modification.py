@@ -68,6 +68,7 @@ def test_gap_is_nowhere_negative_just_where_the_row_says_so(stage, generator):
     assert 50 < (least >= -1e-15)[clear].sum() < 350
 
 
+@pytest.mark.slow
 def test_genetic_algorithm_scatters_and_less_so_with_more_mutation():
     """Δr_rp from 36.0 to 57.0 µm in these seeds with the source's p_m, and from 36.0 to 40.4 µm with p_m = 0.03."""
     problem = residual_gap(RV40E, J)
