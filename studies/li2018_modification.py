@@ -8,8 +8,8 @@ from __future__ import annotations
 import pandas as pd
 from published.modification_comparison import compared, comparison_document
 
+import tolalloc as ta
 from tolalloc.cli.console import UnitProgress
-from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.modification.reference import reference
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
@@ -60,5 +60,7 @@ def build(quick: bool) -> Document:
     return comparison_document(found, section)
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="li2018_modification")
+
 if __name__ == "__main__":
-    run_document("li2018_modification", build)
+    ta.run_script()

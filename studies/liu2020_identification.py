@@ -13,6 +13,7 @@ from published.liu2020_tables import BOUNDS, printed_section
 from published.recovery import Recovery, recovery
 from published.simulated_bench import Bench, random_units, simulated_bench
 
+import tolalloc as ta
 from tolalloc.bench.identification.answer import IdentificationAnswer
 from tolalloc.bench.identification.data import data_of
 from tolalloc.bench.identification.information import information
@@ -22,10 +23,9 @@ from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.study import IdentificationStudy, identify
 from tolalloc.bench.measurement.records import Measurements
 from tolalloc.cli.console import UnitProgress
-from tolalloc.cli.document_script import run_document
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.progress import Progress
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
@@ -266,5 +266,7 @@ def _curves_and_loops(
     return results, recovery(given, parameters, truth, exact, repetitions, seeds.child("again"), progress.advance)
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="liu2020_identification")
+
 if __name__ == "__main__":
-    run_document("liu2020_identification", build)
+    ta.run_script()

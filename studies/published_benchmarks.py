@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from published.allocation_cases import CASES, bearing_moments, clutch, figures, gap_chain, limit_stack
 
+import tolalloc as ta
 from tolalloc.allocation.program.problem import AllocationProblem, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
-from tolalloc.cli.document_script import run_document
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 
@@ -156,5 +156,7 @@ def build(_: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="published_benchmarks")
+
 if __name__ == "__main__":
-    run_document("published_benchmarks", build)
+    ta.run_script()

@@ -3,21 +3,22 @@
 tolalloc run studies/rv20e_allocation.py --quick
 """
 
-from tolalloc.cli.main import run_script
-from tolalloc.study.definition import Study
+import tolalloc as ta
 
-study = Study(
+study = ta.Study(
+    ta.reducer(
+        "rv20e",
+        stiffness="rv20e_table6",
+        flank_clearance=(1.0, 5.0),
+        radial_clearance=(5.0, 20.0),
+        unit="table4",
+    ),
+    ta.drawing("rv20e_baseline"),
+    limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.9973))},
+    questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)],
     name="rv20e_allocation",
-    reducer="rv20e",
-    tolerances="rv20e_baseline",
-    unit="table4",
-    stiffness="rv20e_table6",
-    limit_arcsec=60.0,
-    yield_target=0.9973,
-    flank_clearance_um=(1.0, 5.0),
-    radial_clearance_um=(5.0, 20.0),
     seed=1,
 )
 
 if __name__ == "__main__":
-    run_script()
+    ta.run_script()

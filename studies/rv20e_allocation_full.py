@@ -3,31 +3,22 @@
 tolalloc allocate studies/rv20e_allocation_full.py --quick
 """
 
-from tolalloc.allocation.cost.unit_price import UnitPrice
-from tolalloc.allocation.guarantee import AtCpk
-from tolalloc.capability.indices import Limits
-from tolalloc.cli.main import run_script
-from tolalloc.study.definition import Study
+import tolalloc as ta
 
-LOST_MOTION = "lost motion [arcmin]"
-RADIAL = "radial clearance at tip and root [µm]"
-
-study = Study(
+study = ta.Study(
+    ta.reducer("rv20e", stiffness="rv20e_table6", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0)),
+    ta.drawing("rv20e_baseline", costs="rv20e"),
+    limits={
+        ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.9973)),
+        ta.LOST_MOTION: ta.Limit(upper=0.5, show=ta.AtCpk(target=1.33)),
+        ta.RADIAL_CLEARANCE: ta.Limit(lower=-5.0, show=ta.AtYield(target=0.9973)),
+    },
+    questions=[
+        ta.Allocation(grades=True, unit_price=ta.UnitPrice(inspection=1.0, rework_share=0.3, rework=15.0, scrap=5.0))
+    ],
     name="rv20e_allocation_full",
-    reducer="rv20e",
-    tolerances="rv20e_baseline",
-    process_costs="rv20e",
-    stiffness="rv20e_table6",
-    limit_arcsec=60.0,
-    yield_target=0.9973,
-    other_limits={LOST_MOTION: Limits(upper=0.5), RADIAL: Limits(lower=-5.0)},
-    guarantees={LOST_MOTION: AtCpk(target=1.33)},
-    grades=True,
-    unit_price=UnitPrice(inspection=1.0, rework_share=0.3, rework=15.0, scrap=5.0),
-    flank_clearance_um=(1.0, 5.0),
-    radial_clearance_um=(5.0, 20.0),
     seed=1,
 )
 
 if __name__ == "__main__":
-    run_script()
+    ta.run_script()

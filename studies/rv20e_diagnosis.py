@@ -11,24 +11,26 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+import tolalloc as ta
 from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.diagnosis.sources import dominant, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.chunks import one_thread
-from tolalloc.cli.document_script import run_document
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import limited_measure
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.study.definition import Prepared, Study, prepare
+from tolalloc.rv.model import ReducerModel
 
 UNITS, QUICK = 200, 8
 READINGS = 1440
 """Readings of one output turn [-]."""
 NOISE = Noise()
 SEEDS = SeedTree(1).child("diagnosis")
+DRAWN, ERRORS = ta.reducer("rv20e"), ta.drawing("rv20e_baseline").errors
+DRAWN, ERRORS = ta.reducer("rv20e"), ta.drawing("rv20e_baseline").errors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,9 +47,9 @@ class Outcome:
     curves: int
 
 
-def simulated(prepared: Prepared, deviations: np.ndarray, seeds: SeedTree) -> MeasuredCurve:
+def simulated(model: ReducerModel, deviations: np.ndarray, seeds: SeedTree) -> MeasuredCurve:
     """Return the noisy curve of a unit, what the model leaves out included."""
-    kernel = prepared.kernel
+    kernel = model.kernel
     angle = 2 * np.pi * np.arange(READINGS) / READINGS
     exact = kernel.model.equilibria(kernel.errors(deviations), kernel.torque, angle).transmission_error[0]
     generator = seeds.generator()
@@ -59,11 +61,11 @@ def simulated(prepared: Prepared, deviations: np.ndarray, seeds: SeedTree) -> Me
 
 def outcome(number: int) -> Outcome:
     """Draw a unit from the drawings, simulate its curve, diagnose it and compare with the truth."""
-    prepared = prepare(Study(name="rv20e_diagnosis"))
-    kernel, errors = prepared.kernel, prepared.space.errors
+    model = DRAWN.bound(ERRORS, "rv20e_diagnosis")
+    kernel, errors = model.kernel, ERRORS
     uniform = next(SEEDS.child("units", str(number)).uniform_chunks(1, len(errors.columns)))
     deviations = errors.deviations(errors.standard_values(uniform), errors.zones)
-    curve = simulated(prepared, deviations, SEEDS.child("noise", str(number)))
+    curve = simulated(model, deviations, SEEDS.child("noise", str(number)))
     effort = DiagnosisEffort()
     found = diagnose(curve, kernel, errors, errors.zones, NOISE, SEEDS.child("diagnose", str(number)), effort)
     problem = CurveProblem(
@@ -113,8 +115,7 @@ def build(quick: bool) -> Document:
     units, workers = QUICK if quick else UNITS, os.cpu_count() or 1
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=one_thread) as pool:
         outcomes = list(pool.map(outcome, range(units)))
-    prepared = prepare(Study(name="rv20e_diagnosis"))
-    owner, sources = np.array(prepared.space.errors.source_of_column), prepared.space.errors.active
+    owner, sources = np.array(ERRORS.source_of_column), ERRORS.active
     named = np.array([one.dominant in one.named for one in outcomes])
     columns, gauges = (np.array([getattr(one, name) for one in outcomes]) for name in ("columns_hold", "gauges_hold"))
     explained = np.array([one.explained for one in outcomes])
@@ -159,5 +160,7 @@ def build(quick: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="rv20e_diagnosis")
+
 if __name__ == "__main__":
-    run_document("rv20e_diagnosis", build)
+    ta.run_script()

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolalloc.cli.document_script import run_document
+import tolalloc as ta
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.equivalent.attribution import attribute
@@ -178,5 +178,7 @@ def build(quick: bool) -> Document:  # noqa: ARG001 (one turn has nothing to sho
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="rv20e_one_turn")
+
 if __name__ == "__main__":
-    run_document("rv20e_one_turn", build)
+    ta.run_script()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.cli.document_script import run_document
+import tolalloc as ta
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
@@ -154,5 +154,7 @@ def build(quick: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="rv20e_speeds")
+
 if __name__ == "__main__":
-    run_document("rv20e_speeds", build)
+    ta.run_script()

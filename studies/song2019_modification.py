@@ -11,8 +11,8 @@ from math import pi, sin
 import pandas as pd
 from published.modification_comparison import algorithms_table, compared, comparison_document, convergence_figure
 
+import tolalloc as ta
 from tolalloc.cli.console import UnitProgress
-from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.mesh import flank_angle
@@ -170,5 +170,7 @@ def build(quick: bool) -> Document:
     return replace(document, title="song2019: towards a rotated profile by differential evolution")
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="song2019_modification")
+
 if __name__ == "__main__":
-    run_document("song2019_modification", build)
+    ta.run_script()

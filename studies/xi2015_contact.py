@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from tolalloc.cli.document_script import run_document
+import tolalloc as ta
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.cycloid.clearance import formula_gap
@@ -130,5 +130,7 @@ def build(quick: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="xi2015_contact")
+
 if __name__ == "__main__":
-    run_document("xi2015_contact", build)
+    ta.run_script()

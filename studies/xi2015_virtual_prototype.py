@@ -10,8 +10,8 @@ from math import inf
 
 import pandas as pd
 
+import tolalloc as ta
 from tolalloc.cli.console import UnitProgress
-from tolalloc.cli.document_script import run_document
 from tolalloc.exceptions import InputError
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.multibody.engine import engine
@@ -173,5 +173,7 @@ def build(quick: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="xi2015_virtual_prototype")
+
 if __name__ == "__main__":
-    run_document("xi2015_virtual_prototype", build)
+    ta.run_script()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from zhang2025_sections import (
+from published.zhang2025_sections import (
     PRECISIONS,
     drawn_parts_section,
     exponential_section,
@@ -18,10 +18,10 @@ from zhang2025_sections import (
     priced_section,
 )
 
+import tolalloc as ta
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.cli.console import UnitProgress
-from tolalloc.cli.document_script import run_document
 from tolalloc.report.document import Document
 from tolalloc.units import ARCSECOND
 
@@ -69,5 +69,7 @@ def build(quick: bool) -> Document:
     )
 
 
+study = ta.Study(questions=[ta.Calculation(build)], name="zhang2025_assembly")
+
 if __name__ == "__main__":
-    run_document("zhang2025_assembly", build)
+    ta.run_script()

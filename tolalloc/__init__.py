@@ -1,1 +1,93 @@
-"""Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are the cheapest."""
+"""Which drawing tolerance drives an output, and which tolerances and settings meet a limit at the lowest cost.
+
+>>> import tolalloc as ta
+>>> ta.reducer("rv20e").name
+'RV-20E'
+
+Names are loaded when they are first used, so that importing the package takes a fraction of a second.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
+    from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
+    from tolalloc.allocation.guarantee import AtCpk as AtCpk
+    from tolalloc.allocation.guarantee import AtYield as AtYield
+    from tolalloc.allocation.guarantee import RootSumSquare as RootSumSquare
+    from tolalloc.allocation.guarantee import WorstCase as WorstCase
+    from tolalloc.cli.main import run_script as run_script
+    from tolalloc.drawings.drawing import Drawing as Drawing
+    from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
+    from tolalloc.exceptions import InputError as InputError
+    from tolalloc.exceptions import RunFolderError as RunFolderError
+    from tolalloc.exceptions import SolveError as SolveError
+    from tolalloc.exceptions import TolallocError as TolallocError
+    from tolalloc.exceptions import UnknownNameError as UnknownNameError
+    from tolalloc.function_model import from_fmu as from_fmu
+    from tolalloc.function_model import model as model
+    from tolalloc.models import Setting as Setting
+    from tolalloc.rv.choice import reducer as reducer
+    from tolalloc.rv.outputs import BACKLASH as BACKLASH
+    from tolalloc.rv.outputs import LOST_MOTION as LOST_MOTION
+    from tolalloc.rv.outputs import PEAK_TO_PEAK as PEAK_TO_PEAK
+    from tolalloc.rv.outputs import RADIAL_CLEARANCE as RADIAL_CLEARANCE
+    from tolalloc.rv.outputs import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
+    from tolalloc.study.effort import Effort as Effort
+    from tolalloc.study.limit import Limit as Limit
+    from tolalloc.study.questions import Allocation as Allocation
+    from tolalloc.study.questions import Calculation as Calculation
+    from tolalloc.study.questions import Question as Question
+    from tolalloc.study.questions import Ranking as Ranking
+    from tolalloc.study.study import Study as Study
+
+_WHERE = {
+    "Allocation": "study.questions",
+    "AtCpk": "allocation.guarantee",
+    "AtYield": "allocation.guarantee",
+    "BACKLASH": "rv.outputs",
+    "Calculation": "study.questions",
+    "Drawing": "drawings.drawing",
+    "Effort": "study.effort",
+    "InputError": "exceptions",
+    "LOST_MOTION": "rv.outputs",
+    "Limit": "study.limit",
+    "PEAK_TO_PEAK": "rv.outputs",
+    "QualityLoss": "allocation.cost.unit_price",
+    "Question": "study.questions",
+    "RADIAL_CLEARANCE": "rv.outputs",
+    "Ranking": "study.questions",
+    "RootSumSquare": "allocation.guarantee",
+    "RunFolderError": "exceptions",
+    "Setting": "models",
+    "SolveError": "exceptions",
+    "Study": "study.study",
+    "TORSIONAL_STIFFNESS": "rv.outputs",
+    "TolallocError": "exceptions",
+    "UnitPrice": "allocation.cost.unit_price",
+    "UnknownNameError": "exceptions",
+    "WorstCase": "allocation.guarantee",
+    "drawing": ("drawings.drawing", "load_drawing"),
+    "from_fmu": "function_model",
+    "model": ("function_model", "model"),
+    "reducer": "rv.choice",
+    "run_script": "cli.main",
+}
+"""Public name → where it stands, with its name there if that is another one."""
+
+__all__ = sorted(_WHERE)
+
+
+def __getattr__(name: str) -> Any:
+    place = _WHERE.get(name)
+    if place is None:
+        raise AttributeError(f"module 'tolalloc' has no attribute {name!r}")
+    module, own = place if isinstance(place, tuple) else (place, name)
+    return getattr(import_module(f"tolalloc.{module}"), own)
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

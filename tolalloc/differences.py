@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.model import Evaluation, Response
+from tolalloc.models import Evaluation, Response
 
 
 @dataclass(frozen=True, kw_only=True)

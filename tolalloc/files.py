@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import pydantic
 
 from tolalloc.exceptions import InputError, UnknownNameError
+
+_FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
+"""Folder that relative paths are meant from; the current one unless a script is being read."""
 
 Model = TypeVar("Model", bound=pydantic.BaseModel)
 
@@ -23,6 +28,22 @@ class Record(pydantic.BaseModel):
     """Base of everything that is read from a file: no unknown fields, no silent conversion, finite numbers."""
 
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+@contextmanager
+def relative_to(folder: Path) -> Iterator[None]:
+    """Take relative paths as those of a folder, such as that of the script that is being read."""
+    token = _FOLDER.set(folder)
+    try:
+        yield
+    finally:
+        _FOLDER.reset(token)
+
+
+def found_from_here(path: str | Path) -> Path:
+    """Return the user's path, as the folder means it that relative paths are taken from."""
+    folder = _FOLDER.get()
+    return Path(path) if folder is None else folder / path
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -108,7 +129,7 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
     shipped = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
     if str(name) in shipped:
         return shipped[str(name)]
-    path = Path(name)
+    path = found_from_here(name)
     if path.suffix or path.exists():
         if not path.is_file():
             raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")

@@ -26,6 +26,16 @@ class Progress(Protocol):
         ...
 
 
+class Silent:
+    """Progress that nobody is shown, as in a script or a notebook."""
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage."""
+
+    def advance(self, units: int) -> None:
+        """So many more units are solved."""
+
+
 @dataclass
 class Record:
     """What the manifest says of the run itself: statuses and times per stage.

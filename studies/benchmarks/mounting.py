@@ -32,9 +32,9 @@ from tolalloc.assembly.mounting.parts import drawn_parts
 from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting
 from tolalloc.assembly.mounting.steps import units_from
 from tolalloc.assembly.mounting.stock import PartStock
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.response.kernel import KernelResponse

@@ -27,8 +27,8 @@ from kernel_speed import SEED, figures, progress, run_benchmark
 from numpy_cores import CORES, timed
 from SALib.analyze import sobol as salib
 
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.model import Evaluation
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.saltelli import one_pass, saltelli_indices
 
 SOURCES, OUTPUTS, RESAMPLES = 30, 9, 100

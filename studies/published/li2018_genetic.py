@@ -22,7 +22,7 @@ from pymoo.operators.crossover.pntx import SinglePointCrossover
 from pymoo.operators.mutation.bitflip import BitflipMutation
 from pymoo.optimize import minimize
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.modification.problem import Amounts, ModificationProblem
 from tolalloc.units import MILLIMETRE
 

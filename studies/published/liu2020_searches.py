@@ -23,7 +23,7 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.stand_in import StandIn
 from tolalloc.bench.identification.study import STARTS
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.progress import Progress
 from tolalloc.report.document import Section

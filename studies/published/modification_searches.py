@@ -16,7 +16,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from scipy.optimize import minimize as minimize_downhill
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.rv.modification.history import History, quartiles
 from tolalloc.rv.modification.problem import Amounts, EvaluatedAmounts, ModificationProblem

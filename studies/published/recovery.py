@@ -15,7 +15,7 @@ from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.capability.monte_carlo import Yield, proportion
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.reducer.design import Reducer
 
 from .simulated_bench import SimulatedBench

@@ -14,7 +14,7 @@ from tolalloc.allocation.program.problem import AllocationProblem
 from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem, requirements_of
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.units import ARCSECOND
 

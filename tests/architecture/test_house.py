@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tolalloc.drawing.fields import COLUMNS, HEADERS, ToleranceRow
+from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.rv.equivalent.columns import source_name
 
 ROOT = Path(__file__).parents[2]

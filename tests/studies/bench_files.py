@@ -15,9 +15,9 @@ import numpy as np
 from studies.published.measurement_folder import write_measurements
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
 from tests.studies.command import tolalloc
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
 

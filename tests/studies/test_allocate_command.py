@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from tolalloc.cli.allocate import allocate
 
 from tests.studies.command import ROOT, command, process, tolalloc
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
-from tolalloc.cli.allocate import allocate
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import TolallocError
 
 KEPT = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
@@ -66,7 +66,7 @@ def script_with(path: Path, fields: str = "", effort: str = SMALL) -> Path:
 
 
 def few_sources(path: Path, **columns: str) -> Path:
-    table = pd.read_csv(ROOT / "tolalloc/drawing/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
     kept = table[table["id"].isin(KEPT)].assign(**columns)
     kept.to_csv(path / "few.csv", index=False)
     return path / "few.csv"

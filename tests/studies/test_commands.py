@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
-from tolalloc.drawing.table_file import DATA
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.table_file import DATA
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
 

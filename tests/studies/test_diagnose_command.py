@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 from tests.studies.command import ROOT, tolalloc
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.study.definition import Study, prepare
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
 REPORT = ("--reducer", "rv20e", "--out")
@@ -29,7 +29,7 @@ class Bench:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory) -> Bench:
     path = tmp_path_factory.mktemp("bench")
-    table = pd.read_csv(ROOT / "tolalloc/drawing/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
     varied = ("housing.pitch", "disc1.pitch", "disc2.pitch", "pin.diameter")
     still = ~table["id"].isin(varied)
     for column in ("plus [unit]", "minus [unit]"):

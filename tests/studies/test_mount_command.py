@@ -8,9 +8,9 @@ import pytest
 
 from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.mounting.parts import drawn_parts
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 

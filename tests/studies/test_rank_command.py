@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, tolalloc
-from tolalloc.drawing.process_capability import load_process_capabilities
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.process_capability import load_process_capabilities
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 
 PEAK_TO_PEAK = "peak-to-peak transmission error"
 EFFORT = """effort=Effort(ranking=RankingEffort(
@@ -36,7 +36,7 @@ def script_with(path: Path, **fields: object) -> Path:
 
 
 def few_sources(path: Path) -> Path:
-    table = pd.read_csv(ROOT / "tolalloc/drawing/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
     kept = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter", "housing.groove.radius")
     table[table["id"].isin(kept)].to_csv(path / "few.csv", index=False)
     return path / "few.csv"

@@ -14,8 +14,8 @@ from tolalloc.allocation.cost.process_costs_file import priced
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.units import MILLIMETRE
 
 CHAIN = ("reciprocal", "t_min of x1 is 0.25", "t_max of x3 is 0.30", "exponential")

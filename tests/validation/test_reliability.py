@@ -21,7 +21,7 @@ from tolalloc.capability.rare_failure.form import DesignPoints, design_point, de
 from tolalloc.capability.rare_failure.importance import importance_sampling
 from tolalloc.capability.rare_failure.result import RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 
 PROBLEMS = {
     item["id"]: item

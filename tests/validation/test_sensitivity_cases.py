@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.model import Evaluation
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import saltelli_indices
 

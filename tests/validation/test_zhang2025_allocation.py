@@ -17,7 +17,7 @@ from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.control import kalman_filter, regulator
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
 PLAN = load_plan("bx40e")

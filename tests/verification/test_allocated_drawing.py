@@ -9,6 +9,8 @@ from math import exp, sqrt
 import numpy as np
 import pytest
 from openpyxl import load_workbook
+from tolalloc.study.allocation import allocate_study
+from tolalloc.study.definition import Study
 from typer.testing import CliRunner
 
 from tolalloc.allocation.answer.cost_formulas import cost_formula
@@ -20,9 +22,7 @@ from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.capability.indices import Limits
 from tolalloc.cli.main import app
-from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.study.allocation import allocate_study
-from tolalloc.study.definition import Study
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.study.effort import QUICK
 
 UM, RADIAL = 1e-6, "radial clearance at tip and root [µm]"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from scipy.stats import kurtosis, norm
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.closed_forms import Reciprocal
@@ -22,10 +23,9 @@ from tolalloc.allocation.trust_region import aimed
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK
-from tolalloc.study.definition import Study, prepare
 
 LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
 UNITS = 1152

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 import tolalloc.allocation.robustness as module
 from tolalloc.allocation.cost.closed_forms import Reciprocal
@@ -18,8 +19,7 @@ from tolalloc.allocation.trade import ModificationTrade, modification_trade
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.capability.indices import Limits
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.study.definition import Study, prepare
+from tolalloc.drawings.seeds import SeedTree
 
 UNITS = 1152
 

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.answer.cautions import warnings
 from tolalloc.allocation.answer.document import allocation_document
 from tolalloc.allocation.answer.paragraphs import cheapest_clearances, quantiles
+from tolalloc.study.allocation import allocate_study
+from tolalloc.study.definition import Study
+
+from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.answer.sentences import answer, least_saving
 from tolalloc.allocation.cost.unit_price import UnitPrice, YieldLadder
 from tolalloc.allocation.guarantee import AtCpk
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.trade import ModificationTrade
 from tolalloc.capability.indices import Limits
-from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.study.allocation import allocate_study
-from tolalloc.study.definition import Study
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.study.effort import QUICK
 
 KEPT = {"housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter"}

@@ -13,7 +13,7 @@ from studies.published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import allocate_angles, verify_angles
 from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.files import load_plan
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.units import ARCSECOND
 

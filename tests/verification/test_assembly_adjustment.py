@@ -19,7 +19,7 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_order
 from tolalloc.assembly.trajectory import Trajectory, foreseen, simulated
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.units import ARCSECOND
 

@@ -11,13 +11,13 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import kstest
 
-from tolalloc.drawing.correlation import CorrelatedSource, Correlation, Pair
-from tolalloc.drawing.correlation_file import load_correlations
-from tolalloc.drawing.distributions import Distribution
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.mixtures import Batch
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair
+from tolalloc.drawings.correlation_file import load_correlations
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.mixtures import Batch
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 
 SAMPLES = 40_000

@@ -10,14 +10,14 @@ import pytest
 from scipy.special import ndtr
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlation import Correlation, Pair
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.zones import Distribution, Feature
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Prepared, Study, prepare
 
 from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
 from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
@@ -14,12 +15,11 @@ from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort, climb
 from tolalloc.bench.diagnosis.sources import dominant, groups, named_set, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import limited_measure
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.study.definition import Prepared, Study, prepare
 from tolalloc.units import ARCSECOND, DEGREE
 
 NOISE = Noise()

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-
-from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame, with_zones
-from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.study.definition import Study, prepare
+
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, with_zones
+from tolalloc.exceptions import InputError, TolallocError
 
 PARTS = 0.5e-6 + 0.6e-6 * stats.weibull_min(2.5).ppf((np.arange(60) + 0.5) / 60)
 

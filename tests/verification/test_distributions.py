@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolalloc.drawing.distributions import Distribution, moments
-from tolalloc.drawing.measured_parts import MeasuredParts
-from tolalloc.drawing.mixtures import Batch, smoothed_magnitude
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature, harmonic_range_quantile, parsed_spectrum
+from tolalloc.drawings.distributions import Distribution, moments
+from tolalloc.drawings.measured_parts import MeasuredParts
+from tolalloc.drawings.mixtures import Batch, smoothed_magnitude
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature, harmonic_range_quantile, parsed_spectrum
 
 SAMPLES = 100_000
 ZONE = 4e-6

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tolalloc.drawing.correlation import Correlation, Pair
-from tolalloc.drawing.drawing import Drawing, load_drawing
-from tolalloc.drawing.tolerance_table import load_tolerance_table, table_frame, table_text
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.drawing import Drawing, load_drawing
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, table_text
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 
 ZONE = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3}

@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.allocation.design_space import ClearanceRange
 from tolalloc.allocation.grade.iso286 import grade_zones
@@ -15,9 +16,8 @@ from tolalloc.allocation.graded import AMOUNT_STEP, allocate_grades, group_ladde
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.study.definition import Study, prepare
 
 UNITS, UM = 1152, 1e-6
 

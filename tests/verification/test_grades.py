@@ -3,9 +3,9 @@ import pytest
 
 from tolalloc.allocation.grade.iso286 import GRADES, SIZE_STEPS, grade_zones
 from tolalloc.allocation.grade.ladder import ZONES, Ladder, group_ladder
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 
 UM, MM = 1e-6, 1e-3

@@ -24,9 +24,9 @@ from tolalloc.bench.identification.problem import IdentificationProblem, require
 from tolalloc.bench.identification.profile import as_stiffness, estimates, profile
 from tolalloc.bench.identification.resampling import bootstrap, judged, simplest
 from tolalloc.bench.identification.stand_in import StandIn, fit_stand_in
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness

@@ -9,12 +9,12 @@ import pytest
 from scipy.stats import norm
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.inverse import inverse_sensitivity
 
 NAMES = ("a", "b", "c", "d")

@@ -27,11 +27,11 @@ from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.steps import units_from
 from tolalloc.assembly.mounting.stock import PartStock
 from tolalloc.bench.diagnosis.half_turn import half_turn
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.equivalent.bearings import crank_disc
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel

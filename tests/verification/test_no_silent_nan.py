@@ -20,12 +20,12 @@ from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.classical import classical_estimate
 from tolalloc.sensitivity.saltelli import saltelli_indices
 

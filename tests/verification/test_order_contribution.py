@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.growth import Growth, Step
 from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
 from tolalloc.sensitivity.saltelli import saltelli_indices

@@ -12,9 +12,9 @@ from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.orientations import OrientationResponse, transmission_curves
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.model import Response
+from tolalloc.models import Response
 from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.line_load import peak_line_load
 from tolalloc.rv.equivalent.model import EquivalentModel

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.outputs import order_spectrum
 from tolalloc.rv.equivalent.status import Status, count_statuses
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
-from tolalloc.study.definition import Study, prepare
 from tolalloc.units import ARCMINUTE, ARCSECOND
 
 ORDERS = (1, 39, 40)

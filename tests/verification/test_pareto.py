@@ -15,7 +15,7 @@ from tolalloc.allocation.pareto.genetic import reference_directions, search
 from tolalloc.allocation.pareto.indicators import knee, nondominated, spread_over, thinned
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.allocation.program import process_choice
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 
 POPULATION = 80

@@ -14,7 +14,7 @@ from stack_front import StackProblem, stack_problem
 
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.genetic import search
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 POPULATION = 80
@@ -84,7 +84,7 @@ def test_a_search_resumed_in_another_process_has_the_same_bits(tmp_path, stack):
         "from stack_front import stack_problem\n"
         "from tolalloc.allocation.pareto.answers import Checkpoint\n"
         "from tolalloc.allocation.pareto.genetic import search\n"
-        "from tolalloc.drawing.seeds import SeedTree\n"
+        "from tolalloc.drawings.seeds import SeedTree\n"
         f"found = search(stack_problem(), np.empty((0, 12)), SeedTree(0), *{SMALL}, "
         "checkpoint=Checkpoint(path=Path(sys.argv[2]), every=24))\n"
         "print(hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest())"

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
@@ -15,9 +16,8 @@ from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
 from tolalloc.allocation.pareto.indicators import nondominated
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.study.definition import Study, prepare
 
 POPULATION = 80
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from tolalloc.drawing.distributions import Distribution
-from tolalloc.drawing.process_capability import load_process_capabilities
-from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.process_capability import load_process_capabilities
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 
 LIBRARY = """process,feature,Cp [-],shift [half zone],distribution,shape [-],sorted,note

@@ -17,9 +17,9 @@ from tolalloc.allocation.cost.closed_forms import (
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs_file import ProcessCostRow, load_process_costs, priced, today
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.drawing.table_file import DATA, read_rows
-from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.table_file import DATA, read_rows
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.units import MICROMETRE
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
@@ -16,7 +17,6 @@ from tolalloc.rv.equivalent.radial_clearance import radial_clearance
 from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
-from tolalloc.study.definition import Study, prepare
 from tolalloc.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 CLEARANCE = "radial clearance at tip and root [µm]"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.indices import Limits
-from tolalloc.drawing.correlation import CorrelatedSource
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
-from tolalloc.model import Evaluation, Model, Response
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
+from tolalloc.models import Evaluation, Model, Response
 from tolalloc.progress import Record
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.answer import RankingAnswer, rank

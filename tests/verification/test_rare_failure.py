@@ -14,7 +14,7 @@ from tolalloc.capability.rare_failure.form import DesignPoints, design_point, de
 from tolalloc.capability.rare_failure.importance import importance_sampling
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitValues
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 
 

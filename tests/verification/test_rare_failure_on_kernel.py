@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
@@ -18,15 +19,14 @@ from tolalloc.capability.rare_failure.result import Level, RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
-from tolalloc.drawing.correlation import Correlation, Pair
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Distribution, Feature
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.response.kernel import WithDerivatives
-from tolalloc.study.definition import Study, prepare
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.model import ReducerModel

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from SALib.analyze import sobol as salib
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.growth import grow_until_stable
 from tolalloc.sensitivity.ranking import (
     Ranking,

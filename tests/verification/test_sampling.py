@@ -11,11 +11,11 @@ from scipy.stats import kstest, qmc
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import CHUNK, SamplingDesign, SeedTree, uniform_chunk, uniform_chunks
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
-from tolalloc.model import Evaluation
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import CHUNK, SamplingDesign, SeedTree, uniform_chunk, uniform_chunks
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
+from tolalloc.models import Evaluation
 
 COLUMNS = 3
 LATIN, SOBOL = SamplingDesign.LATIN_HYPERCUBE, SamplingDesign.SOBOL

@@ -12,13 +12,13 @@ from scipy.stats import norm
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.drawing.correlation import Correlation, Pair
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Distribution, Feature
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 
 

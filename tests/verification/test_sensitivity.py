@@ -10,12 +10,12 @@ from scipy.stats import norm
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import allowed_rejections, monte_carlo, proportion
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Distribution, Feature
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 

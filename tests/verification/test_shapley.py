@@ -12,14 +12,14 @@ import pytest
 from scipy.special import ndtri
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlation import CorrelatedSource, Correlation, Pair
-from tolalloc.drawing.distributions import Distribution
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 
 SIGMA_ZONE = float(2 * -ndtri((1 - 0.9973) / 2))

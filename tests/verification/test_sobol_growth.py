@@ -9,13 +9,13 @@ import pytest
 from SALib.sample import sobol as salib
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlation import Correlation, Pair
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
 from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices

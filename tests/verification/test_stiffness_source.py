@@ -7,14 +7,15 @@ from math import exp
 
 import numpy as np
 import pytest
+from tolalloc.study.definition import Study, prepare
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.correlation import CorrelatedSource
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
@@ -27,7 +28,6 @@ from tolalloc.rv.response.stiffness import (
     stiffness_source,
 )
 from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
-from tolalloc.study.definition import Study, prepare
 
 FIELDS = ("crank_disc_bearing", "pin_contact")
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.tolerance_table import load_tolerance_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation, Response
+from tolalloc.models import Evaluation, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected

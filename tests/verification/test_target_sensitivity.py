@@ -10,13 +10,13 @@ from scipy.stats import norm
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.drawing.correlation import CorrelatedSource
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source, limited_measure
-from tolalloc.drawing.zones import Feature, parsed_spectrum
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source, limited_measure
+from tolalloc.drawings.zones import Feature, parsed_spectrum
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.drawing.distributions import Distribution
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import CHUNK, SeedTree
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import CHUNK, SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.rv.reducer.unit_file import load_unit
 

@@ -11,14 +11,14 @@ import pytest
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import DifferencedResponse
-from tolalloc.drawing.correlation import CorrelatedSource
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import Source, limited_measure
-from tolalloc.drawing.tolerance_table import load_tolerance_table
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source, limited_measure
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
 

@@ -6,10 +6,9 @@ import numpy as np
 
 from tolalloc.allocation.programs import SETTLED
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
-from tolalloc.rv.reducer.design import Modification
 
 
-def scale_by_hand(verifier: Verifier, modification: Modification, steps: int) -> tuple[VerifiedDesign, ...]:
+def scale_by_hand(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
     """Return designs with all zones scaled alike, the first the tolerance table as it is.
 
     Notes
@@ -20,7 +19,7 @@ def scale_by_hand(verifier: Verifier, modification: Modification, steps: int) ->
     space, scale = verifier.space, 1.0
     tried: list[VerifiedDesign] = []
     for step in range(steps):
-        tried.append(verifier.verify(space.uniform(scale, modification), f"by hand {step + 1}"))
+        tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}"))
         factor = _factor(tried[-1])
         if tried[-1].met and factor < 1 + SETTLED:
             break
@@ -32,7 +31,7 @@ def _factor(tried: VerifiedDesign) -> float:
     """Return the common factor of all scales that takes a design to its limits [-]."""
     factors = []
     for side in tried.sides:
-        rise = float(side.stack.load(tried.design[:-2], np.zeros(2)))
-        left = -float(side.predicted(tried.design)) - side.doubt
-        factors.append(1 + left / max(rise, 0.1 * side.scale))
+        rise = side.load_of_zones(tried.design)
+        budget = -float(side.predicted(tried.design)) - side.doubt
+        factors.append(1 + budget / max(rise, 0.1 * side.scale))
     return float(np.clip(min(factors), 0.4, 2.5))

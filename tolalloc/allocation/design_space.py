@@ -1,9 +1,9 @@
-"""What the allocation may change: one scale per drawing group, and the two modification amounts."""
+"""What the allocation may change: one scale per drawing group, and the settings of the model."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,47 +12,25 @@ from jaxtyping import Float, Int
 from tolalloc.allocation.cost.model import Process, made_together
 from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.sources import Source
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError
-from tolalloc.rv.reducer.design import CycloidStage, Modification
-from tolalloc.units import MICROMETRE
-
-FLANK = "flank clearance [µm]"
-RADIAL = "radial clearance [µm]"
+from tolalloc.models import Setting
 
 _ROUNDING = 1e-9
 """Distance of a scale from a process's range up to which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClearanceRange:
-    """Nominal clearances that the modification may leave between pins and teeth; equal bounds lock one.
-
-    Parameters
-    ----------
-    flank
-        Smallest and largest gap on the flank, the narrowest place [m].
-    radial
-        Smallest and largest gap at tooth tip and root [m].
-    """
-
-    flank: tuple[float, float]
-    radial: tuple[float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
 class DesignSpace:
-    """Design variables: the scale of each group's zones and the two clearances.
+    """Design variables: the scale of each group's zones and the settings of the model.
 
     Parameters
     ----------
     errors
         The sources at their zones in the tolerance table; a scale of 1 is that zone.
-    stage
-        Cycloid stage of the reducer.
-    clearances
-        Range of the clearances.
+    settings
+        What the designer chooses beside the zones, with bounds; none if the model has none.
     processes
         Source → ways to make it, zones in [m]; without an entry it costs what the tolerance table says at its zone,
         and that falls as 1/zone.
@@ -64,13 +42,11 @@ class DesignSpace:
 
     Notes
     -----
-    A design is a vector: the scale of every group [-], then flank and radial clearance [µm]. Clearances and
-    amounts map to each other one to one, `tolalloc.rv.reducer.design.Modification.from_clearances`.
+    A design is a vector: the scale of every group [-], then every setting [unit of its name].
     """
 
     errors: ErrorModel
-    stage: CycloidStage
-    clearances: ClearanceRange
+    settings: tuple[Setting, ...] = ()
     processes: Mapping[str, tuple[Process, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -84,7 +60,7 @@ class DesignSpace:
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of the design variables."""
-        return (*(f"scale of {group} [-]" for group in self.groups), FLANK, RADIAL)
+        return (*(f"scale of {group} [-]" for group in self.groups), *(setting.name for setting in self.settings))
 
     @cached_property
     def group_of_source(self) -> Int[np.ndarray, " source"]:
@@ -110,9 +86,27 @@ class DesignSpace:
 
     @cached_property
     def shared(self) -> Shared:
-        """The two clearances."""
-        low, high = np.array([self.clearances.flank, self.clearances.radial]).T / MICROMETRE
-        return Shared(names=(FLANK, RADIAL), lower=low, upper=high)
+        """The settings."""
+        return Shared(
+            names=tuple(setting.name for setting in self.settings),
+            lower=np.array([setting.lower for setting in self.settings], float),
+            upper=np.array([setting.upper for setting in self.settings], float),
+        )
+
+    @property
+    def fixed(self) -> DesignSpace:
+        """The same with every setting locked at its present value."""
+        locked = (replace(setting, lower=setting.value, upper=setting.value) for setting in self.settings)
+        return replace(self, settings=tuple(locked))
+
+    @property
+    def setting_steps(self) -> Float[np.ndarray, " setting"]:
+        """Step of every setting to either side of a difference [unit of its name]."""
+        return np.array([setting.step for setting in self.settings], float)
+
+    def settings_of(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs setting"]:
+        """Return the settings of designs [units of their names]."""
+        return designs[..., len(self.groups) :]
 
     @cached_property
     def locked_cost(self) -> float:
@@ -174,16 +168,6 @@ class DesignSpace:
         scales = np.append(design[: len(self.groups)], 1.0)
         return np.asarray(self.errors.zones * scales[self.group_of_source])
 
-    def modification(self, design: Float[np.ndarray, " variable"]) -> Modification:
-        """Return the modification amounts."""
-        return Modification.from_clearances(float(design[-2]) * MICROMETRE, float(design[-1]) * MICROMETRE, self.stage)
-
-    @cached_property
-    def modification_by_clearance(self) -> Float[np.ndarray, "2 2"]:
-        """Change of equidistant and shift amount (rows) with flank and radial clearance (columns) [-]."""
-        columns = [Modification.from_clearances(*clearances, self.stage) for clearances in ((1.0, 0.0), (0.0, 1.0))]
-        return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
-
     def process_positions(self, designs: Float[np.ndarray, "*designs variable"]) -> Int[np.ndarray, "*designs group"]:
         """Return the position of the cheapest process that holds each scale, or comes nearest to it [-]."""
         return np.stack([self._cheapest(at, designs[..., at])[0] for at in range(len(self.groups))], axis=-1)
@@ -208,10 +192,14 @@ class DesignSpace:
         allowed = np.where(outside <= outside.min(axis=0), totals, np.inf)
         return np.asarray(allowed.argmin(axis=0)), np.asarray(allowed.min(axis=0))
 
-    def uniform(self, scale: float, modification: Modification) -> Float[np.ndarray, " variable"]:
-        """Return the design with all zones scaled alike and the given modification, whatever the bounds."""
-        clearances = [modification.flank_clearance(self.stage), modification.radial_clearance]
-        return np.array([*([scale] * len(self.groups)), *(value / MICROMETRE for value in clearances)])
+    def cost_of_sources(self, design: Float[np.ndarray, " variable"]) -> dict[str, float]:
+        """Return the cost of every source whose zone may change, by the process that makes it [cost units]."""
+        zones = dict(zip((source.name for source in self.errors.active), self.zones(design), strict=True))
+        return {name: float(made.total(np.array(zones[name]))) for name, made in self.made_by(design).items()}
+
+    def uniform(self, scale: float) -> Float[np.ndarray, " variable"]:
+        """Return the design with all zones scaled alike and the settings as they are, whatever the bounds."""
+        return np.array([*([scale] * len(self.groups)), *(setting.value for setting in self.settings)])
 
 
 def _apart(members: list[Source], ways: list[tuple[Process, ...]]) -> str:

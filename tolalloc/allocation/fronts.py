@@ -19,7 +19,7 @@ from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.surrogate.regression import Surrogate
 
 _SPAN = 2.5
@@ -35,7 +35,7 @@ class ConvexFront:
     limits
         The limits that can be kept [arcsec].
     designs
-        Scales [-] and clearances [µm].
+        Scales [-] and settings.
     cost, bound
         Cost, and a lower bound on it over all processes that takes no solver's word [cost units].
     """
@@ -85,13 +85,14 @@ def exact_front(
 def _designs_around(
     space: DesignSpace, centre: Float[np.ndarray, " variable"], count: int, seeds: SeedTree
 ) -> Float[np.ndarray, "design variable"]:
-    """Return space-filling designs around a centre; clearances vary over their whole range."""
-    genes = to_genes(centre)
-    reach = np.append(np.full(genes.size - 2, np.log(_SPAN)), [np.inf, np.inf])
-    lower = np.maximum(to_genes(space.lower), genes - reach)
-    upper = np.maximum(np.minimum(to_genes(space.upper), genes + reach), lower)
+    """Return space-filling designs around a centre; settings vary over their whole range."""
+    groups = len(space.groups)
+    genes = to_genes(centre, groups)
+    reach = np.append(np.full(groups, np.log(_SPAN)), np.full(genes.size - groups, np.inf))
+    lower = np.maximum(to_genes(space.lower, groups), genes - reach)
+    upper = np.maximum(np.minimum(to_genes(space.upper, groups), genes + reach), lower)
     unit = qmc.LatinHypercube(genes.size, rng=seeds.generator()).random(count)
-    return from_genes(lower + unit * (upper - lower))
+    return from_genes(lower + unit * (upper - lower), groups)
 
 
 def searched_front(
@@ -134,6 +135,7 @@ def searched_front(
     return pareto_front(
         replace(response, spread=best.spread),
         LocalQuantile(side=best.sides[0]),
+        best.sides[0].limit / 60,
         _designs_around(response.space, best.design, effort.designs, seeds.child("designs")),
         np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),
         seeds.child("pareto"),
@@ -143,3 +145,25 @@ def searched_front(
         sides=sides,
         checkpoint=checkpoint,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fronts:
+    """What can be had at which cost.
+
+    Parameters
+    ----------
+    exact
+        The convex program's front around the chosen design, with its certificate.
+    searched
+        The front of NSGA-II on the corrected model, cost against quantile, with runs of the real model along it.
+    with_setting
+        The front of NSGA-III with the last setting as a third objective, to be large; none without settings.
+    surrogate
+        What the searches ran on, with its Q².
+    """
+
+    exact: ConvexFront
+    searched: Front
+    with_setting: Front | None
+    surrogate: Surrogate

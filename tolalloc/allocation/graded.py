@@ -1,4 +1,4 @@
-"""Zones of grades and preferred numbers, and round modification amounts: proven on the local models, then verified."""
+"""Zones of grades and preferred numbers, and round amounts: proven on the local models, then verified."""
 
 from __future__ import annotations
 
@@ -13,18 +13,16 @@ from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSoluti
 from tolalloc.allocation.program.problem import AllocationProblem, Shared, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
-from tolalloc.drawing.tolerance_table import with_zones
+from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import SolveError
+from tolalloc.models import DrawnAmounts
 
-AMOUNT_STEP = 0.5
-"""Step of the modification amounts on a drawing [µm]."""
 _STEPS_AROUND = 4
 """Steps to either side of the free amounts that are tried; the local models are trusted no further [-]."""
-_AMOUNTS = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
 _SETTLED = 0.2
 """Distance of a kept from a missed margin that ends the search [standard errors]."""
 _ROUNDING = 1e-9
-"""Distance of a clearance from its range up to which it is rounding [µm]."""
+"""Distance of a setting from its range up to which it is rounding [unit of the setting]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,28 +113,30 @@ def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
 
 
 class _Grid:
-    """The choices of a design space: steps of the ladders, and modification amounts around those of a design."""
+    """The choices of a design space: steps of the ladders, and drawn amounts around those of a design."""
 
-    def __init__(self, space: DesignSpace, around: Float[np.ndarray, " variable"]) -> None:
-        self.space, self.options = space, group_options(space)
-        self._by_clearance = space.modification_by_clearance
-        self._to_clearance = np.linalg.inv(self._by_clearance)
-        free = self._by_clearance @ around[-2:]  # both in micrometres
-        steps = AMOUNT_STEP * np.arange(-_STEPS_AROUND, _STEPS_AROUND + 1)
-        self.amounts = tuple(AMOUNT_STEP * np.round(amount / AMOUNT_STEP) + steps for amount in free)
-        if not self._clearances.size:
-            # A clearance that is locked, or whose range is narrow, may leave no round amounts: they stay as they are.
+    def __init__(self, space: DesignSpace, drawn: DrawnAmounts, around: Float[np.ndarray, " variable"]) -> None:
+        self.space, self.options, self._names = space, group_options(space), drawn.names
+        self._to_setting = np.linalg.inv(drawn.by_setting)
+        free = drawn.by_setting @ space.settings_of(around)
+        steps = np.arange(-_STEPS_AROUND, _STEPS_AROUND + 1)
+        self.amounts = tuple(
+            step * np.round(amount / step) + step * steps for amount, step in zip(free, drawn.steps, strict=True)
+        )
+        if not self._settings.size:
+            # A setting that is locked, or whose range is narrow, may leave no round amounts: they stay as they are.
             self.amounts = tuple(np.array([amount]) for amount in free)
 
     @property
-    def _clearances(self) -> Float[np.ndarray, "pair 2"]:
-        """Clearances of all pairs of amounts, those outside their range left out [µm]."""
-        pairs = np.array(np.meshgrid(*self.amounts)).reshape(2, -1).T @ self._to_clearance.T
+    def _settings(self) -> Float[np.ndarray, "choice setting"]:
+        """Settings of all combinations of amounts, those outside their range left out."""
+        count = len(self.amounts)
+        pairs = np.array(np.meshgrid(*self.amounts)).reshape(count, -1).T @ self._to_setting.T
         low, high = self.space.shared.lower, self.space.shared.upper
         return np.asarray(pairs[np.all((pairs >= low - _ROUNDING) & (pairs <= high + _ROUNDING), axis=1)])
 
     def problem(self, stacks: tuple[Stack, ...]) -> DiscreteProblem:
-        """Return the choice that keeps the stacks and the range of the clearances."""
+        """Return the choice that keeps the stacks and the range of the settings."""
         shared, still = self.space.shared, np.zeros(len(self.options))
         ranges = tuple(
             Stack(
@@ -146,28 +146,28 @@ class _Grid:
                 budget=sign * bound + _ROUNDING,
                 slopes=sign * row,
             )
-            for name, row, low, high in zip(shared.names, self._to_clearance, shared.lower, shared.upper, strict=True)
+            for name, row, low, high in zip(shared.names, self._to_setting, shared.lower, shared.upper, strict=True)
             for sign, bound in ((1.0, float(high)), (-1.0, float(low)))
         )
-        by_amount = tuple(replace(stack, slopes=stack.slopes @ self._to_clearance) for stack in stacks)
+        by_amount = tuple(replace(stack, slopes=stack.slopes @ self._to_setting) for stack in stacks)
         around = Shared(
-            names=_AMOUNTS,
-            lower=np.array([amounts[0] for amounts in self.amounts]),
-            upper=np.array([amounts[-1] for amounts in self.amounts]),
+            names=self._names,
+            lower=np.array([amounts[0] for amounts in self.amounts], float),
+            upper=np.array([amounts[-1] for amounts in self.amounts], float),
         )
         problem = AllocationProblem(features=self.space.features, stacks=(*by_amount, *ranges), shared=around)
         return DiscreteProblem(problem=problem, options=self.options, grids=self.amounts)
 
     def design(self, found: DiscreteSolution) -> Float[np.ndarray, " variable"]:
         """Return the design of a choice."""
-        return np.concatenate([found.zones, self._to_clearance @ found.shared])
+        return np.concatenate([found.zones, self._to_setting @ found.shared])
 
     def least_violating(self, stacks: tuple[Stack, ...]) -> Float[np.ndarray, " variable"]:
-        """Return the tightest zones with the clearances, inside their range, whose largest violation is least."""
+        """Return the tightest zones with the settings, inside their range, whose largest violation is least."""
         tightest = np.array([min(own.zone for own in options) for options in self.options])
         problem = self.space.problem(stacks)
-        largest = [(problem.violation(tightest, pair) / problem.scales).max() for pair in self._clearances]
-        return np.append(tightest, self._clearances[int(np.argmin(largest))])
+        largest = [(problem.violation(tightest, pair) / problem.scales).max() for pair in self._settings]
+        return np.append(tightest, self._settings[int(np.argmin(largest))])
 
 
 def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> GradedAllocation:
@@ -199,7 +199,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     """
     space = with_shared_zones(verifier.space)
     own, design = replace(verifier, space=space), np.clip(start.design, space.lower, space.upper)
-    grid, tried = _Grid(space, design), [own.verify(design, "graded start")]
+    grid, tried = _Grid(space, verifier.model.drawn_amounts, design), [own.verify(design, "graded start")]
     missed, kept = -1.0, np.inf
     while len(tried) <= steps and kept - missed > _SETTLED:
         margin = missed + 1.0 if kept == np.inf else (missed + kept) / 2
@@ -235,7 +235,7 @@ def _labels(grid: _Grid, chosen: VerifiedDesign) -> tuple[str, ...]:
     """Return the name of every zone of a choice."""
     return tuple(
         min(options, key=lambda option: abs(option.zone - scale)).label
-        for options, scale in zip(grid.options, chosen.design[:-2], strict=True)
+        for options, scale in zip(grid.options, chosen.scales, strict=True)
     )
 
 

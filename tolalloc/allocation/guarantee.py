@@ -30,7 +30,12 @@ class Trial(Protocol):
 
     @property
     def design(self) -> Float[np.ndarray, " variable"]:
-        """Scales [-] and clearances [µm]."""
+        """Scales [-] and settings."""
+        ...
+
+    @property
+    def groups(self) -> int:
+        """Number of scales; what follows them in a design are the settings [-]."""
         ...
 
     @property
@@ -51,10 +56,19 @@ class Trial(Protocol):
         """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""
         ...
 
+    def linear(self) -> tuple[float, float, Float[np.ndarray, " group"], Float[np.ndarray, " setting"]]:
+        """Return the nominal output, what locked zones and each group add in quadrature, and its change by settings."""
+        ...
+
 
 @runtime_checkable
 class Guarantee(Protocol):
     """What must be shown of an output for its limits to count as kept."""
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        ...
 
     def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side; the requirement is met if no value lies beyond its limit."""
@@ -86,6 +100,11 @@ class AtYield:
     def __post_init__(self) -> None:
         if not 0.5 <= self.target < 1:
             raise InputError.at("requirement", "yield", self.target, "0.5 up to but not 1")
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return f"{self.target:.2%} of units"
 
     def require_enough(self, units: int) -> None:
         """Raise unless so many units can show it.
@@ -146,6 +165,11 @@ class AtCpk:
         if not 0 < self.target <= 10:
             raise InputError.at("requirement", "Cpk", self.target, "above 0 up to 10")
 
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return f"Cpk {self.target:g}"
+
     def require_enough(self, units: int) -> None:
         """Raise unless so many units can show it.
 
@@ -189,6 +213,11 @@ class AtCpk:
 class WorstCase:
     """No unit inside its zones lies beyond a limit, as far as an ascent from many starts can tell."""
 
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return "worst case found"
+
     def require_enough(self, units: int) -> None:
         """Accept every number of units; none is asked."""
 
@@ -198,10 +227,67 @@ class WorstCase:
 
     def _side(self, trial: Trial, sign: Literal[1, -1], limit: float) -> Side:
         value, gradient = trial.worst(sign)
-        stack = worst_case_stack(_name(trial, sign), trial.design, sign * (value - limit), sign * gradient)
+        stack = worst_case_stack(
+            _name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
+        )
         return Side(
             sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), scale=_scale(trial, limit), stack=stack
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootSumSquare:
+    """Nominal value and root-sum-square of what every source adds at its limit, to first order, lie inside the limits.
+
+    Notes
+    -----
+    The classical stack: √Σ(Dᵢtᵢ)² with the derivatives Dᵢ at nominal and tᵢ half the zone. It takes sizes and
+    positions, needs no sample and knows neither distributions nor what the model bends, so the report shows the yield
+    of fresh units beside it.
+    """
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return "root-sum-square"
+
+    def require_enough(self, units: int) -> None:
+        """Accept every number of units; none is asked."""
+
+    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side.
+
+        Raises
+        ------
+        InputError
+            A source that is neither a size nor a position.
+        """
+        value, locked, added, by_setting = trial.linear()
+        spread = float(np.hypot(locked, np.linalg.norm(added)))
+        scales, settings = trial.design[: trial.groups], trial.design[trial.groups :]
+        return tuple(
+            Side(
+                sign=sign,
+                limit=limit,
+                value=value + sign * spread,
+                doubt=0.0,
+                scale=_scale(trial, limit),
+                stack=Stack(
+                    name=_name(trial, sign),
+                    worst_case=np.zeros(trial.groups),
+                    root_sum_square=added / scales,
+                    # Locked zones take their part of the quadrature: the free ones may fill what it leaves.
+                    budget=_left(sign * (limit - value), locked) + float(sign * by_setting @ settings),
+                    slopes=sign * by_setting,
+                ),
+            )
+            for sign, limit in _turned(limits)
+        )
+
+
+def _left(distance: float, locked: float) -> float:
+    """Return what locked zones leave of the distance to a limit, less than nothing beyond it [unit of the output]."""
+    return float(np.sqrt(max(distance**2 - locked**2, 0.0))) if distance > locked else distance - locked
 
 
 def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
@@ -245,4 +331,4 @@ def _root_sum_square(trial: Trial, sign: int, limit: float, value: float) -> Sta
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
     standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
     gradient = sign * (1.0 + spread * standard) @ derivative / known.size
-    return root_sum_square_stack(_name(trial, sign), trial.design, value - sign * limit, gradient)
+    return root_sum_square_stack(_name(trial, sign), trial.design, value - sign * limit, gradient, trial.groups)

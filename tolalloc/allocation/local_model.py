@@ -48,26 +48,38 @@ class Side:
         """The same over the scale [-]."""
         return self.excess / self.scale
 
+    def load_of_zones(self, design: Float[np.ndarray, " variable"]) -> float:
+        """Return what the zones alone take of the model's budget [unit of the output]."""
+        groups = self.stack.worst_case.size
+        return float(self.stack.load(design[:groups], np.zeros(design.size - groups)))
+
     def predicted(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the excess that the model predicts, negative inside the limit [unit of the output]."""
-        return np.asarray(self.stack.load(designs[..., :-2], designs[..., -2:]) - self.stack.budget)
+        groups = self.stack.worst_case.size
+        return np.asarray(self.stack.load(designs[..., :groups], designs[..., groups:]) - self.stack.budget)
 
 
 def root_sum_square_stack(
-    name: str, design: Float[np.ndarray, " variable"], excess: float, gradient: Float[np.ndarray, " variable"]
+    name: str,
+    design: Float[np.ndarray, " variable"],
+    excess: float,
+    gradient: Float[np.ndarray, " variable"],
+    groups: int,
 ) -> Stack:
-    """Return the model of a statistical requirement: slopes·clearances + ‖weights∘scales‖₂ ≤ budget.
+    """Return the model of a statistical requirement: slopes·settings + ‖weights∘scales‖₂ ≤ budget.
 
     Parameters
     ----------
     name
         What the stack keeps.
     design
-        Scales [-] and clearances [µm].
+        Scales [-] and settings.
     excess
         How far the design lies beyond the limit [unit of the output].
     gradient
-        Derivative of the excess by every variable [unit of the output, per µm for the clearances].
+        Derivative of the excess by every variable [unit of the output, per unit of a setting].
+    groups
+        Number of scales; what follows them are the settings [-].
 
     Notes
     -----
@@ -75,26 +87,30 @@ def root_sum_square_stack(
     is gradient·scales. A group whose larger zone relieves the limit, by noise or because its errors open the contact,
     gets weight zero: the model never rewards a larger error.
     """
-    by_scale = np.maximum(gradient[:-2], 0.0)
-    spread = float(by_scale @ design[:-2])
+    by_scale = np.maximum(gradient[:groups], 0.0)
+    spread = float(by_scale @ design[:groups])
     return Stack(
         name=name,
         worst_case=np.zeros(by_scale.size),
-        root_sum_square=np.sqrt(by_scale * spread / design[:-2]),
-        budget=float(spread + gradient[-2:] @ design[-2:] - excess),
-        slopes=gradient[-2:].copy(),
+        root_sum_square=np.sqrt(by_scale * spread / design[:groups]),
+        budget=float(spread + gradient[groups:] @ design[groups:] - excess),
+        slopes=gradient[groups:].copy(),
     )
 
 
 def worst_case_stack(
-    name: str, design: Float[np.ndarray, " variable"], excess: float, gradient: Float[np.ndarray, " variable"]
+    name: str,
+    design: Float[np.ndarray, " variable"],
+    excess: float,
+    gradient: Float[np.ndarray, " variable"],
+    groups: int,
 ) -> Stack:
-    """Return the model of a worst case, weights·scales + slopes·clearances ≤ budget, from the same arguments."""
-    by_scale = np.maximum(gradient[:-2], 0.0)
+    """Return the model of a worst case, weights·scales + slopes·settings ≤ budget, from the same arguments."""
+    by_scale = np.maximum(gradient[:groups], 0.0)
     return Stack(
         name=name,
         worst_case=by_scale,
         root_sum_square=np.zeros(by_scale.size),
-        budget=float(by_scale @ design[:-2] + gradient[-2:] @ design[-2:] - excess),
-        slopes=gradient[-2:].copy(),
+        budget=float(by_scale @ design[:groups] + gradient[groups:] @ design[groups:] - excess),
+        slopes=gradient[groups:].copy(),
     )

@@ -1,4 +1,4 @@
-"""The requirement as a function of the design: the quantile of the peak-to-peak that the yield asks for."""
+"""The leading requirement as a function of the design: the quantile of its output that the guarantee asks for."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
-from tolalloc.model import Evaluation
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.models import Evaluation, Model
 
 
 @dataclass(frozen=True, kw_only=True)
 class QuantileResponse:
-    """Quantile of the peak-to-peak of a design, on the real kernel with common random numbers.
+    """Quantile of an output of a design, on the real model with common random numbers.
 
     Parameters
     ----------
     space
         The design variables.
-    kernel
+    model
         What answers for single units.
+    output
+        Name of the output with its unit.
     standard
         Standard values of the units that all designs share [-].
     spread
@@ -35,7 +36,8 @@ class QuantileResponse:
     """
 
     space: DesignSpace
-    kernel: KernelResponse
+    model: Model
+    output: str
     standard: Float[np.ndarray, "unit column"]
     spread: float
 
@@ -47,13 +49,13 @@ class QuantileResponse:
     @property
     def outputs(self) -> tuple[str, ...]:
         """The one output."""
-        return ("quantile of the peak-to-peak transmission error [arcsec]",)
+        return (f"quantile of the {self.output}",)
 
     def __call__(self, x: Float[np.ndarray, "design variable"]) -> Evaluation:
         """Return the quantile of every design; a design with a failed unit is a failed sample."""
         values, status = np.empty((x.shape[0], 1)), np.zeros(x.shape[0], np.uint8)
         for at, design in enumerate(x):
-            response = self.kernel.with_modification(self.space.modification(design))
+            response = self.model.at(self.space.settings_of(design)).reading((self.output,))
             evaluation = response(self.space.errors.deviations(self.standard, self.space.zones(design)))
             units = evaluation.values[evaluation.good, 0]
             values[at, 0] = units.mean() + self.spread * units.std(ddof=1) if units.size > 1 else np.nan
@@ -68,11 +70,11 @@ class LocalQuantile:
     Parameters
     ----------
     side
-        The upper limit on the peak-to-peak at the verified design, with its model.
+        The limited side of the output at the verified design, with its model.
     """
 
     side: Side
 
     def __call__(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
-        """Return the model's quantile [arcsec]."""
-        return self.side.limit + self.side.predicted(designs)
+        """Return the model's quantile [unit of the output]."""
+        return self.side.limit + self.side.sign * self.side.predicted(designs)

@@ -27,6 +27,13 @@ class Requirement:
     limits: Limits
     guarantee: Guarantee
 
+    @property
+    def sentence(self) -> str:
+        """The requirement in words."""
+        ends = {"at least": self.limits.lower, "at most": self.limits.upper}
+        said = " and ".join(f"{word} {end:g}" for word, end in ends.items() if end is not None)
+        return f"{self.output}: {said}, shown for {self.guarantee.words}"
+
     def check(self, trial: Trial) -> Check:
         """Return how a design stands against the requirement."""
         return Check(requirement=self, sides=self.guarantee.judge(trial, self.limits))

@@ -1,4 +1,4 @@
-"""Whether the drawing stays the same when costs, stiffness or processes are not what was assumed."""
+"""Whether the drawing stays the same when costs, the model or processes are not what was assumed."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Model
 
 COST_CHANGE = 0.2
 """Relative change of every cost, up or down, in the corners that are tried [-]."""
@@ -60,8 +60,8 @@ class Robustness:
         The undisturbed answer of the same local models [-].
     costs
         In random corners of the box in which every cost changes by `COST_CHANGE`.
-    stiffness
-        With stiffnesses drawn from what is not known of them; none where a study names no identified stiffness.
+    uncertain
+        With what is uncertain in the model drawn from what is known of it; none where nothing is.
     second_best
         With the second-best set of processes, none where there is no other.
     """
@@ -69,13 +69,13 @@ class Robustness:
     groups: tuple[str, ...]
     optimum: Float[np.ndarray, " group"]
     costs: tuple[Variant, ...]
-    stiffness: tuple[Variant, ...]
+    uncertain: tuple[Variant, ...]
     second_best: Variant | None
 
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All of them."""
-        return (*self.costs, *self.stiffness, *((self.second_best,) if self.second_best else ()))
+        return (*self.costs, *self.uncertain, *((self.second_best,) if self.second_best else ()))
 
     @property
     def ratios(self) -> Float[np.ndarray, "variant group"]:
@@ -89,18 +89,18 @@ class Robustness:
 
 
 def robustness(
-    verifier: Verifier, allocation: Allocation, kernels: Sequence[KernelResponse], seeds: SeedTree, draws: int
+    verifier: Verifier, allocation: Allocation, models: Sequence[Model], seeds: SeedTree, draws: int
 ) -> Robustness:
-    """Return the answers under changed costs, stiffnesses and processes.
+    """Return the answers under changed costs, models and processes.
 
     Parameters
     ----------
     verifier
-        Judges the chosen design again with every changed stiffness.
+        Judges the chosen design again with every changed model.
     allocation
         What was found.
-    kernels
-        Kernels of reducers with changed stiffnesses.
+    models
+        The model with what is uncertain in it changed, such as its stiffnesses.
     seeds
         Node of the seed tree.
     draws
@@ -109,10 +109,10 @@ def robustness(
     Notes
     -----
     Costs and processes are changed in the local models of the chosen design. What is lost is largest where every cost
-    is wrong by all of its change, so corners are drawn and not what lies between them. A changed stiffness takes models
-    of its own around the same design. How far it moves what is compared with a limit is the difference between two
-    kernels on the same units, added to what the verification of the chosen design found: the luck of a second sample,
-    often smaller and so less able to show a yield, tells nothing of the stiffness.
+    is wrong by all of its change, so corners are drawn and not what lies between them. A changed model takes local
+    models around the same design. How far it moves what is compared with a limit is the difference between two
+    models on the same units, added to what the verification of the chosen design found: the luck of a second sample,
+    often smaller and so less able to show a yield, tells nothing of the change.
     """
     problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
     corners = seeds.child("costs").generator().choice([1 - COST_CHANGE, 1 + COST_CHANGE], (draws, optimum.zones.size))
@@ -123,7 +123,7 @@ def robustness(
             _with_costs(problem, optimum, own, locked, f"corner {at} of the costs")
             for at, own in enumerate(corners, start=1)
         ),
-        stiffness=_with_kernels(verifier, allocation, kernels),
+        uncertain=_with_models(verifier, allocation, models),
         second_best=_second_best(problem, optimum, locked),
     )
 
@@ -147,19 +147,20 @@ def _priced(feature: PricedFeature, factor: float) -> PricedFeature:
     return replace(feature, processes=processes)
 
 
-def _with_kernels(verifier: Verifier, allocation: Allocation, kernels: Sequence[KernelResponse]) -> tuple[Variant, ...]:
-    """Return the answers of reducers with changed stiffnesses."""
-    if not kernels:
+def _with_models(verifier: Verifier, allocation: Allocation, models: Sequence[Model]) -> tuple[Variant, ...]:
+    """Return the answers of changed models."""
+    if not models:
         return ()
+    name = verifier.model.uncertain[0].name.split(" (")[0]
     undisturbed = verifier.verify(allocation.chosen.design, "robustness")
     return tuple(
-        _with_kernel(replace(verifier, kernel=kernel), allocation, undisturbed, f"stiffness {at}")
-        for at, kernel in enumerate(kernels, start=1)
+        _with_model(replace(verifier, model=model), allocation, undisturbed, f"{name} {at}")
+        for at, model in enumerate(models, start=1)
     )
 
 
-def _with_kernel(verifier: Verifier, allocation: Allocation, undisturbed: VerifiedDesign, name: str) -> Variant:
-    """Return the answer of a reducer with changed stiffnesses."""
+def _with_model(verifier: Verifier, allocation: Allocation, undisturbed: VerifiedDesign, name: str) -> Variant:
+    """Return the answer of a changed model."""
     chosen, optimum, stacks = allocation.chosen, allocation.inside, []
     judged = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units
     rises = [
@@ -167,7 +168,7 @@ def _with_kernel(verifier: Verifier, allocation: Allocation, undisturbed: Verifi
         for now, before in zip(judged.sides, undisturbed.sides, strict=True)
     ]
     for side, aimed, rise in zip(judged.sides, allocation.stacks, rises, strict=True):
-        loads = [float(stack.load(chosen.design[:-2], chosen.design[-2:])) for stack in (side.stack, aimed)]
+        loads = [float(stack.load(chosen.scales, chosen.settings)) for stack in (side.stack, aimed)]
         stacks.append(replace(side.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
     problem = verifier.space.problem(tuple(stacks))
     found = process_choice.allocate(problem)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -46,9 +47,7 @@ class Allocation:
     Parameters
     ----------
     limit
-        Largest peak-to-peak allowed [arcsec].
-    groups
-        Names of the groups, in the order of the scales.
+        Limit of the leading output, the upper one of two [unit of the output].
     chosen
         The cheapest design that fresh units on the real kernel show to be met, or the least violating one.
     tried
@@ -128,33 +127,32 @@ class Allocation:
         return 1 - self.chosen.cost / (self.by_hand.cost * unused)
 
 
-def require_reachable(response: QuantileResponse, limit: float, target: float, place: str) -> None:
-    """Raise unless the smallest zones of the table, with the best corner of the clearances, can keep the limit.
+def require_reachable(response: QuantileResponse, limit: float, place: str) -> None:
+    """Raise unless the smallest zones of the table, with the best corner of the settings, can keep an upper limit.
 
     Parameters
     ----------
     response
-        Quantile of a design on the real kernel.
+        Quantile of a design on the real model.
     limit
-        Largest peak-to-peak allowed [arcsec].
-    target
-        Yield asked for [-].
+        Largest value of the leading output allowed [unit of the output].
     place
-        Where they stand, for the message.
+        Where it stands, for the message.
 
     Raises
     ------
     InputError
         The limit is below what the smallest zones leave, or no zone may change.
     """
-    require_groups(response.space, place)
-    lower, upper = response.space.lower, response.space.upper
-    corners = [[*lower[:-2], flank, radial] for flank in (lower[-2], upper[-2]) for radial in (lower[-1], upper[-1])]
-    least = float(response(np.array(corners)).values.min())
+    space = response.space
+    require_groups(space, place)
+    scales, ends = space.lower[: len(space.groups)], zip(space.shared.lower, space.shared.upper, strict=True)
+    corners = np.array([[*scales, *corner] for corner in product(*ends)])
+    least = float(response(corners).values.min())
     if not least <= limit:
         raise InputError(
-            f"{place}: limit_arcsec is {limit:g}; allowed is {least:.3g} or more, the peak-to-peak that "
-            f"{target:.2%} of units keep with every zone at its smallest (min in the tolerance table)."
+            f"{place}: the limit of {response.output} is {limit:g}; allowed is {least:.3g} or more, which units keep "
+            "with every zone at its smallest (min in the tolerance table)."
         )
 
 

@@ -14,16 +14,13 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import DifferencedResponse
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.model import Evaluation
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
-from tolalloc.units import MICROMETRE
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import InputError
+from tolalloc.models import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
 
 _SCALE_STEP = 0.05
 """Step of a scale to either side, over the scale [-]."""
-_CLEARANCE_STEP = 0.1
-"""Step of a clearance to either side [µm]."""
 _COLUMN_STEP = 0.02
 """Step of a column to either side, over its standard deviation [-]."""
 
@@ -36,22 +33,22 @@ class FreshUnits:
     ----------
     space
         The design variables.
-    kernel
-        The real kernel.
+    model
+        The real model.
     design
-        Scales [-] and clearances [µm].
+        Scales [-] and settings.
     standard
         Standard values of the units [-].
     outputs
-        Names of the outputs besides the peak-to-peak.
+        Names of the outputs, the leading one first.
     slope_units
-        Units, the first ones, that the derivatives of these outputs are averaged over [-].
+        Units, the first ones, over which derivatives that the model does not know exactly are averaged [-].
     seeds
         Node of the seed tree, for the worst units.
     """
 
     space: DesignSpace
-    kernel: KernelResponse
+    model: Model
     design: Float[np.ndarray, " variable"]
     standard: Float[np.ndarray, "unit column"]
     outputs: tuple[str, ...]
@@ -64,44 +61,59 @@ class FreshUnits:
         return self.space.errors.deviations(self.standard, self.space.zones(self.design))
 
     @cached_property
-    def answers(self) -> WithDerivatives:
-        """Peak-to-peak with its exact derivatives."""
-        return self._kernel_at(self.design).with_derivatives(self.x)
+    def exact(self) -> dict[str, SettingDerivatives]:
+        """Outputs whose derivatives the model knows exactly."""
+        model = self._at(self.design)
+        return {output: model.derivatives(output, self.x) for output in self.outputs if output in model.exact}
 
     @cached_property
-    def sample(self) -> MonteCarlo:
-        """The units with their peak-to-peak."""
-        return MonteCarlo(x=self.x, evaluation=self.answers.evaluation)
+    def _others(self) -> tuple[str, ...]:
+        """Names of the other outputs."""
+        return tuple(output for output in self.outputs if output not in self.model.exact)
 
     @cached_property
     def others(self) -> Evaluation:
         """The other outputs, in the order of their names; a unit is good if all of them are."""
-        found = self._others_at(self.design)(self.x)
-        return Evaluation(values=found.values[:, self._columns], status=found.status)
+        return self._at(self.design).reading(self._others)(self.x)
+
+    def evaluation(self, output: str) -> Evaluation:
+        """Return one output of every unit."""
+        if output in self.exact:
+            return self.exact[output].evaluation
+        at = self._others.index(output)
+        return Evaluation(values=self.others.values[:, [at]], status=self.others.status)
+
+    @cached_property
+    def samples(self) -> tuple[MonteCarlo, ...]:
+        """The units with every output that is solved on its own, the leading one first."""
+        first = MonteCarlo(x=self.x, evaluation=self.evaluation(self.outputs[0]))
+        rest = [MonteCarlo(x=self.x, evaluation=self.exact[name].evaluation) for name in [*self.exact][1:]]
+        others = [MonteCarlo(x=self.x, evaluation=self.others)] if self._others else []
+        return (first, *rest, *others)
 
     def values(self, output: str) -> Float[np.ndarray, " unit"]:
         """Return one output of every unit, NaN where it has none [unit of the output]."""
-        evaluation, at = (
-            (self.answers.evaluation, 0) if output == PEAK_TO_PEAK else (self.others, self.outputs.index(output))
-        )
+        evaluation = self.exact[output].evaluation if output in self.exact else self.others
+        at = 0 if output in self.exact else self._others.index(output)
         return np.where(evaluation.good, evaluation.values[:, at], np.nan)
 
-    @cached_property
-    def by_zone(self) -> Float[np.ndarray, "good source"]:
-        """Derivative of every good unit's peak-to-peak by the zones [arcsec/m]."""
-        good, names = self.answers.evaluation.good, self.space.errors.source_of_column
+    def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
+        """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m]."""
+        found = self.exact[output]
+        good, names = found.evaluation.good, self.space.errors.source_of_column
         starts = [names.index(source.name) for source in self.space.errors.active]
-        return np.asarray(np.add.reduceat(self.answers.by_column[good] * self.standard[good], starts, axis=1))
+        return np.asarray(np.add.reduceat(found.by_column[good] * self.standard[good], starts, axis=1))
 
     def derived(self, output: str) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return an output of some units and its derivative by every variable [unit of the output]."""
-        if output != PEAK_TO_PEAK:
+        if output not in self.exact:
             values, slopes = self._differences
-            at = self.outputs.index(output)
+            at = self._others.index(output)
             return values[:, at], slopes[:, at]
-        good = self.answers.evaluation.good
-        by_clearance = self.answers.by_modification[good] @ self.space.modification_by_clearance * MICROMETRE
-        return self.values(output)[good], np.concatenate([self.space.by_scale(self.by_zone), by_clearance], axis=1)
+        found = self.exact[output]
+        good = found.evaluation.good
+        by_scale = self.space.by_scale(self.by_zone(output))
+        return self.values(output)[good], np.concatenate([by_scale, found.by_setting[good]], axis=1)
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output].
@@ -110,24 +122,49 @@ class FreshUnits:
         -----
         The worst unit moves with the design, but to first order its value does not feel that (envelope theorem).
         """
-        kernel = self._kernel_at(self.design)
-        response = kernel if output == PEAK_TO_PEAK else self._differenced(output)
         zones = self.space.zones(self.design)
-        found = worst_unit(Experiment(response, self.space.errors, zones, self.seeds.child(output)), sense=sense)
-        by_clearance = []
-        for step in _CLEARANCE_STEP * np.eye(self.design.size)[-2:]:
-            ends = [self._one(output, self.design + side * step, found.x) for side in (1, -1)]
-            by_clearance.append((ends[0] - ends[1]) / (2 * _CLEARANCE_STEP))
-        return found.value, np.append(self.space.by_scale(found.by_zone), by_clearance)
+        experiment = Experiment(self._differentiable(output), self.space.errors, zones, self.seeds.child(output))
+        found = worst_unit(experiment, sense=sense)
+        return found.value, np.append(self.space.by_scale(found.by_zone), self._by_setting(output, found.x))
+
+    def linear(self, output: str) -> tuple[float, Float[np.ndarray, " source"], Float[np.ndarray, " setting"]]:
+        """Return the output of the nominal unit, what each source adds to it at its limit, and its change by settings.
+
+        Raises
+        ------
+        InputError
+            A source whose zone is neither a size nor a position, which has no single limit.
+        """
+        errors, zones = self.space.errors, self.space.zones(self.design)
+        for source in errors.active:
+            if source.feature not in (Feature.SIZE, Feature.POSITION):
+                raise InputError(
+                    f"{source.name}: a root-sum-square guarantee takes sizes and positions; its feature is "
+                    f"{source.feature.value}. Ask for a yield or a Cpk instead."
+                )
+        nominal = errors.deviations(np.zeros((1, len(errors.columns))), zones)
+        found = self._differentiable(output).with_derivatives(nominal)
+        slopes = [np.linalg.norm(found.by_column[0, own]) for own in errors.columns_of_source[: len(errors.active)]]
+        limits = zones / 2 / np.array([source.lever for source in errors.active])
+        return float(found.evaluation.values[0, 0]), np.array(slopes) * limits, self._by_setting(output, nominal[0])
+
+    def _by_setting(self, output: str, x: Float[np.ndarray, " column"]) -> Float[np.ndarray, " setting"]:
+        """Return the derivative of one unit's output by the settings, by central differences."""
+        slopes, model = [], self.model
+        present = self.space.settings_of(self.design)
+        for step, size in zip(np.diag(self.space.setting_steps), self.space.setting_steps, strict=True):
+            ends = [model.at(present + side * step).reading((output,))(x[np.newaxis]) for side in (1, -1)]
+            slopes.append((float(ends[0].values[0, 0]) - float(ends[1].values[0, 0])) / (2 * size))
+        return np.array(slopes)
 
     @cached_property
     def _differences(
         self,
     ) -> tuple[Float[np.ndarray, "known output"], Float[np.ndarray, "known output variable"]]:
         """Other outputs of the first units, and their derivatives by central differences with the same units."""
-        standard = self.standard[: self.slope_units]
-        steps = np.append(_SCALE_STEP * self.design[:-2], [_CLEARANCE_STEP] * 2)
-        slopes = np.empty((len(standard), len(self.outputs), steps.size))
+        standard, groups = self.standard[: self.slope_units], len(self.space.groups)
+        steps = np.append(_SCALE_STEP * self.design[:groups], self.space.setting_steps)
+        slopes = np.empty((len(standard), len(self._others), steps.size))
         for at, step in enumerate(np.diag(steps)):
             ends = [self._others_of(self.design + side * step, standard) for side in (1, -1)]
             slopes[..., at] = (ends[0] - ends[1]) / (2 * steps[at])
@@ -139,35 +176,23 @@ class FreshUnits:
         self, design: Float[np.ndarray, " variable"], standard: Float[np.ndarray, "unit column"]
     ) -> Float[np.ndarray, "unit output"]:
         """Return the other outputs of the units at another design, NaN where one has none."""
-        found = self._others_at(design)(self.space.errors.deviations(standard, self.space.zones(design)))
-        return np.where(found.good[:, np.newaxis], found.values, np.nan)[:, self._columns]
+        found = self._at(design).reading(self._others)(self.space.errors.deviations(standard, self.space.zones(design)))
+        return np.where(found.good[:, np.newaxis], found.values, np.nan)
 
-    def _one(self, output: str, design: Float[np.ndarray, " variable"], x: Float[np.ndarray, " column"]) -> float:
-        """Return one output of one unit at another design's clearances [unit of the output]."""
-        if output == PEAK_TO_PEAK:
-            return float(self._kernel_at(design)(x[np.newaxis]).values[0, 0])
-        return float(self._others_at(design)(x[np.newaxis]).values[0, self._columns[self.outputs.index(output)]])
+    def _differentiable(self, output: str) -> ResponseWithDerivatives:
+        """Return the output at the design with derivatives by the columns, exact ones where the model knows them."""
+        response = self._at(self.design).reading((output,))
+        if isinstance(response, ResponseWithDerivatives):
+            return response
+        return DifferencedResponse(response=response, output=output, steps=_COLUMN_STEP * self.x.std(axis=0))
 
-    def _differenced(self, output: str) -> DifferencedResponse:
-        steps = _COLUMN_STEP * self.x.std(axis=0)
-        return DifferencedResponse(response=self._others_at(self.design), output=output, steps=steps)
-
-    def _kernel_at(self, design: Float[np.ndarray, " variable"]) -> KernelResponse:
-        return self.kernel.with_modification(self.space.modification(design))
-
-    def _others_at(self, design: Float[np.ndarray, " variable"]) -> OutputsResponse:
-        readings = tuple(reading for reading in REQUIREMENTS if not {*reading.outputs}.isdisjoint(self.outputs))
-        return OutputsResponse(kernel=self._kernel_at(design), readings=readings)
-
-    @property
-    def _columns(self) -> list[int]:
-        """Where the other outputs stand among those of their readings."""
-        return [self._others_at(self.design).outputs.index(output) for output in self.outputs]
+    def _at(self, design: Float[np.ndarray, " variable"]) -> Model:
+        return self.model.at(self.space.settings_of(design))
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutputTrial:
-    """What fresh units of a design say of one output; a `tolalloc.allocation.requirement.Trial`.
+    """What fresh units of a design say of one output; a `tolalloc.allocation.guarantee.Trial`.
 
     Parameters
     ----------
@@ -182,8 +207,13 @@ class OutputTrial:
 
     @property
     def design(self) -> Float[np.ndarray, " variable"]:
-        """Scales [-] and clearances [µm]."""
+        """Scales [-] and settings."""
         return self.units.design
+
+    @property
+    def groups(self) -> int:
+        """Number of scales; what follows them in a design are the settings [-]."""
+        return len(self.units.space.groups)
 
     @cached_property
     def values(self) -> Float[np.ndarray, " unit"]:
@@ -203,3 +233,13 @@ class OutputTrial:
     def worst(self, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""
         return self.units.worst(self.output, sense)
+
+    def linear(self) -> tuple[float, float, Float[np.ndarray, " group"], Float[np.ndarray, " setting"]]:
+        """Return the nominal output, what locked zones and each group add in quadrature, and its change by settings.
+
+        All to first order [unit of the output].
+        """
+        value, added, by_setting = self.units.linear(self.output)
+        group = self.units.space.group_of_source
+        own = np.array([np.linalg.norm(added[group == at]) for at in range(self.groups)])
+        return value, float(np.linalg.norm(added[group < 0])), own, by_setting

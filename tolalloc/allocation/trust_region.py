@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.programs import SETTLED, Programs
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 
 _SIMILAR = (1.25, 1.0)
-"""Ratio of scales [-] and difference of clearances [µm] up to which designs share their convex models."""
+"""Ratio of scales, and difference of settings over ten steps of theirs, up to which designs share their models [-]."""
 _EXPLAINED = 2.0
 """Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
@@ -35,7 +34,7 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     each limit. Where the models of the last design also explain earlier ones near by, their mean deviation from them
     corrects them, so the noise averages out.
     """
-    similar = [item for item in tried if _is_similar(item.design, last.design)]
+    similar = [item for item in tried if _is_similar(item, last)]
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
@@ -43,10 +42,11 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     return tuple(stacks)
 
 
-def _is_similar(first: Float[np.ndarray, " variable"], second: Float[np.ndarray, " variable"]) -> bool:
+def _is_similar(first: VerifiedDesign, second: VerifiedDesign) -> bool:
     ratio, distance = _SIMILAR
-    scales = np.abs(np.log(first[:-2] / second[:-2])).max(initial=0.0)
-    return bool(scales <= np.log(ratio) and np.abs(first[-2:] - second[-2:]).max() <= distance)
+    scales = np.abs(np.log(first.scales / second.scales)).max(initial=0.0)
+    moved = np.abs(first.settings - second.settings) / (10 * first.space.setting_steps)
+    return bool(scales <= np.log(ratio) and moved.max(initial=0.0) <= distance)
 
 
 def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:
@@ -61,7 +61,7 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     margin
         How far inside each limit the aim is; 0 for the limits themselves [standard errors].
     """
-    loads = [float(side.stack.load(chosen.design[:-2], chosen.design[-2:])) for side in chosen.sides]
+    loads = [float(side.stack.load(chosen.scales, chosen.settings)) for side in chosen.sides]
     stacks = aimed(chosen, list(tried), margin)
     return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
 

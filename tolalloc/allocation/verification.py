@@ -1,4 +1,4 @@
-"""A design counts only after fresh units on the real kernel have judged it."""
+"""A design counts only after fresh units on the real model have judged it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits, OutputTrial
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import MonteCarlo, Yield, proportion, require_few_failures
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.exceptions import InputError
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,27 +25,31 @@ class VerifiedDesign:
     ----------
     name
         Which search made it, and its number there.
+    space
+        The design variables.
     design
-        Scales [-] and clearances [µm].
+        Scales [-] and settings.
     processes
         Name of the process of every group.
     cost
         Cost [cost units].
     sample
-        The fresh units on the real kernel with their peak-to-peak.
+        The fresh units on the real model with the leading output, which the first requirement limits.
     achieved
-        Yield within the limit of the peak-to-peak.
+        Yield within its limits.
     checks
-        How the design stands against every requirement, the peak-to-peak first.
+        How the design stands against every requirement, the leading one first.
     joint
         Share of units that keep the limits of all requirements.
     outputs
         Outputs of all requirements of every fresh unit, NaN where a unit has none.
     by_zone
-        Change of the peak-to-peak's quantile with the zone of each active source [arcsec/m].
+        Change of the leading output's value with the zone of each active source; none where the model does not know
+        its derivatives exactly [unit of the output per m].
     """
 
     name: str
+    space: DesignSpace
     design: Float[np.ndarray, " variable"]
     processes: tuple[str, ...]
     cost: float
@@ -55,7 +58,17 @@ class VerifiedDesign:
     checks: tuple[Check, ...]
     joint: Yield
     outputs: dict[str, Float[np.ndarray, " unit"]]
-    by_zone: Float[np.ndarray, " source"]
+    by_zone: Float[np.ndarray, " source"] | None
+
+    @property
+    def scales(self) -> Float[np.ndarray, " group"]:
+        """Scale of every group [-]."""
+        return self.design[: len(self.space.groups)]
+
+    @property
+    def settings(self) -> Float[np.ndarray, " setting"]:
+        """The settings [units of their names]."""
+        return self.space.settings_of(self.design)
 
     @property
     def met(self) -> bool:
@@ -74,7 +87,7 @@ class VerifiedDesign:
 
     @property
     def quantile_bound(self) -> float:
-        """What of the peak-to-peak is compared with its limit: at a yield, the smallest limit shown kept [arcsec]."""
+        """What of the leading output is compared with its limit: at a yield, the smallest limit shown kept."""
         return self.checks[0].sides[0].value
 
     @property
@@ -92,27 +105,27 @@ class Verifier:
     ----------
     space
         The design variables.
-    kernel
-        The real kernel.
+    model
+        The real model.
     requirements
-        What must be kept; the first one limits the peak-to-peak from above.
+        What must be kept; the first one limits the leading output.
     seeds
         Node of the seed tree; every verification takes its own child.
     units
         Units per verification [-].
     slope_units
-        How many of them the derivatives of other outputs than the peak-to-peak are averaged over [-].
+        How many of them derivatives that the model does not know exactly are averaged over [-].
     largest_failed_share
         Share of the units that may fail [-].
 
     Raises
     ------
     InputError
-        No upper limit on the peak-to-peak stands first, or there are too few units for a guarantee.
+        There are too few units for a guarantee.
     """
 
     space: DesignSpace
-    kernel: KernelResponse
+    model: Model
     requirements: tuple[Requirement, ...]
     seeds: SeedTree
     units: int
@@ -120,16 +133,14 @@ class Verifier:
     largest_failed_share: float = LARGEST_FAILED_SHARE
 
     def __post_init__(self) -> None:
-        first = self.requirements[0]
-        if first.output != PEAK_TO_PEAK or first.limits.upper is None or first.limits.lower is not None:
-            raise InputError(f"requirements: the first one must be an upper limit on the {PEAK_TO_PEAK}.")
         for requirement in self.requirements:
             requirement.guarantee.require_enough(self.units)
 
     @property
     def limit(self) -> float:
-        """Largest peak-to-peak allowed [arcsec]."""
-        return float(self.requirements[0].limits.upper or np.inf)
+        """Limit of the leading output, the upper one of two [unit of the output]."""
+        limits = self.requirements[0].limits
+        return float(limits.upper if limits.upper is not None else limits.lower or 0.0)
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design judged by fresh units of its own.
@@ -141,33 +152,32 @@ class Verifier:
         """
         seeds, errors = self.seeds.child(name), self.space.errors
         outputs = tuple(dict.fromkeys(requirement.output for requirement in self.requirements))
-        others = tuple(output for output in outputs if output != PEAK_TO_PEAK)
         fresh = FreshUnits(
             space=self.space,
-            kernel=self.kernel,
+            model=self.model,
             design=design,
             standard=errors.standard_values(np.concatenate([*seeds.uniform_chunks(self.units, len(errors.columns))])),
-            outputs=others,
+            outputs=outputs,
             slope_units=self.slope_units,
             seeds=seeds,
         )
-        require_few_failures(fresh.sample, name, self.largest_failed_share)
-        if others:
-            require_few_failures(MonteCarlo(x=fresh.x, evaluation=fresh.others), name, self.largest_failed_share)
+        for sample in fresh.samples:
+            require_few_failures(sample, name, self.largest_failed_share)
         checks = tuple(
             requirement.check(OutputTrial(units=fresh, output=requirement.output)) for requirement in self.requirements
         )
         values = {output: fresh.values(output) for output in outputs}
-        kept = np.all([_kept(requirement, values[requirement.output]) for requirement in self.requirements], axis=0)
+        kept = np.array([_kept(requirement, values[requirement.output]) for requirement in self.requirements])
         return VerifiedDesign(
             name=name,
+            space=self.space,
             design=design,
             processes=self.space.process_names(design),
             cost=float(self.space.cost(design)),
-            sample=fresh.sample,
-            achieved=fresh.sample.within(self.limit),
+            sample=fresh.samples[0],
+            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))),
             checks=checks,
-            joint=proportion(self.units, int(np.count_nonzero(~kept))),
+            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
             outputs=values,
             by_zone=_by_zone(fresh, checks[0].sides[0].value),
         )
@@ -179,12 +189,15 @@ def _kept(requirement: Requirement, values: Float[np.ndarray, " unit"]) -> Bool[
     return np.asarray((values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high)))
 
 
-def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"]:
-    """Return the change of mean + spread·σ of the peak-to-peak with the zones [arcsec/m]; equation (24)."""
-    values = fresh.sample.values
+def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"] | None:
+    """Return the change of mean + spread·σ of the leading output with the zones; equation (24)."""
+    leading = fresh.outputs[0]
+    if leading not in fresh.exact:
+        return None
+    values = fresh.samples[0].values
     standard = (values - values.mean()) / values.std()
     spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
-    return np.asarray((1.0 + spread * standard) @ fresh.by_zone / values.size)
+    return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / values.size)
 
 
 def answer(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:

@@ -1,4 +1,4 @@
-"""What a yield costs: the cheapest design for another share of units within the limit of the peak-to-peak."""
+"""What a yield costs: the cheapest design for another share of units within the limit of the leading output."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> 
     allocation
         What was found for the yield asked for; its local models are used.
     target
-        Share of units that must keep the limit of the peak-to-peak [-].
+        Share of units that must keep the limit of the leading output [-].
 
     Returns
     -------
@@ -39,7 +39,7 @@ def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> 
     shown = chosen.sample.quantile_bound(target)
     if not np.isfinite(shown):
         return np.nan
-    spread = float(first.load(chosen.design[:-2], np.zeros(2)))
+    spread = float(first.load(chosen.scales, np.zeros(chosen.settings.size)))
     factor = max(spread + shown - chosen.quantile_bound, 0.0) / spread
     changed = replace(first, worst_case=factor * first.worst_case, root_sum_square=factor * first.root_sum_square)
     found = process_choice.allocate(space.problem((changed, *others)))

@@ -13,7 +13,7 @@ from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.assembly.chain_records import LARGEST, ChainRecord, CostRecord, PartRecord, StepRecord
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Efforts, check_steps, steps_in_order
-from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import read_toml, shipped_or_path, validated
 from tolalloc.rv.reducer.files import PRESETS

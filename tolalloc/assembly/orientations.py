@@ -9,9 +9,9 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.chunks import Mapper
-from tolalloc.drawing.sources import ANGULAR
+from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError
-from tolalloc.model import Evaluation, Observer
+from tolalloc.models import Evaluation, Observer
 from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure

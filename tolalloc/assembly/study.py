@@ -19,7 +19,7 @@ from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.assembly.transmission import transmission_effect
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header

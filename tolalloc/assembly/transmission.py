@@ -12,9 +12,9 @@ from tolalloc.assembly.orientations import OrientationResponse, transmission_cur
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.trajectory import foreseen, random_numbers
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Observer
+from tolalloc.models import Observer
 from tolalloc.rv.equivalent.line_load import contact_pattern
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer

@@ -8,9 +8,9 @@ from typing import Generic, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.model import Response, ResponseWithDerivatives
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Response, ResponseWithDerivatives
 
 LARGEST_FAILED_SHARE = 0.01
 """Share of the units that may fail unless a study says otherwise [-]."""

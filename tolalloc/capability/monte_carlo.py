@@ -9,9 +9,9 @@ from jaxtyping import Float
 from scipy.stats import beta
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.drawing.seeds import SamplingDesign, uniform_chunks
+from tolalloc.drawings.seeds import SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Evaluation, Response
+from tolalloc.models import Evaluation, Response
 
 CONFIDENCE = 0.95
 

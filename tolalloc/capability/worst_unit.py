@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import ResponseWithDerivatives
+from tolalloc.models import ResponseWithDerivatives
 
 _WEIGHT = 0.3
 """Weight of the newest gradient in the mean of all before [-]."""

@@ -80,6 +80,8 @@ class Answer(ABC):
     header: Header
     kind: ClassVar[str]
     """Word for the question, such as ``ranking``."""
+    shown: ClassVar[tuple[str, ...]] = ()
+    """Columns of the first table that a terminal shows; the first six unless an answer says otherwise."""
 
     @property
     @abstractmethod

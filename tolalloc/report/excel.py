@@ -8,28 +8,6 @@ import pandas as pd
 from openpyxl.styles import Alignment, Font
 from openpyxl.utils import get_column_letter
 
-from tolalloc.drawing.tolerance_table import table_frame
-from tolalloc.report import tables
-from tolalloc.report.results import StudyResults
-
-
-def write_workbook(results: StudyResults, path: Path) -> None:
-    """Write ``results.xlsx``: one sheet per table, headers frozen, units in every header."""
-    sheets = {
-        "capability": tables.capability(results),
-        "drawing": tables.before_after(results),
-        "allocation": table_frame(tables.allocated_sources(results), path.parent),
-        "modification": tables.modification(results),
-        "sensitivity": tables.ranking(results),
-        "stack-up": tables.stack_up(results),
-        "pareto": tables.pareto(results),
-        "verified designs": tables.verified(results),
-        "orders": tables.orders(results),
-        "distributions": tables.mappings(results),
-        "assumptions": pd.DataFrame({"assumption": results.assumptions}),
-    }
-    write_sheets(sheets, path)
-
 
 def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
     """Write one sheet per table, headers frozen, units in every header; a text that begins with = is a formula."""

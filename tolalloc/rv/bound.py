@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.sources import neglected_columns
-from tolalloc.drawing.tolerance_table import require_small_zones
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import neglected_columns
+from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS

@@ -1,26 +1,29 @@
-"""The equivalent model of a reducer as a `tolalloc.model.Model`: what every question asks of it."""
+"""The equivalent model of a reducer as a `tolalloc.models.Model`: what every question asks of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.correlation import CorrelatedSource
+from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.model import Model, Observer, Response, Setting, SettingDerivatives
+from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
+from tolalloc.report.document import Section
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading, wave_outputs
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
-from tolalloc.units import MICROMETRE
+from tolalloc.units import ARCMINUTE, MICROMETRE
 
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
@@ -50,6 +53,10 @@ class ReducerModel(Model):
         Stiffnesses that replaced the reducer's own, if any.
     clearances
         Values of the settings in force; those of the reducer's own modification unless given [µm].
+    unit
+        Built unit whose curve is shown beside others, if any.
+    bound_assumptions
+        What binding the drawing to the reducer assumed.
     """
 
     kernel: KernelResponse
@@ -57,6 +64,8 @@ class ReducerModel(Model):
     radial: tuple[float, float] | None = None
     identified: IdentifiedStiffness | None = None
     clearances: tuple[float, float] | None = None
+    unit: BuiltUnit | None = None
+    bound_assumptions: tuple[str, ...] = ()
 
     @property
     def reducer(self) -> Reducer:
@@ -174,8 +183,36 @@ class ReducerModel(Model):
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """Those of the reducer."""
-        return self.reducer.assumptions
+        """Those of the reducer, of the built unit and of what the drawing leaves out."""
+        clearances = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
+        without = (f"without clearance: {', '.join(clearances).replace('_', ' ')}",) if clearances else ()
+        return (
+            *self.reducer.assumptions,
+            *(self.unit.assumptions if self.unit else ()),
+            *self.bound_assumptions,
+            *without,
+        )
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
+        perfect = np.zeros((1, len(self.kernel.model.columns)))
+        stiffness = hysteresis_loop(self.kernel.model, perfect, LOOP_ANGLES).torsional_stiffness[0] * ARCMINUTE
+        return {"torsional stiffness of the perfect reducer [N·m/arcmin]": float(stiffness)}
+
+    @property
+    def drawn_amounts(self) -> DrawnAmounts:
+        """Equidistant and shift amount of the modification, in steps of half a micrometre."""
+        names = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
+        return DrawnAmounts(names=names, by_setting=self._modification_by_clearance, steps=(0.5, 0.5))
+
+    def illustrated(
+        self, units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
+    ) -> tuple[Section, ...]:
+        """Return curves and orders of units, and how exact teeth carry the rated torque."""
+        from tolalloc.rv.illustration import illustrated
+
+        return illustrated(self, units)
 
     @property
     def content(self) -> Any:

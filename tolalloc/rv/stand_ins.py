@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy.polynomial import polynomial
 
 from tolalloc.chunks import map_chunks
-from tolalloc.model import Evaluation, Response
+from tolalloc.models import Evaluation, Response
 from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
@@ -96,7 +96,7 @@ class CurveRegression:
     Parameters
     ----------
     columns, outputs
-        As in `tolalloc.model.Response`.
+        As in `tolalloc.models.Response`.
     modes
         The fitted principal modes of the curves.
     estimator

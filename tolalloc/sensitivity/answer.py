@@ -12,9 +12,9 @@ from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.yield_at_limit import YieldAtLimit
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SamplingDesign, SeedTree
-from tolalloc.model import Model
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SamplingDesign, SeedTree
+from tolalloc.models import Model
 from tolalloc.progress import Record
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Response
+from tolalloc.models import Response
 
 DIRECTIONS = 16
 

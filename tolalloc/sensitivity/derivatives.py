@@ -10,9 +10,9 @@ from scipy.special import ndtr, ndtri
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
-from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
-from tolalloc.model import ResponseWithDerivatives
+from tolalloc.models import ResponseWithDerivatives
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.units import MICROMETRE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tolalloc.capability import yield_at_limit
-from tolalloc.drawing.seeds import SamplingDesign
+from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
 from tolalloc.sensitivity import screening, target
 from tolalloc.sensitivity.sobol import SobolEffort
@@ -88,3 +88,19 @@ class RankingEffort:
     @staticmethod
     def _refusal(field_name: str, value: float, allowed: str) -> InputError:
         return InputError.at("study", f"effort.ranking.{field_name}", value, allowed)
+
+
+QUICK_RANKING = RankingEffort(
+    units=2048,
+    sobol=SobolEffort(start=32, limit=64),
+    trajectories=8,
+    moment_units=512,
+    derivative_units=128,
+    inverse_units=400,
+    surrogate_units=512,
+    level_units=200,
+    level_runs=3,
+    widened_units=500,
+    permutations=100,
+)
+"""Effort of a quick run: every measure is real, every interval wide."""

@@ -16,9 +16,9 @@ from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.rare_failure.response_limit import ResponseLimit
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.differences import DifferencedResponse
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.model import Model, Response, ResponseWithDerivatives, SettingDerivatives
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Model, Response, ResponseWithDerivatives, SettingDerivatives
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent

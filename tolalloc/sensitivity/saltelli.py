@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.blas import one_blas_thread
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 
 _LEAST_RANGE = 8 * np.finfo(float).eps
 """Range of an output over its largest magnitude below which it is rounding and not an effect."""

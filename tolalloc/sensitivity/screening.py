@@ -15,10 +15,10 @@ from jaxtyping import Bool, Float
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Response
+from tolalloc.models import Response
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from tolalloc.drawing.tolerance_table import table_frame
+from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.report.document import Section
 from tolalloc.sensitivity import driver_tables, figures, limit_tables, trust_tables
 from tolalloc.sensitivity.answer import RankingAnswer

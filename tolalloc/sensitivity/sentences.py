@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.drawing.seeds import SamplingDesign
+from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.sensitivity.answer import RankingAnswer, sign_of
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 

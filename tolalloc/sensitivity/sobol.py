@@ -14,9 +14,9 @@ from enum import StrEnum
 import numpy as np
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
-from tolalloc.model import Evaluation, Response
+from tolalloc.models import Evaluation, Response
 from tolalloc.sensitivity.growth import Resampled, grow_until_stable
 from tolalloc.sensitivity.saltelli import SaltelliIndices, saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SaltelliDesign

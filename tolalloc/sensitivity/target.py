@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import limited_measure
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.sensitivity.ranking import percentile_interval
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.correlation import CorrelatedSource
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.model import Model
+from tolalloc.models import Model
 
 _UNITS = 256
 """Units over which the effect is averaged [-]."""

@@ -3,43 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
-from tolalloc.report.document import Document, Section
+from tolalloc.report.answer import Answer, Header
+from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
-
-TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
-
-
-@dataclass(frozen=True, kw_only=True)
-class FinishedRun:
-    """What a run folder says.
-
-    Parameters
-    ----------
-    name
-        How the comparison calls it.
-    summary, manifest
-        Answer and circumstances, units in the names.
-    ranking
-        Sources, largest total index first.
-    zones
-        The allocated tolerance table.
-    """
-
-    name: str
-    summary: dict[str, Any]
-    manifest: dict[str, Any]
-    ranking: pd.DataFrame
-    zones: pd.DataFrame
+from tolalloc.report.wording import with_unit
+from tolalloc.study.finished_run import HIGH, LOW, TOTAL, FinishedRun
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """Two runs.
+class ComparisonAnswer(Answer):
+    """Two finished runs side by side.
 
     Parameters
     ----------
@@ -47,8 +26,73 @@ class Comparison:
         The runs, in the order in which they were named.
     """
 
+    kind: ClassVar[str] = "comparison"
+
     first: FinishedRun
     second: FinishedRun
+
+    @classmethod
+    def of(cls, first: FinishedRun, second: FinishedRun) -> ComparisonAnswer:
+        """Return the comparison of two runs."""
+        return cls(header=Header(name=f"{first.name}, {second.name}", model=""), first=first, second=second)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "Two studies side by side"
+
+    @property
+    def subtitle(self) -> str:
+        """Which ones."""
+        return f"{self.names[0]}; {self.names[1]}."
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The comparison in a few sentences."""
+        return _sentences(self)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the two hard to compare."""
+        return _warnings(self)
+
+    @cached_property
+    def ranking(self) -> pd.DataFrame:
+        """Every source with its rank and total index in both, and whether their intervals lie apart."""
+        return _ranking_table(self)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Answers, rankings, zones."""
+        return (
+            Section(heading="Answers", tables=(("answers", _headline_table(self)),)),
+            Section(
+                heading="Which error drives it",
+                paragraphs=("Overlap of intervals does not prove that two indices are the same.",),
+                figures=(_ranking_figure(self),),
+                tables=(("rankings", self.ranking),),
+            ),
+            Section(heading="What to write on the drawing", tables=(("zones", _zones_table(self)),)),
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The comparison for a program."""
+        answers, ranking, zones = (self.tables_of_sections[name] for name in ("answers", "rankings", "zones"))
+        return {
+            "A": self.first.name,
+            "B": self.second.name,
+            "same question": self.same_question,
+            "answers": answers.to_dict("records"),
+            "rankings": ranking.astype(object).where(ranking.notna(), None).to_dict("records"),
+            "zones": zones.astype(object).where(zones.notna(), None).to_dict("records"),
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def tables_of_sections(self) -> dict[str, pd.DataFrame]:
+        """All tables by name."""
+        return {name: frame for section in self.sections for name, frame in section.tables}
 
     @property
     def runs(self) -> tuple[FinishedRun, FinishedRun]:
@@ -63,11 +107,12 @@ class Comparison:
     @property
     def same_question(self) -> bool:
         """Whether both were asked for the same reducer, torque, limit and yield."""
-        asked = ("reducer", "torque [N·m]", "limit [arcsec]", "yield target [-]")
+        asked = [name for name in self.first.summary if name.startswith("limit")]
+        asked += ["model", "torque [N·m]", "yield target [-]"]
         return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked)
 
 
-def headline_table(comparison: Comparison) -> pd.DataFrame:
+def _headline_table(comparison: ComparisonAnswer) -> pd.DataFrame:
     """Return every number of the two answers, and the difference where there is one."""
     first, second = (run.summary for run in comparison.runs)
     rows = []
@@ -83,7 +128,7 @@ def headline_table(comparison: Comparison) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def ranking_table(comparison: Comparison) -> pd.DataFrame:
+def _ranking_table(comparison: ComparisonAnswer) -> pd.DataFrame:
     """Return every source with its rank and total index in both, and whether their intervals lie apart."""
     columns = ["rank [-]", TOTAL, LOW, HIGH]
     first, second = (run.ranking.set_index("source")[columns] for run in comparison.runs)
@@ -102,7 +147,7 @@ def ranking_table(comparison: Comparison) -> pd.DataFrame:
     ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
 
 
-def zones_table(comparison: Comparison) -> pd.DataFrame:
+def _zones_table(comparison: ComparisonAnswer) -> pd.DataFrame:
     """Return every zone and cost in both."""
     parts = []
     for run in comparison.runs:
@@ -124,9 +169,9 @@ def zones_table(comparison: Comparison) -> pd.DataFrame:
     )
 
 
-def _ranking_figure(comparison: Comparison) -> Figure:
+def _ranking_figure(comparison: ComparisonAnswer) -> Figure:
     """Draw the total indices of both with their intervals."""
-    names = list(ranking_table(comparison)["source"])
+    names = list(comparison.ranking["source"])
     series = []
     for label, run in zip(comparison.names, comparison.runs, strict=True):
         own = run.ranking.set_index("source").reindex(names).fillna(0.0)
@@ -142,16 +187,17 @@ def _ranking_figure(comparison: Comparison) -> Figure:
     )
 
 
-def answer(comparison: Comparison) -> tuple[str, ...]:
+def _sentences(comparison: ComparisonAnswer) -> tuple[str, ...]:
     """Return the comparison in a few sentences."""
     sentences = []
     for label, run in zip(comparison.names, comparison.runs, strict=True):
         found = run.summary
-        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {found['limit [arcsec]']:g}″"
+        limit = next(name for name in found if name.startswith("limit"))
+        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {with_unit(f'{found[limit]:g}', limit)}"
         if "met" in found:  # an allocation; a ranking alone decides nothing
             kept += f", {'met' if found['met'] else 'NOT met'}, cost {found['cost [cost units]']:.2f} cost units"
         sentences.append(f"{kept}.")
-    table = ranking_table(comparison)
+    table = comparison.ranking
     moved = list(table.loc[table["90 % intervals"] == "apart", "source"])
     sentences.append(
         f"Sources whose total indices differ beyond their 90 % intervals: {', '.join(moved)}."
@@ -161,7 +207,7 @@ def answer(comparison: Comparison) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def warnings(comparison: Comparison) -> tuple[str, ...]:
+def _warnings(comparison: ComparisonAnswer) -> tuple[str, ...]:
     """Return what makes the two hard to compare."""
     found = []
     if not comparison.same_question:
@@ -177,34 +223,3 @@ def warnings(comparison: Comparison) -> tuple[str, ...]:
     if comparison.first.manifest.get("study hash") == comparison.second.manifest.get("study hash"):
         found.append("Both are runs of one and the same study, seed included.")
     return tuple(found)
-
-
-def comparison_document(comparison: Comparison) -> Document:
-    """Return the report of the comparison."""
-    headline, ranking, zones = headline_table(comparison), ranking_table(comparison), zones_table(comparison)
-    return Document(
-        title="Two studies side by side",
-        subtitle=f"{comparison.names[0]}; {comparison.names[1]}.",
-        answer=answer(comparison),
-        warnings=warnings(comparison),
-        sections=(
-            Section(heading="Answers", tables=(("answers", headline),)),
-            Section(
-                heading="Which error drives it",
-                paragraphs=("Overlap of intervals does not prove that two indices are the same.",),
-                figures=(_ranking_figure(comparison),),
-                tables=(("rankings", ranking),),
-            ),
-            Section(heading="What to write on the drawing", tables=(("zones", zones),)),
-        ),
-        assumptions=(),
-        summary={
-            "A": comparison.first.name,
-            "B": comparison.second.name,
-            "same question": comparison.same_question,
-            "answers": headline.to_dict("records"),
-            "rankings": ranking.astype(object).where(ranking.notna(), None).to_dict("records"),
-            "zones": zones.astype(object).where(zones.notna(), None).to_dict("records"),
-            "warnings": list(warnings(comparison)),
-        },
-    )

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.model import Response
+from tolalloc.models import Response
 from tolalloc.surrogate.regression import NEEDED_Q2
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 
 HELD_OUT = 0.2
 """Answers that the fit does not see, over those that it sees [-]."""

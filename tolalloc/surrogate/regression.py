@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 
 NEEDED_Q2 = 0.95
 """A surrogate below this Q² is not used; the response itself runs instead."""
@@ -31,7 +31,7 @@ class Regression:
     Parameters
     ----------
     columns, outputs
-        As in `tolalloc.model.Response`.
+        As in `tolalloc.models.Response`.
     estimator
         The fitted scikit-learn estimator of the output over the baseline.
     baseline
@@ -85,7 +85,7 @@ class RegressionCandidate:
     name
         What a table calls it.
     columns, outputs
-        As in `tolalloc.model.Response`.
+        As in `tolalloc.models.Response`.
     estimator
         Makes the unfitted scikit-learn regressor.
     """

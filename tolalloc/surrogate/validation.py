@@ -13,9 +13,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Response
+from tolalloc.models import Response
 
 FOLDS = 5
 FEWEST_OF_FOLD = 2

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from tolalloc.capability.indices import Limits
 from tolalloc.report.figure import Figure, Series
+from tolalloc.report.wording import short, with_unit
 
 
 def zones_figure(drawing: pd.DataFrame, after: str) -> Figure:
@@ -34,27 +36,21 @@ def zones_figure(drawing: pd.DataFrame, after: str) -> Figure:
 
 
 def units_figure(
-    before: Float[np.ndarray, " before"], after: Float[np.ndarray, " after"], share: float, limit: float
+    output: str, before: Float[np.ndarray, " before"], after: Float[np.ndarray, " after"], share: float, limits: Limits
 ) -> Figure:
-    """Return the peak-to-peak of random units before and after.
-
-    Parameters
-    ----------
-    before, after
-        Peak-to-peak of the units [arcsec].
-    share
-        Yield after [-].
-    limit
-        Largest peak-to-peak allowed [arcsec].
-    """
+    """Return an output of random units before and after, with the yield after."""
     return Figure(
-        name="peak_to_peak",
+        name=short(output).replace("-", "_").replace(" ", "_"),
         title=f"Random units before and after; yield after {share:.2%}",
-        x_label="peak-to-peak transmission error, output side [arcsec]",
+        x_label=output,
         y_label="units [-]",
         series=(
             Series(label="tolerance table as it is", kind="histogram", x=list(before)),
             Series(label="as drawn", kind="histogram", x=list(after)),
         ),
-        vertical=((limit, f"limit {limit:g}″"),),
+        vertical=tuple(
+            (limit, f"limit {with_unit(f'{limit:g}', output)}")
+            for limit in (limits.upper, limits.lower)
+            if limit is not None
+        ),
     )

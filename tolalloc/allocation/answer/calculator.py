@@ -13,9 +13,9 @@ from openpyxl import load_workbook
 from openpyxl.styles import Border, Font, PatternFill, Side
 from openpyxl.utils import get_column_letter
 
+from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
-from tolalloc.allocation.answer.results import AllocationResults
-from tolalloc.allocation.answer.tables import unit_of
+from tolalloc.report.wording import unit_of
 from tolalloc.units import MICROMETRE
 
 _FIRST = 2
@@ -36,14 +36,14 @@ _NOTES = {
 }
 
 
-def calculator_sheets(results: AllocationResults) -> dict[str, pd.DataFrame]:
+def calculator_sheets(answer: AllocationAnswer) -> dict[str, pd.DataFrame]:
     """Return the sheets ``zones`` (to change) and ``requirements`` (to watch)."""
-    return {"zones": _zones(results), "requirements": _requirements(results)}
+    return {"zones": _zones(answer), "requirements": _requirements(answer)}
 
 
-def _zones(results: AllocationResults) -> pd.DataFrame:
+def _zones(answer: AllocationAnswer) -> pd.DataFrame:
     """Return one row per group, with what its zone costs and what it adds to every limited side."""
-    space, chosen = results.drawn, results.chosen
+    space, chosen = answer.drawn, answer.chosen
     groups = len(space.groups)
     rows = range(_FIRST, _FIRST + groups)
     made = [
@@ -72,9 +72,9 @@ def _zones(results: AllocationResults) -> pd.DataFrame:
     return table
 
 
-def _requirements(results: AllocationResults) -> pd.DataFrame:
+def _requirements(answer: AllocationAnswer) -> pd.DataFrame:
     """Return one row per limited side with what the zones of the other sheet would keep, and the total cost."""
-    space, chosen = results.drawn, results.chosen
+    space, chosen = answer.drawn, answer.chosen
     first, last = _FIRST, _FIRST + len(space.groups) - 1
     scales, watched = f"zones!$D${first}:$D${last}", []
     for at, side in enumerate(chosen.sides):

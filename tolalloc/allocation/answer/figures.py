@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.allocation.answer import tables, what_if_tables
-from tolalloc.allocation.answer.results import AllocationResults
+from tolalloc.allocation.answer import tables
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.trade import SettingTrade
 from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.units import MICROMETRE
+from tolalloc.report.wording import quantity, short, unit_of, with_unit
 
 
-def front_figure(results: AllocationResults) -> Figure:
-    """Return cost against the peak-to-peak that is kept."""
-    fronts, limit = results.fronts, results.joint.limit
+def front_figure(answer: AllocationAnswer, fronts: Fronts) -> Figure:
+    """Return cost against what is kept of the leading output."""
+    limit, unit = answer.free.limit, unit_of(answer.leading)
+    error = with_unit(f"{answer.chosen.sides[0].doubt:.2g}", answer.leading)
+    guarantee = answer.requirements[0].guarantee
+    by = f" by {guarantee.target:.2%} of units" if isinstance(guarantee, AtYield) else ""
     searched, exact = fronts.searched, fronts.exact
     checked = ~np.isnan(searched.on_kernel)
-    compared = tables.designs(results)
-    others = "; the search keeps the other requirements by their local models" if len(results.requirements) > 1 else ""
+    compared = tables.designs(answer)
+    others = "; the search keeps the other requirements by their local models" if len(answer.requirements) > 1 else ""
     knee = searched.knee
     return Figure(
         name="front",
-        title=f"What a limit costs, dashed: {limit:g}″{others}",
-        x_label=f"peak-to-peak kept by {results.target:.2%} of units [arcsec]",
+        title=f"What a limit costs, dashed: {with_unit(f'{limit:g}', answer.leading)}{others}",
+        x_label=f"{short(answer.leading)} kept{by} [{unit}]",
         y_label="cost [cost units]",
         series=(
             Series(
-                label=f"exact by the local models (±{results.chosen.sides[0].doubt:.2g}″)",
+                label=f"exact by the local models (±{error})",
                 kind="line",
                 x=list(exact.limits),
                 y=list(exact.cost),
@@ -48,39 +55,46 @@ def front_figure(results: AllocationResults) -> Figure:
     )
 
 
-def trade_figures(results: AllocationResults) -> tuple[Figure | HeatMap, ...]:
-    """Return what the modification is worth, nothing where no pair of clearances has a cost."""
-    return (trade_figure(results), trade_map(results)) if np.isfinite(results.trade.cost).any() else ()
+def trade_figures(answer: AllocationAnswer, trade: SettingTrade) -> tuple[Figure | HeatMap, ...]:
+    """Return what the settings are worth, nothing where no choice has a cost."""
+    if not np.isfinite(trade.cost).any():
+        return ()
+    curves = _trade_figure(answer, trade)
+    return (curves, _trade_map(trade)) if len(trade.names) == 2 else (curves,)
 
 
-def trade_map(results: AllocationResults) -> HeatMap:
-    """Return the cost of the cheapest zones over both clearances."""
-    trade = results.trade
+def _trade_map(trade: SettingTrade) -> HeatMap:
+    """Return the cost of the cheapest zones over both settings."""
+    first, second = trade.values
     return HeatMap(
         name="modification_cost",
         title="Cost of the cheapest zones; an empty cell: none found that keep all requirements",
-        columns=[f"{value:.3g}" for value in trade.radial],
-        rows=[f"flank {value:.3g} µm" for value in trade.flank],
-        x_label="radial clearance at tip and root [µm]",
+        columns=[f"{value:.3g}" for value in second],
+        rows=[f"{quantity(trade.names[0])} {value:.3g} {unit_of(trade.names[0])}" for value in first],
+        x_label=trade.names[1],
         label="cost [cost units]",
         values=[[float(value) for value in row] for row in trade.cost],
     )
 
 
-def trade_figure(results: AllocationResults) -> Figure:
-    """Return the cost of the cheapest zones over the radial clearance."""
-    trade, now = results.trade, results.reducer.modification
+def _trade_figure(answer: AllocationAnswer, trade: SettingTrade) -> Figure:
+    """Return the cost of the cheapest zones over the last setting, a line for each value of the others."""
+    along, lines = trade.values[-1], []
+    for at in np.ndindex(trade.cost.shape[:-1]):
+        chosen = [
+            f"{quantity(name)} {values[place]:.3g} {unit_of(name)}"
+            for name, values, place in zip(trade.names, trade.values, at, strict=False)
+        ]
+        if np.isfinite(trade.cost[at]).any():
+            lines.append(_where_known(", ".join(chosen) or "cheapest zones", along, trade.cost[at]))
+    now = answer.space.settings[-1].value
     return Figure(
         name="modification_trade",
-        title="What one micrometre of modification buys in zones",
-        x_label="radial clearance at tip and root [µm]",
+        title="What one unit of a setting buys in zones",
+        x_label=trade.names[-1],
         y_label="cost of the cheapest zones [cost units]",
-        series=tuple(
-            _where_known(f"flank clearance {flank:.3g} µm", trade.radial, cost)
-            for flank, cost in zip(trade.flank, trade.cost, strict=True)
-            if np.isfinite(cost).any()
-        ),
-        vertical=((now.radial_clearance / MICROMETRE, "as it is"), (float(results.chosen.design[-1]), "chosen")),
+        series=tuple(lines),
+        vertical=((now, "as it is"), (float(answer.chosen.settings[-1]), "chosen")),
     )
 
 
@@ -90,9 +104,8 @@ def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray,
     return Series(label=label, kind="line" if known.sum() > 1 else "points", x=list(x[known]), y=list(y[known]))
 
 
-def robustness_figure(results: AllocationResults) -> Figure:
-    """Return how far every free zone moves when an assumption is wrong."""
-    frame = what_if_tables.robustness_table(results)
+def robustness_figure(frame: pd.DataFrame) -> Figure:
+    """Return how far every free zone moves when an assumption is wrong, from the table that says so."""
     bars = Series(
         label="free zone; between its smallest and largest under all changed assumptions",
         kind="bars",

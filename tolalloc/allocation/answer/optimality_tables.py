@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.results import AllocationResults
-from tolalloc.allocation.answer.tables import solver_noise
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.answer.tables import searches, solver_noise
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.pareto import Front
+from tolalloc.report.wording import short, unit_of
 from tolalloc.units import MICROMETRE
 
 
-def certificate_table(results: AllocationResults) -> pd.DataFrame:
+def certificate_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return cost, certified bound and gap of every search, at the limits and one standard error inside them."""
-    searches = {"tolerances alone": results.alone, "tolerances and modification": results.joint}
     rows: list[dict[str, object]] = [
         {
             "search": label,
@@ -27,9 +29,9 @@ def certificate_table(results: AllocationResults) -> pd.DataFrame:
             "of that for the margin [%]": (found.inside.cost - found.optimum.cost) / found.bound * 100,
             "designs verified [-]": len(found.tried),
         }
-        for label, found in searches.items()
+        for label, found in searches(answer).items()
     ]
-    graded = results.graded
+    graded = answer.graded
     if graded:
         locked = graded.space.locked_cost
         rows.append(
@@ -46,9 +48,9 @@ def certificate_table(results: AllocationResults) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def bounds_table(results: AllocationResults) -> pd.DataFrame:
+def bounds_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return what the smallest and the largest zones, of process and tolerance table together, cost free zones."""
-    space, found = results.space, results.joint
+    space, found = answer.space, answer.free
     zones, scales = space.first_zones / MICROMETRE, found.optimum.zones
     made = [feature.processes[at] for feature, at in zip(space.features, found.optimum.processes, strict=True)]
     noise = solver_noise(found.optimum)
@@ -67,42 +69,34 @@ def bounds_table(results: AllocationResults) -> pd.DataFrame:
     )
 
 
-def searched_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the front of the search with what the kernel says of it, its knee marked."""
-    front = results.fronts.searched
-    return pd.DataFrame(
+def front_tables(answer: AllocationAnswer, fronts: Fronts) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """Return the exact front with its certified bound, and the searched ones with what the real model says of them."""
+    unit = unit_of(answer.leading)
+    kept = f"{short(answer.leading)} kept, told [{unit}]"
+    groups, searched = len(answer.drawn.groups), fronts.searched
+    exact = pd.DataFrame(
         {
-            "peak-to-peak kept, told [arcsec]": front.quantile,
-            "on the kernel [arcsec]": front.on_kernel,
-            "cost [cost units]": front.cost,
-            "flank clearance [µm]": front.designs[:, -2],
-            "radial clearance [µm]": front.designs[:, -1],
-            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
+            f"{short(answer.leading)} limit [{unit}]": fronts.exact.limits,
+            "cost [cost units]": fronts.exact.cost,
+            "certified bound [cost units]": fronts.exact.bound,
         }
     )
+    found = pd.DataFrame({kept: searched.quantile, f"on the kernel [{unit}]": searched.on_kernel})
+    found["cost [cost units]"] = searched.cost
+    for at, name in enumerate(answer.drawn.shared.names):
+        found[name] = searched.designs[:, groups + at]
+    found["knee"] = _knees(searched)
+    tables = (("front", exact), ("searched front", found))
+    front = fronts.with_setting
+    if front is None:
+        return tables
+    third = pd.DataFrame({"cost [cost units]": front.cost, kept: front.quantile})
+    third[f"on the kernel [{unit}]"] = front.on_kernel
+    third[answer.drawn.shared.names[-1]] = front.further[:, 0]
+    third["knee"] = _knees(front)
+    return (*tables, ("front with clearance", third))
 
 
-def clearance_front_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the front of cost, peak-to-peak and radial clearance, its knee marked."""
-    front = results.fronts.with_clearance
-    return pd.DataFrame(
-        {
-            "cost [cost units]": front.cost,
-            "peak-to-peak kept, told [arcsec]": front.quantile,
-            "on the kernel [arcsec]": front.on_kernel,
-            "radial clearance [µm]": front.further[:, 0],
-            "knee": ["yes" if at == front.knee else "" for at in range(front.cost.size)],
-        }
-    )
-
-
-def front_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the exact front of the local models with its certified bound."""
-    front = results.fronts.exact
-    return pd.DataFrame(
-        {
-            "peak-to-peak limit [arcsec]": front.limits,
-            "cost [cost units]": front.cost,
-            "certified bound [cost units]": front.bound,
-        }
-    )
+def _knees(front: Front) -> list[str]:
+    """Return where the knee of a front stands."""
+    return ["yes" if at == front.knee else "" for at in range(front.cost.size)]

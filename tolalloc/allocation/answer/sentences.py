@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.allocation.answer.results import AllocationResults
-from tolalloc.allocation.answer.tables import guarantee_text, limit_price, unit_of
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.report.wording import short, unit_of, with_unit
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
@@ -15,24 +16,24 @@ _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
 
-def answer(results: AllocationResults) -> tuple[str, ...]:
+def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return the answer in sentences."""
-    chosen, joint = results.chosen, results.joint
+    chosen = answer.chosen
     achieved = chosen.achieved
     found = [
         f"{'Met' if chosen.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units} fresh units keep "
-        f"{joint.limit:g}″ (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
+        f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
-    if len(results.requirements) > 1:
+    if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
-    found.append(_cost(results))
+    found.append(_cost(answer))
     return (
         *found,
-        *_certificate(results),
-        *_modification(results),
-        *_prices(results),
-        *_good_unit(results),
-        *_settled(results),
+        *_certificate(answer),
+        *_modification(answer),
+        *_prices(answer),
+        *_good_unit(answer),
+        *_settled(answer),
     )
 
 
@@ -41,16 +42,20 @@ def missed(design: VerifiedDesign) -> str:
     check = design.blocking
     side, unit = check.tightest, unit_of(check.requirement.output)
     kept = f"{check.requirement.output.split(' [')[0]}, limit {side.limit:g} {unit}: "
-    shown = guarantee_text(check.requirement.guarantee)
+    shown = check.requirement.guarantee.words
     if not np.isfinite(side.value):
         return f"{kept}too many units have no answer to show any limit kept (shown for {shown})"
     return f"{kept}it keeps {side.value:.4g} {unit} (shown for {shown}), {side.excess:.3g} {unit} beyond"
 
 
-def least_saving(results: AllocationResults) -> float:
-    """Return the saving against uniform scaling that uses the limit to its last arcsecond [-]."""
-    joint = results.joint
-    return 1 - (1 - joint.saving_at_least) * results.chosen.cost / joint.chosen.cost
+def _limits(answer: AllocationAnswer) -> str:
+    """Return the limits of the leading output."""
+    limits = answer.requirements[0].limits
+    if limits.upper is None:
+        return f"at least {with_unit(f'{limits.lower:g}', answer.leading)}"
+    if limits.lower is None:
+        return with_unit(f"{limits.upper:g}", answer.leading)
+    return f"{limits.lower:g} to {with_unit(f'{limits.upper:g}', answer.leading)}"
 
 
 def _against(cost: float, other: float) -> str:
@@ -61,12 +66,12 @@ def _against(cost: float, other: float) -> str:
     return f"{abs(change):.1%} {'below' if change < 0 else 'above'}"
 
 
-def _cost(results: AllocationResults) -> str:
+def _cost(answer: AllocationAnswer) -> str:
     """Return what the drawing costs, and what uniform scaling does."""
-    chosen, hand = results.chosen, results.joint.by_hand
+    chosen, hand = answer.chosen, answer.free.by_hand
     used = ", which missed a limit"
     if hand.met:
-        least = chosen.cost / (1 - least_saving(results))
+        least = chosen.cost / (1 - answer.least_saving)
         used = f", and {_against(chosen.cost, least)} that had it used the limit to its last arcsecond ({least:.2f})"
     return (
         f"Cost {chosen.cost:.2f} cost units, {_against(chosen.cost, hand.cost)} all zones scaled alike with the "
@@ -74,14 +79,14 @@ def _cost(results: AllocationResults) -> str:
     )
 
 
-def _certificate(results: AllocationResults) -> tuple[str, ...]:
+def _certificate(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
-    return (*_free(results), *_graded(results))
+    return (*_free(answer), *_graded(answer))
 
 
-def _free(results: AllocationResults) -> tuple[str, ...]:
+def _free(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what is certified of free zones; nothing where they miss a limit."""
-    joint = results.joint
+    joint = answer.free
     if not joint.chosen.met:
         return ()
     of_margin = (joint.inside.cost - joint.optimum.cost) / joint.bound
@@ -90,16 +95,16 @@ def _free(results: AllocationResults) -> tuple[str, ...]:
         if of_margin >= _SAME_COST
         else ""
     )
-    design = "the verified design with free zones" if results.graded else "the verified design"
+    design = "the verified design with free zones" if answer.graded else "the verified design"
     return (
         f"Certified: by the local models around {design}, no zones, processes and clearances that keep the limits cost "
         f"less than {joint.bound:.2f}; it costs {max(joint.gap, 0.0):.1%} more ({joint.chosen.cost:.2f}){margin}.",
     )
 
 
-def _graded(results: AllocationResults) -> tuple[str, ...]:
+def _graded(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what is certified of grades, if they were asked for."""
-    graded, free = results.graded, results.joint.chosen
+    graded, free = answer.graded, answer.free.chosen
     if not graded:
         return ()
     cost = f"On grades and preferred numbers the cost is {graded.chosen.cost:.2f}"
@@ -113,9 +118,11 @@ def _graded(results: AllocationResults) -> tuple[str, ...]:
     )
 
 
-def _modification(results: AllocationResults) -> tuple[str, ...]:
+def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what the modification buys."""
-    alone, joint = results.alone.chosen, results.joint.chosen
+    if answer.fixed is None:
+        return () if answer.free.chosen.met else (f"No design was verified: {missed(answer.free.chosen)}.",)
+    alone, joint = answer.fixed.chosen, answer.free.chosen
     if not joint.met:
         said = (f"With tolerances and modification free no design was verified: {missed(joint)}.",)
         return said if alone.met else (*said, f"Nor with tolerances alone: {missed(alone)}.")
@@ -125,9 +132,9 @@ def _modification(results: AllocationResults) -> tuple[str, ...]:
     if saving < _SAME_COST:
         return (f"Nothing cheaper was found with the modification free: as it is, the zones cost {alone.cost:.2f}.",)
     doubt = ""
-    if max(results.alone.gap, results.joint.gap) > saving:
+    if max(answer.fixed.gap, answer.free.gap) > saving:
         doubt = (
-            f" (the search for tolerances alone ended {max(results.alone.gap, 0.0):.1%} above its own certified bound, "
+            f" (the search for tolerances alone ended {max(answer.fixed.gap, 0.0):.1%} above its own certified bound, "
             "so up to that much of it may be the search)"
         )
     return (
@@ -136,9 +143,9 @@ def _modification(results: AllocationResults) -> tuple[str, ...]:
     )
 
 
-def _prices(results: AllocationResults) -> tuple[str, ...]:
+def _prices(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what the limits cost, to first order."""
-    joint, said = results.joint, []
+    joint, said = answer.free, []
     for side in joint.chosen.sides if joint.chosen.met else ():
         price = joint.prices[side.stack.name]
         if price * abs(side.limit) > _NOTHING * joint.chosen.cost:
@@ -150,9 +157,9 @@ def _prices(results: AllocationResults) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _good_unit(results: AllocationResults) -> tuple[str, ...]:
+def _good_unit(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return the yield with the cheapest good unit, if the study states what becomes of the others."""
-    found = results.prices
+    found = answer.prices
     if found is None:
         return ()
     if not found.priced.size:
@@ -163,13 +170,15 @@ def _good_unit(results: AllocationResults) -> tuple[str, ...]:
         said = f"Of the yields that were tried only {found.best * 100:g}% has a price for a good unit"
     return (
         f"{said}: {np.nanmin(found.prices):.2f} cost units by the local models, not verified; units beyond the "
-        "peak-to-peak limit alone count as bad.",
+        f"{short(answer.leading)} limit alone count as bad.",
     )
 
 
-def _settled(results: AllocationResults) -> tuple[str, ...]:
+def _settled(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return which zones do not depend on what was assumed."""
-    found = results.robustness
+    found = answer.robustness
+    if found is None:
+        return ()
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
     said = [
         f"{len(same)} of {len(found.groups)} free zones {'stays' if len(same) == 1 else 'stay'} within {SAME:.0%} "
@@ -183,3 +192,69 @@ def _settled(results: AllocationResults) -> tuple[str, ...]:
             "than the cheapest ones there."
         )
     return tuple(said)
+
+
+def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return what a reader must know before acting on the answer."""
+    chosen, found = answer.chosen, []
+    if answer.header.quick:
+        found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
+    if not chosen.met:
+        found.append(
+            "No design was verified to meet all limits. This is the least violating one; what blocks is "
+            f"{missed(chosen)}."
+        )
+    if not answer.free.by_hand.met:
+        found.append("Uniform scaling was not verified to meet the limits, so the saving is against a miss.")
+    uncertain = answer.robustness.uncertain if answer.robustness else ()
+    lost = sum(not variant.kept for variant in uncertain)
+    if lost and answer.free.chosen.met:
+        found.append(
+            f"With {lost} of {len(uncertain)} drawn {answer.model.uncertain[0].name.split(' (')[0]} values the free "
+            "zones are no longer shown to keep every limit."
+        )
+    found += answer.model.cautions(chosen.settings)
+    found += _fronts(answer)
+    return (*found, *_failed(answer))
+
+
+def _fronts(answer: AllocationAnswer) -> list[str]:
+    """Return what a reader must know of the searched fronts."""
+    if answer.fronts is None:
+        return []
+    found, lost = [], answer.fronts.searched.failed
+    if not answer.fronts.surrogate.earns_its_place:
+        found.append("The corrected model of the front has not earned its place; its search ran on the kernel, short.")
+    if lost:
+        found.append(
+            f"{lost} design{'' if lost == 1 else 's'} of the search for the front failed on the kernel; the front is "
+            "without them."
+        )
+    return found
+
+
+def _failed(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return how many units have no answer, and who counts them."""
+    failed = answer.header.failed
+    if not failed:
+        return ()
+    has, them = ("unit has", "it") if failed == 1 else ("units have", "them")
+    return (f"{failed} {has} no answer; a yield counts {them} as outside the limits, a Cpk leaves {them} out.",)
+
+
+def assumptions(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return what no source states."""
+    priced = bool(answer.space.processes)
+    return (
+        *answer.header.assumptions,
+        "zones, distributions, Cp, smallest and largest zones: as the tolerance table states them; its notes say where "
+        "each comes from",
+        "processes and costs as the process cost table states them; a process changes the cost and the range of a "
+        "zone, not its distribution or Cp"
+        if priced
+        else "a cost falls as 1/zone, from the tolerance table's cost at its zone",
+        *(("what is chosen beside the zones costs nothing and is exact",) if answer.space.settings else ()),
+        "sources correlated as their file states; the certified bounds do not know of correlations"
+        if answer.space.errors.is_correlated
+        else "all sources are independent of each other",
+    )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.results import AllocationResults
-from tolalloc.allocation.guarantee import AtCpk, AtYield, Guarantee
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.program.problem import Solution
 from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.units import MICROMETRE
+from tolalloc.report.wording import short, unit_of
 
 _ROUNDING = 1e-6
 """Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""
@@ -22,29 +23,20 @@ def solver_noise(solution: Solution) -> float:
     return max(solution.gap, _ROUNDING) * solution.cost
 
 
-def unit_of(name: str) -> str:
-    """Return the unit in the name of an output."""
-    return name.split("[")[-1].split("]")[0]
-
-
-def designs(results: AllocationResults) -> dict[str, VerifiedDesign]:
+def designs(answer: AllocationAnswer) -> dict[str, VerifiedDesign]:
     """Return the designs that the report compares."""
     found = {
-        "tolerance table as it is": results.joint.baseline,
-        "all zones scaled alike": results.joint.by_hand,
-        "tolerances alone": results.alone.chosen,
-        "tolerances and modification": results.joint.chosen,
+        "tolerance table as it is": answer.free.baseline,
+        "all zones scaled alike": answer.free.by_hand,
     }
-    return {**found, "grades": results.graded.chosen} if results.graded else found
+    found |= {label: search.chosen for label, search in searches(answer).items()}
+    return {**found, "grades": answer.graded.chosen} if answer.graded else found
 
 
-def guarantee_text(guarantee: Guarantee) -> str:
-    """Return what must be shown of a limit, in words."""
-    if isinstance(guarantee, AtYield):
-        return f"{guarantee.target:.2%} of units"
-    if isinstance(guarantee, AtCpk):
-        return f"Cpk {guarantee.target:g}"
-    return "worst case found"
+def searches(answer: AllocationAnswer) -> dict[str, Allocation]:
+    """Return the searches by what they were free to choose."""
+    free = {"tolerances and modification" if answer.space.settings else "tolerances": answer.free}
+    return {"tolerances alone": answer.fixed, **free} if answer.fixed else free
 
 
 def limit_price(side: Side, price: float) -> tuple[float, str]:
@@ -76,25 +68,22 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
     return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])
 
 
-def designs_table(results: AllocationResults) -> pd.DataFrame:
+def designs_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return cost, yield and clearances of the compared designs."""
-    rows = []
-    for label, design in designs(results).items():
-        space = results.drawn if design is results.chosen else results.space
-        amounts = space.modification(design.design)
+    rows, drawn = [], answer.model.drawn_amounts
+    for label, design in designs(answer).items():
+        kept = short(answer.leading)
         rows.append(
             {
                 "design": label,
                 "cost [cost units]": design.cost,
-                "yield, peak-to-peak [%]": design.achieved.estimate * 100,
+                f"yield, {kept} [%]": design.achieved.estimate * 100,
                 "low 95 % [%]": design.achieved.low * 100,
                 "high 95 % [%]": design.achieved.high * 100,
                 "yield, all limits [%]": design.joint.estimate * 100,
-                "flank clearance [µm]": float(design.design[-2]),
-                "radial clearance [µm]": float(design.design[-1]),
-                "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
-                "shift Δr_p [µm]": amounts.shift / MICROMETRE,
-                **_loss(results, design),
+                **dict(zip(answer.space.shared.names, design.settings.tolist(), strict=True)),
+                **dict(zip(drawn.names, (drawn.by_setting @ design.settings).tolist(), strict=True)),
+                **_loss(answer, design),
                 "units [-]": design.achieved.units,
                 "OK": "yes" if design.met else "no",
             }
@@ -102,29 +91,29 @@ def designs_table(results: AllocationResults) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _loss(results: AllocationResults, design: VerifiedDesign) -> dict[str, float]:
+def _loss(answer: AllocationAnswer, design: VerifiedDesign) -> dict[str, float]:
     """Return the mean quality loss of a design, if the study states what a peak-to-peak costs its user."""
-    if results.loss is None:
+    if answer.loss is None:
         return {}
     values = design.sample.values
-    lost = results.loss.smaller_is_better(float(values.mean()), float(values.std(ddof=1)))
+    lost = answer.loss.smaller_is_better(float(values.mean()), float(values.std(ddof=1)))
     return {"mean quality loss [cost units]": lost}
 
 
-def requirements_table(results: AllocationResults) -> pd.DataFrame:
+def requirements_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return every limited side with what each design was shown to keep, and what the limit costs."""
-    prices, compared, noise = results.joint.prices, designs(results), solver_noise(results.joint.optimum)
+    prices, compared, noise = answer.free.prices, designs(answer), solver_noise(answer.free.optimum)
     rows = []
-    for number, side in enumerate(results.chosen.sides):
-        check = next(check for check in results.chosen.checks if side in check.sides)
+    for number, side in enumerate(answer.chosen.sides):
+        check = next(check for check in answer.chosen.checks if side in check.sides)
         unit = unit_of(check.requirement.output)
         price = prices[side.stack.name]
         price, per = limit_price(side, price if price * side.scale > noise else 0.0)
         row: dict[str, object] = {
             "requirement": check.requirement.output,
             "limit": f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit}",
-            "shown for": guarantee_text(check.requirement.guarantee),
-            "quantile of the units [unit of the output]": unit_quantile(results.chosen, check),
+            "shown for": check.requirement.guarantee.words,
+            "quantile of the units [unit of the output]": unit_quantile(answer.chosen, check),
         }
         row |= {f"kept: {label} [unit of the output]": design.sides[number].value for label, design in compared.items()}
         rows.append(
@@ -140,20 +129,18 @@ def requirements_table(results: AllocationResults) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def verified_table(results: AllocationResults) -> pd.DataFrame:
+def verified_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return all designs that fresh units have judged, in order."""
-    tried = {
-        "tolerances alone": results.alone.tried,
-        "tolerances and modification": results.joint.tried,
-        "grades": results.graded.tried if results.graded else (),
-    }
+    tried = {label: search.tried for label, search in searches(answer).items()}
+    if answer.graded:
+        tried["grades"] = answer.graded.tried
     return pd.DataFrame(
         [
             {
                 "search": search,
                 "design": design.name,
                 "cost [cost units]": design.cost,
-                "peak-to-peak kept [arcsec]": design.quantile_bound,
+                f"{short(answer.leading)} kept [{unit_of(answer.leading)}]": design.quantile_bound,
                 "yield [%]": design.achieved.estimate * 100,
                 "nearest limit": design.blocking.requirement.output,
                 "met": "yes" if design.met else "no",
@@ -164,11 +151,11 @@ def verified_table(results: AllocationResults) -> pd.DataFrame:
     )
 
 
-def work_table(results: AllocationResults) -> pd.DataFrame:
+def work_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return what each stage took."""
     return pd.DataFrame(
         [
             {"stage": name, "units [-]": own["units"], "seconds [s]": own["seconds"]}
-            for name, own in results.stages.items()
+            for name, own in answer.header.stages.items()
         ]
     )

@@ -1,32 +1,32 @@
-"""The tables of what would be otherwise: clearances, assumptions, yields; a unit in every header."""
+"""The tables of what would be otherwise: settings, assumptions, yields; a unit in every header."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.results import AllocationResults
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.robustness import Robustness
+from tolalloc.allocation.trade import SettingTrade
+from tolalloc.report.wording import quantity, unit_of
 from tolalloc.units import MICROMETRE
 
 
-def trade_table(results: AllocationResults) -> pd.DataFrame:
-    """Return cost and price of a micrometre for every pair of clearances."""
-    trade = results.trade
-    flank, radial = np.meshgrid(trade.flank, trade.radial, indexing="ij")
-    return pd.DataFrame(
-        {
-            "flank clearance [µm]": flank.ravel(),
-            "radial clearance [µm]": radial.ravel(),
-            "cost [cost units]": trade.cost.ravel(),
-            "1 µm more on the flank costs at the rate of [cost units/µm]": trade.price_of_flank.ravel(),
-            "1 µm more at tip and root costs at the rate of [cost units/µm]": trade.price_of_radial.ravel(),
-        }
-    )
+def trade_table(trade: SettingTrade) -> pd.DataFrame:
+    """Return cost and price of one more unit of each setting, for every choice of settings."""
+    values = np.meshgrid(*trade.values, indexing="ij")
+    frame = pd.DataFrame({name: own.ravel() for name, own in zip(trade.names, values, strict=True)})
+    frame["cost [cost units]"] = trade.cost.ravel()
+    for at, name in enumerate(trade.names):
+        header = f"1 {unit_of(name)} more {quantity(name)} costs at the rate of [cost units/{unit_of(name)}]"
+        frame[header] = trade.price(at).ravel()
+    return frame
 
 
-def robustness_table(results: AllocationResults) -> pd.DataFrame:
+def robustness_table(answer: AllocationAnswer, found: Robustness) -> pd.DataFrame:
     """Return how far every free zone moves when an assumption is wrong."""
-    found, zones = results.robustness, results.space.first_zones / MICROMETRE
+    zones = answer.space.first_zones / MICROMETRE
     ratios, best = found.ratios, found.optimum * zones
     return pd.DataFrame(
         {
@@ -39,7 +39,7 @@ def robustness_table(results: AllocationResults) -> pd.DataFrame:
     )
 
 
-def variants_table(results: AllocationResults) -> pd.DataFrame:
+def variants_table(found: Robustness) -> pd.DataFrame:
     """Return the answers under changed assumptions."""
     rows = [
         {
@@ -48,16 +48,13 @@ def variants_table(results: AllocationResults) -> pd.DataFrame:
             "free zones cost more by [%]": variant.regret * 100,
             "free zones keep all": "yes" if variant.kept else "no",
         }
-        for variant in results.robustness.variants
+        for variant in found.variants
     ]
     return pd.DataFrame(rows)
 
 
-def prices_table(results: AllocationResults) -> pd.DataFrame:
-    """Return the price of a good unit over yield targets, nothing where none has a price."""
-    found = results.prices
-    if found is None or not found.priced.size:
-        return pd.DataFrame()
+def prices_table(found: YieldLadder) -> pd.DataFrame:
+    """Return the price of a good unit over yield targets."""
     return pd.DataFrame(
         {
             "yield target [%]": found.targets * 100,

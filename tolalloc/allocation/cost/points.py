@@ -12,9 +12,9 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from tolalloc.drawing.fields import LARGEST_ZONE, UNITS
-from tolalloc.drawing.table_file import TableRow, read_rows
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.fields import LARGEST_ZONE, UNITS
+from tolalloc.drawings.table_file import TableRow, read_rows
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 
 

@@ -24,9 +24,9 @@ from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel, Process
 from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.drawing.fields import LARGEST_ZONE
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.table_file import DATA, TableRow, read_rows
+from tolalloc.drawings.fields import LARGEST_ZONE
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.table_file import DATA, TableRow, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import shipped_or_path
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -191,7 +191,7 @@ def priced(
 
     Examples
     --------
-    >>> from tolalloc.drawing.zones import Feature
+    >>> from tolalloc.drawings.zones import Feature
     >>> hub = Source(name="hub", part="hub", feature=Feature.SIZE, zone=0.2e-3, minimum=0.03e-3, maximum=0.5e-3, cost=9)
     >>> [turned] = priced({"hub": [("turned", 5, 0.5, 0.06, 0.15)]}, [hub], tolerance="half zone")["hub"]
     >>> float(turned.total(np.array(0.2e-3)))

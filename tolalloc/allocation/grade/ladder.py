@@ -21,8 +21,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.grade.iso286 import grade_zones, size_step
-from tolalloc.drawing.sources import Source
-from tolalloc.drawing.zones import Feature
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
 

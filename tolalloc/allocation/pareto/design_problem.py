@@ -1,4 +1,4 @@
-"""Cost and quantile of a reducer's design as a problem: logarithms of scales or ladder positions, and clearances."""
+"""Cost and quantile of a design as a problem: logarithms of scales or ladder positions, and settings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.model import Response
+from tolalloc.models import Response
 
 COST = Objective(name="cost [cost units]")
 
@@ -21,14 +21,14 @@ Ladders = Mapping[str, Float[np.ndarray, " position"]]
 """Group → the scales that it may have, rising [-]."""
 
 
-def to_genes(designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
-    """Return designs with the logarithms of their scales."""
-    return np.concatenate([np.log(designs[..., :-2]), designs[..., -2:]], axis=-1)
+def to_genes(designs: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
+    """Return designs with the logarithms of their scales, of which there are as many as groups."""
+    return np.concatenate([np.log(designs[..., :groups]), designs[..., groups:]], axis=-1)
 
 
-def from_genes(genes: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs variable"]:
+def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
     """Return the designs whose scales have these logarithms."""
-    return np.concatenate([np.exp(genes[..., :-2]), genes[..., -2:]], axis=-1)
+    return np.concatenate([np.exp(genes[..., :groups]), genes[..., groups:]], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +47,14 @@ class Criterion:
     value: Callable[[Float[np.ndarray, "design variable"]], Float[np.ndarray, " design"]]
 
 
-RADIAL_CLEARANCE = Criterion(
-    objective=Objective(name="radial clearance [µm]", better="large"), value=lambda designs: designs[:, -1]
-)
+def large(setting: str, column: int) -> Criterion:
+    """Return the criterion that a setting, whose value stands in a column of the designs, shall be large."""
+    return Criterion(objective=Objective(name=setting, better="large"), value=lambda designs: designs[:, column])
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignProblem:
-    """Cost against the quantile of the peak-to-peak, and whatever else is asked for.
+    """Cost against the quantile of the leading output, and whatever else is asked for.
 
     Parameters
     ----------
@@ -106,8 +106,9 @@ class DesignProblem:
 
     @cached_property
     def genes(self) -> Genes:
-        """Logarithms of scales or positions on ladders, and the clearances."""
-        lower, upper = to_genes(self.space.lower), to_genes(self.space.upper)
+        """Logarithms of scales or positions on ladders, and the settings."""
+        groups = len(self.space.groups)
+        lower, upper = to_genes(self.space.lower, groups), to_genes(self.space.upper, groups)
         names, integer = list(self.space.columns), np.zeros(lower.size, bool)
         for at, ladder in self._ladders:
             names[at] = f"position of {names[at]} on {ladder.tolist()}"
@@ -120,7 +121,7 @@ class DesignProblem:
 
     def genes_of(self, designs: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, "design gene"]:
         """Return the genes of designs; on a ladder the nearest step counts."""
-        genes = to_genes(designs)
+        genes = to_genes(designs, len(self.space.groups))
         for at, ladder in self._ladders:
             genes[:, at] = np.abs(genes[:, at, np.newaxis] - np.log(ladder)).argmin(axis=1)
         return self.genes.rounded(genes)
@@ -130,7 +131,7 @@ class DesignProblem:
         genes = genes.copy()
         for at, ladder in self._ladders:
             genes[:, at] = np.log(ladder)[genes[:, at].astype(int)]
-        return from_genes(genes)
+        return from_genes(genes, len(self.space.groups))
 
     def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
         """Return the objectives of every design."""

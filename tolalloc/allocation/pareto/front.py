@@ -13,7 +13,7 @@ from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem, 
 from tolalloc.allocation.pareto.found import SearchedDesigns
 from tolalloc.allocation.pareto.indicators import knee, spread_over
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.surrogate.regression import Baseline, Regression, Surrogate, fitted, gaussian_process
 from tolalloc.surrogate.validation import FOLDS, Answers, answers_of, cross_validate
@@ -107,6 +107,7 @@ def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front
 def pareto_front(
     response: QuantileResponse,
     baseline: Baseline,
+    floor: float,
     designs: Float[np.ndarray, "design variable"],
     convex_front: Float[np.ndarray, "known variable"],
     seeds: SeedTree,
@@ -125,6 +126,8 @@ def pareto_front(
         Quantile of a design on the real kernel.
     baseline
         Convex model of the quantile, which the surrogate corrects.
+    floor
+        Smallest value of it that is believed [unit of the output].
     designs
         First designs to run on the kernel.
     convex_front
@@ -155,7 +158,7 @@ def pareto_front(
     problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further, sides=sides)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
-    candidate = _Corrected(columns=response.columns, outputs=response.outputs, baseline=baseline)
+    candidate = _Corrected(columns=response.columns, outputs=response.outputs, baseline=baseline, floor=floor)
     for number in range(effort.rounds):
         own = seeds.child(str(number))
         surrogate = candidate.judged(answers_of(kernel, asked, own.child("surrogate"), FOLDS, largest_failed_share))
@@ -184,11 +187,12 @@ class _Corrected:
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
     baseline: Baseline
+    floor: float
     name: str = "corrected convex model"
 
     def rough(self, x: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, " design"]:
-        """Return the convex model, which may fall below zero far from its design, above zero [arcsec]."""
-        return np.maximum(self.baseline(x), 1.0)
+        """Return the convex model, which may fall below zero far from its design, above zero [unit of the output]."""
+        return np.maximum(self.baseline(x), self.floor)
 
     def fit(self, x: Float[np.ndarray, "design variable"], y: Float[np.ndarray, " design"]) -> Regression:
         """Return the correction through answers."""

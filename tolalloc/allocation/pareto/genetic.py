@@ -23,7 +23,7 @@ from tolalloc.allocation.pareto.answers import Checkpoint, RememberedAnswers
 from tolalloc.allocation.pareto.found import SearchedDesigns
 from tolalloc.allocation.pareto.indicators import spread_over
 from tolalloc.allocation.pareto.problem import Genes, Objectives, ParetoProblem
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 _MARGIN = 0.49

@@ -14,7 +14,7 @@ from tolalloc.assembly.gains import Gains, assembled, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.capability.indices import ShareInterval, wilson_interval
-from tolalloc.drawing.seeds import CHUNK, SeedTree
+from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.units import ARCSECOND
 

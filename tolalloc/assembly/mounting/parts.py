@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from tolalloc.assembly.mounting.places import Place, own_name, owned_columns, places_of, unmounted
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import ANGULAR
-from tolalloc.drawing.table_file import read_text_table
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import ANGULAR
+from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS

@@ -16,9 +16,9 @@ from jaxtyping import Float
 from tolalloc.assembly.mounting.answer import MountingResult, RandomMountings
 from tolalloc.assembly.mounting.steps import Asking, Peaks, assigned, exchanged, turned, units_from
 from tolalloc.assembly.mounting.stock import Mountings, PartStock
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Response
+from tolalloc.models import Response
 
 _GAIN = 1e-9
 """Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""

@@ -9,7 +9,7 @@ from tolalloc.assembly.mounting.answer import MountingAnswer
 from tolalloc.assembly.mounting.parts import load_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.stock import PartStock
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header

@@ -14,9 +14,9 @@ from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort, explain, posterior
 from tolalloc.bench.diagnosis.sources import InseparableColumns, dominant, groups, named_set, reductions
 from tolalloc.bench.measurement.records import MeasuredCurve
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
-from tolalloc.drawing.sources import limited_measure
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.response.kernel import KernelResponse
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.bench.measurement.angles import TURN
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.chunks import map_chunks
-from tolalloc.drawing.error_model import ErrorModel
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.condensation import CondensedAngles

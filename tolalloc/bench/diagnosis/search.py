@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
 from tolalloc.bench.diagnosis.problem import CurveProblem
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 
 _DAMPINGS = 10.0 ** np.arange(-2, 3)
 """Dampings tried in each step, over the one that did best before [-]."""

@@ -13,8 +13,8 @@ from tolalloc.bench.measurement.cleaning import clean_curve
 from tolalloc.bench.measurement.readings import ANGLE, TRANSMISSION_ERROR, load_readings
 from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.blas import one_blas_thread
-from tolalloc.drawing.error_model import ErrorModel
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header

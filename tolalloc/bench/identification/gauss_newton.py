@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from tolalloc.bench.identification.prediction import Prediction
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 
 NAME = "Gauss–Newton"
 

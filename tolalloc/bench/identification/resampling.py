@@ -13,7 +13,7 @@ from tolalloc.bench.identification.gauss_newton import gauss_newton
 from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.stand_in import StandIn
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 
 RESAMPLES = 400
 FEWEST_UNITS = 5

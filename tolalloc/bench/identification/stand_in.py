@@ -10,7 +10,7 @@ from jaxtyping import Float
 from tolalloc.bench.identification.data import AllReadings
 from tolalloc.bench.identification.parameters import BIAS, Parameter, box
 from tolalloc.bench.identification.prediction import KernelPredictor, Prediction
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.surrogate.polynomial import BoxPolynomial, fit_box_polynomial
 from tolalloc.units import ARCSECOND
 

@@ -18,7 +18,7 @@ from tolalloc.bench.identification.profile import estimates, profile
 from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoice, bootstrap, judged, simplest
 from tolalloc.bench.identification.stand_in import LARGE_DRIFT, StandIn, fit_stand_in
 from tolalloc.bench.measurement.records import Measurements
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress
 from tolalloc.report.answer import Header

@@ -21,7 +21,7 @@ from tolalloc.bench.measurement.readings import (
     read_column,
 )
 from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
-from tolalloc.drawing.table_file import read_text_table
+from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, validated
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit

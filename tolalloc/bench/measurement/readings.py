@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
 from tolalloc.exceptions import InputError
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.special import ndtr
 
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitStateWithGradient
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 _STEP = 1e-4

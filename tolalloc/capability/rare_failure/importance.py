@@ -12,7 +12,7 @@ from scipy.special import log_ndtr, logsumexp, ndtr
 from tolalloc.capability.rare_failure.form import DesignPoint, DesignPoints
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.capability.rare_failure.result import RareFailure
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 METHOD = "Importance sampling"

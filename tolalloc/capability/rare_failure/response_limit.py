@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.rare_failure.limit_state import LimitValues
-from tolalloc.model import Response, ResponseWithDerivatives
+from tolalloc.models import Response, ResponseWithDerivatives
 
 _STEP = 1e-3
 """Step of the differences in standard normal space; up to 6, rounding and curvature both cost less than 1e-4 [-]."""

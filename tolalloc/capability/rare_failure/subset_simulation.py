@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.capability.rare_failure.result import Level, RareFailure
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 METHOD = "Subset simulation"

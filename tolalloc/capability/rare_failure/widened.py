@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tolalloc.capability.rare_failure.importance import FEWEST_EFFECTIVE_SAMPLES
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.capability.rare_failure.result import RareFailure
-from tolalloc.drawing.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 METHOD = "Widened sampling"

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field
 
-from tolalloc.drawing.sources import neglected_columns
+from tolalloc.drawings.sources import neglected_columns
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.rv.reducer.files import PRESETS

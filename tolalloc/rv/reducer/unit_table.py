@@ -8,8 +8,8 @@ from io import StringIO
 from math import isfinite
 from pathlib import Path
 
-from tolalloc.drawing.sources import ANGULAR
-from tolalloc.drawing.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.sources import ANGULAR
+from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
 from tolalloc.exceptions import InputError
 from tolalloc.files import write_new
 from tolalloc.rv.reducer.unit_file import BuiltUnit

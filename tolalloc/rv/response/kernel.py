@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.chunks import Mapper, map_chunks
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.model import Evaluation, Observer, unobserved
+from tolalloc.models import Evaluation, Observer, unobserved
 from tolalloc.rv.equivalent.answers import Derivatives, Extremes
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Modification

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tolalloc.chunks import map_chunks
-from tolalloc.model import Evaluation
+from tolalloc.models import Evaluation
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawing.correlation import CorrelatedSource
+from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.model import Evaluation, Response, unobserved
+from tolalloc.models import Evaluation, Response, unobserved
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives

@@ -1,0 +1,242 @@
+"""The cheapest drawing that keeps every requirement: everything that a report on it is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.graded import GradedAllocation
+from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.robustness import Robustness
+from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.trade import SettingTrade
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.drawings.sources import Source
+from tolalloc.models import Model
+from tolalloc.report.answer import Answer
+from tolalloc.report.document import Section
+from tolalloc.report.wording import short, unit_of
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocationAnswer(Answer):
+    """The cheapest drawing that keeps every requirement.
+
+    Parameters
+    ----------
+    model
+        The model at the sources of the tolerance table.
+    requirements
+        What must be kept, the leading one first.
+    space
+        Design variables with every setting free.
+    fixed
+        The allocation with the settings as they are, if the question asks for it and the model has any.
+    free
+        The allocation of tolerances and settings together.
+    graded
+        The same on ladders of zones, if the question asks for it.
+    shares
+        Sobol indices of the leading output at the zones of the drawing.
+    trade
+        Cost of the cheapest zones over the settings, if asked for.
+    fronts
+        What can be had at which cost, if asked for.
+    robustness
+        Answers under changed assumptions, if asked for.
+    prices
+        Price of a good unit over yield targets, if the question states what becomes of the others.
+    loss
+        What the leading output costs a user, if the question states it.
+    """
+
+    kind: ClassVar[str] = "allocation"
+    shown: ClassVar[tuple[str, ...]] = (
+        *("source", "zone before [µm]", "zone [µm]", "grade", "process"),
+        *("share of variance [%]", "cost [cost units]"),
+    )
+
+    model: Model
+    requirements: tuple[Requirement, ...]
+    space: DesignSpace
+    fixed: Allocation | None
+    free: Allocation
+    graded: GradedAllocation | None
+    shares: SobolIndices
+    trade: SettingTrade | None
+    fronts: Fronts | None
+    robustness: Robustness | None
+    prices: YieldLadder | None
+    loss: QualityLoss | None
+
+    @property
+    def leading(self) -> str:
+        """Name of the leading output, which the first requirement limits."""
+        return self.requirements[0].output
+
+    @property
+    def chosen(self) -> VerifiedDesign:
+        """What the drawing shall show: the graded design where grades were asked for."""
+        return self.graded.chosen if self.graded else self.free.chosen
+
+    @property
+    def drawn(self) -> DesignSpace:
+        """Design variables of the chosen design; groups share one zone where it is graded."""
+        return self.chosen.space
+
+    @property
+    def met(self) -> bool:
+        """Whether fresh units show every requirement to be kept."""
+        return self.chosen.met
+
+    @property
+    def cost(self) -> float:
+        """Cost of the drawing [cost units]."""
+        return self.chosen.cost
+
+    @property
+    def bound(self) -> float:
+        """Lower bound on the cost of every drawing, by the convex models around the verified one [cost units]."""
+        return self.graded.bound if self.graded else self.free.bound
+
+    @cached_property
+    def drawn_sources(self) -> tuple[Source, ...]:
+        """All sources of the tolerance table at the zones of the drawing, with process, grade and cost."""
+        from tolalloc.allocation.answer.drawing import drawn_sources
+
+        return drawn_sources(self)
+
+    @cached_property
+    def drawing_table(self) -> pd.DataFrame:
+        """The drawing in short: zone, grade, process, share of the variance and cost of every source."""
+        from tolalloc.allocation.answer.drawing import drawing_table
+
+        return drawing_table(self)
+
+    @cached_property
+    def requirements_table(self) -> pd.DataFrame:
+        """Every limited side with what each design was shown to keep, and what the limit costs."""
+        from tolalloc.allocation.answer.tables import requirements_table
+
+        return requirements_table(self)
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return f"The cheapest drawing of {self.header.model}: {self.header.name}"
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        count = len(self.requirements)
+        conditions = [f"{name} {value}" for name, value in self.header.conditions.items()]
+        return ", ".join([f"{count} requirement{'s' if count > 1 else ''}", *conditions, f"seed {self.header.seed}"])
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in sentences, each no stronger than what was computed."""
+        from tolalloc.allocation.answer.sentences import sentences
+
+        return sentences(self)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on the answer."""
+        from tolalloc.allocation.answer.sentences import warnings
+
+        return warnings(self)
+
+    @cached_property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        from tolalloc.allocation.answer.sentences import assumptions
+
+        return assumptions(self)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """The sections of the report."""
+        from tolalloc.allocation.answer.sections import sections
+
+        return sections(self)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The whole answer for a program, units in the names."""
+        chosen, free = self.chosen, self.free
+        guarantee = self.requirements[0].guarantee
+        limit = "limit [arcsec]" if unit_of(self.leading) == "arcsec" else f"limit of {self.leading}"
+        answered = {
+            "study": self.header.name,
+            "study hash": self.header.digest,
+            "model": self.header.model,
+            **self.header.conditions,
+            limit: free.limit,
+            "yield target [-]": getattr(guarantee, "target", None),
+            "seed": self.header.seed,
+            "quick": self.header.quick,
+            "met": chosen.met,
+            "yield [-]": chosen.achieved.estimate,
+            "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],
+            "yield lower bound, one-sided 95 % [-]": chosen.achieved.bound,
+            "yield of all limits [-]": chosen.joint.estimate,
+            f"{short(self.leading)} kept [{unit_of(self.leading)}]": chosen.quantile_bound,
+            "cost [cost units]": chosen.cost,
+            "cost of the tolerance table [cost units]": free.baseline.cost,
+            "tolerance table met": free.baseline.met,
+            "cost of uniform scaling [cost units]": free.by_hand.cost,
+            "uniform scaling met": free.by_hand.met,
+            "saving [-]": 1 - chosen.cost / free.by_hand.cost,
+            "saving at least [-]": self.least_saving,
+            "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
+            "cost of tolerances and modification [cost units]": free.chosen.cost,
+            "cost on grades [cost units]": self.graded.chosen.cost if self.graded else None,
+            "certified bound [cost units]": self.bound if chosen.met else None,
+            "gap of the convex program [-]": free.optimum.gap,
+            "blocking requirement": None if chosen.met else chosen.blocking.requirement.output,
+            "beyond its limit by [unit of the output]": None if chosen.met else -chosen.blocking.slack,
+            **self.model.amounts(chosen.settings),
+            "requirements": _records(self.requirements_table),
+            "drawing": _records(self.drawing_table),
+            "zones that stay the same": [
+                group for group, same in zip(self.robustness.groups, self.robustness.same, strict=True) if same
+            ]
+            if self.robustness
+            else None,
+            **self.model.facts,
+            "statuses": dict(self.header.statuses),
+            "warnings": list(self.warnings),
+        }
+        return {name: _known(value) for name, value in answered.items()}
+
+    @property
+    def least_saving(self) -> float:
+        """Saving against uniform scaling that uses the limit to its last unit, as a share of its cost [-]."""
+        return 1 - (1 - self.free.saving_at_least) * self.chosen.cost / self.free.chosen.cost
+
+    def add_files(self, folder: Path) -> None:
+        """Write ``allocation.csv``, which is read back, and ``drawing.xlsx``, which goes on calculating."""
+        from tolalloc.allocation.answer.drawing import write_drawing
+
+        write_drawing(self, folder)
+
+
+def _known(value: object) -> object:
+    """Return a number, or null where it is none; JSON knows neither NaN nor infinity."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return a table for JSON."""
+    return [{str(name): _known(value) for name, value in row.items()} for row in frame.to_dict("records")]

@@ -1,0 +1,133 @@
+"""How much an allocation may compute."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.search import SearchEffort
+from tolalloc.exceptions import InputError
+from tolalloc.surrogate import validation
+
+_FEWEST_ALLOCATING = {
+    "": {
+        "verification_units": 1,
+        "shared_units": 2,
+        "graded_steps": 1,
+        "exact_points": 2,
+        "changed_costs": 1,
+        "changed_stiffnesses": 1,
+        "stiffness_units": 100,
+    },
+    "search.": {"steps": 1},
+    "search.front.": {
+        # Three objectives need four designs, and both fronts have the same effort.
+        "population": 4,
+        "generations": 1,
+        "population_on_kernel": 4,
+        "generations_on_kernel": 1,
+        "designs": validation.FEWEST_OF_FOLD * validation.FOLDS,
+        "rounds": 1,
+        "points": 2,
+    },
+}
+"""Smallest numbers with which an allocation has an answer in every stage [-]."""
+
+
+def _require_enough(effort: object, prefix: str) -> None:
+    """Raise unless the numbers of an effort are whole and no stage of an allocation would stop with them.
+
+    Raises
+    ------
+    InputError
+        A number that is too small or not whole.
+    """
+    for name, fewest in _FEWEST_ALLOCATING[prefix].items():
+        value = getattr(effort, name)
+        if not isinstance(value, int) or value < fewest:
+            raise InputError.at(
+                "study", f"effort.allocation.{prefix}{name}", value, f"a whole number, {fewest} or more"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocationEffort:
+    """How much an allocation may compute.
+
+    Parameters
+    ----------
+    verification_units
+        Fresh units per verified design [-].
+    shared_units
+        Common random units of the quantile surrogate [-].
+    search
+        Effort of the searches.
+    graded_steps
+        Largest number of verified choices of grades [-].
+    exact_points
+        Limits of the exact front of the local models [-].
+    setting_steps
+        Values of each setting for which the cheapest zones are looked for, the first setting's first [-].
+    changed_costs
+        Random corners of the box in which every cost is wrong [-].
+    changed_stiffnesses, stiffness_units
+        Stiffnesses drawn from what is not known of them, and fresh units for each [-].
+    share_blocks
+        Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
+    yields
+        Yield targets among which the cheapest good unit is looked for [-].
+
+    Raises
+    ------
+    InputError
+        A number with which a stage would stop, often after long work of others.
+    """
+
+    verification_units: int = 6144
+    shared_units: int = 256
+    search: SearchEffort = field(default_factory=SearchEffort)
+    graded_steps: int = 8
+    exact_points: int = 50
+    setting_steps: tuple[int, ...] = (5, 6)
+    changed_costs: int = 40
+    changed_stiffnesses: int = 6
+    stiffness_units: int = 2048
+    share_blocks: int = 256
+    yields: tuple[float, ...] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
+
+    def __post_init__(self) -> None:
+        _require_enough(self, "")
+        _require_enough(self.search, "search.")
+        _require_enough(self.search.front, "search.front.")
+        if not 1.0 < self.search.reach < np.inf:
+            raise InputError.at("study", "effort.allocation.search.reach", self.search.reach, "a number above 1")
+        if not all(isinstance(steps, int) and steps >= 1 for steps in self.setting_steps):
+            raise InputError.at(
+                "study", "effort.allocation.setting_steps", self.setting_steps, "whole numbers, 1 or more"
+            )
+        blocks = self.share_blocks
+        if blocks < 2 or blocks & (blocks - 1):
+            raise InputError.at("study", "effort.allocation.share_blocks", blocks, "a power of two, 2 or more")
+        if not self.yields or not all(0 < target < 1 for target in self.yields):
+            raise InputError.at("study", "effort.allocation.yields", self.yields, "one share or more between 0 and 1")
+
+
+QUICK_ALLOCATION = AllocationEffort(
+    verification_units=1152,
+    shared_units=48,
+    search=SearchEffort(
+        steps=2,
+        front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
+    ),
+    graded_steps=3,
+    exact_points=20,
+    setting_steps=(2, 3),
+    changed_costs=10,
+    changed_stiffnesses=2,
+    stiffness_units=1152,
+    share_blocks=32,
+    yields=(0.7, 0.8, 0.9, 0.95, 0.99, 0.9973),
+)
+"""Effort of a quick run: every stage is real, every interval wide."""

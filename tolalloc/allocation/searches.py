@@ -1,0 +1,299 @@
+"""From requirements to the cheapest drawing: all searches of one question, in order, and what is asked around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.by_hand import scale_by_hand
+from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.effort import AllocationEffort
+from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
+from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
+from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.design_problem import large
+from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.robustness import Robustness, robustness
+from tolalloc.allocation.search import Allocation, allocate, require_groups
+from tolalloc.allocation.trade import SettingTrade, setting_trade
+from tolalloc.allocation.trust_region import kept_stacks
+from tolalloc.allocation.verification import Verifier
+from tolalloc.allocation.yield_cost import cost_at_yield
+from tolalloc.blas import one_blas_thread
+from tolalloc.capability.experiment import Experiment
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError
+from tolalloc.models import Model
+from tolalloc.progress import Record
+from tolalloc.report.answer import Header
+from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+_EXACT = (0.85, 1.25)
+"""Ends of the exact front over the limit asked for [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawingQuestion:
+    """What is asked of the cheapest drawing.
+
+    Parameters
+    ----------
+    model
+        The model at the sources of the tolerance table.
+    space
+        Design variables with every setting free.
+    requirements
+        What must be kept; the first one limits the leading output.
+    effort
+        How much may be computed.
+    seed
+        Seed of every random number [-].
+    largest_failed_share
+        Share of units that may fail [-].
+    grades
+        Whether zones come from ISO 286 grades and preferred numbers alone.
+    fixed_first
+        Whether the settings are first left as they are, which says what freeing them is worth.
+    front
+        Whether cost is traded against the limit.
+    what_if
+        Whether the settings are traded against the zones, and costs, the model and processes are changed.
+    unit_price, quality_loss
+        What becomes of units beyond a limit, and what the leading output costs a user although it keeps its limit.
+    place
+        Where the question stands, for messages.
+    """
+
+    model: Model
+    space: DesignSpace
+    requirements: tuple[Requirement, ...]
+    effort: AllocationEffort
+    seed: int
+    largest_failed_share: float
+    grades: bool
+    fixed_first: bool
+    front: bool
+    what_if: bool
+    unit_price: UnitPrice | None
+    quality_loss: QualityLoss | None
+    place: str
+
+    @property
+    def limits_one_side_above(self) -> bool:
+        """Whether the leading output has one limit, an upper one above 0, along which fronts and prices run."""
+        limits = self.requirements[0].limits
+        return limits.lower is None and (limits.upper or 0.0) > 0.0
+
+    def seeds(self, name: str) -> SeedTree:
+        """Return the node of the seed tree of a stage."""
+        return SeedTree(self.seed).child("allocate", name)
+
+    def require_answerable(self) -> None:
+        """Raise unless every stage can be asked: zones to change, steps of ladders, units enough.
+
+        Raises
+        ------
+        InputError
+            What cannot be asked, before anything long runs.
+        """
+        require_groups(self.space, self.place)
+        if self.grades:
+            group_options(with_shared_zones(self.space))
+        if self.unit_price and not self.limits_one_side_above:
+            leading = self.requirements[0].output
+            raise InputError(f"{self.place}: unit_price needs one upper limit above 0 on {leading}, the first limit.")
+        asked = {"verification_units": self.effort.verification_units}
+        if self.what_if and self.model.uncertain:
+            asked["allocation.stiffness_units"] = self.effort.stiffness_units
+        for requirement in self.requirements:
+            for name, units in asked.items():
+                try:
+                    requirement.guarantee.require_enough(units)
+                except InputError as error:
+                    raise InputError(f"{self.place}, effort.{name} for {requirement.output}, {error}") from None
+
+    def verifier(self, search: str, space: DesignSpace) -> Verifier:
+        """Return what judges the designs of one search on fresh units, other ones than those of any other search."""
+        # The search that frees everything at once keeps the stream that it had before there were others.
+        direct = SeedTree(self.seed).child("verification")
+        return Verifier(
+            space=space,
+            model=self.model,
+            requirements=self.requirements,
+            seeds=direct if search == "direct" else self.seeds("verification").child(search),
+            units=self.effort.verification_units,
+            largest_failed_share=self.largest_failed_share,
+        )
+
+    def quantile(self, spread: float) -> QuantileResponse:
+        """Return the quantile of designs on the real model, common random numbers."""
+        errors, units = self.space.errors, self.effort.shared_units
+        shared = next(self.seeds("shared").uniform_chunks(units, len(errors.columns)))
+        return QuantileResponse(
+            space=self.space,
+            model=self.model,
+            output=self.requirements[0].output,
+            standard=errors.standard_values(shared),
+            spread=spread,
+        )
+
+    def direct(self) -> Allocation:
+        """Return the allocation of tolerances and settings at once, from proportional scaling."""
+        verifier = self.verifier("direct", self.space)
+        return allocate(verifier, scale_by_hand(verifier, self.effort.search.steps), self.effort.search)
+
+    def fixed(self) -> Allocation:
+        """Return the allocation of tolerances with the settings as they are."""
+        verifier = self.verifier("alone", self.space.fixed)
+        return allocate(verifier, scale_by_hand(verifier, self.effort.search.steps), self.effort.search)
+
+    def free(self, fixed: Allocation) -> Allocation:
+        """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
+        return allocate(self.verifier("joint", self.space), fixed.hand_tried, self.effort.search, fixed.chosen)
+
+    def graded(self, free: Allocation) -> GradedAllocation:
+        """Return the allocation on ladders of zones."""
+        return allocate_grades(self.verifier("graded", self.space), free.chosen, self.effort.graded_steps)
+
+    def trade(self, free: Allocation) -> SettingTrade | None:
+        """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
+        if not 1 <= len(self.space.settings) <= len(self.effort.setting_steps):
+            return None
+        values = tuple(
+            _denser_below(setting.lower, setting.upper, steps)
+            for setting, steps in zip(self.space.settings, self.effort.setting_steps, strict=False)
+        )
+        return setting_trade(self.quantile(free.chosen.spread), free, values)
+
+    def fronts(self, found: Allocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
+        """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
+        drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
+        space, ladders = (graded.space, graded.scales) if graded else (self.space, {})
+        effort = self.effort.search.front
+        # Where the limit is out of reach, the front lies around what is kept instead.
+        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
+        stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
+        exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
+        response = replace(self.quantile(drawn.spread), space=space)
+        further = [()] if not space.settings else [(), (large(space.settings[-1].name, -1),)]
+        searched = [
+            searched_front(response, drawn, stacks, exact, self.seeds("front"), effort, ladders, own, checkpoint)
+            for own in further
+        ]
+        third = searched[1][0] if len(searched) > 1 else None
+        return Fronts(exact=exact, searched=searched[0][0], with_setting=third, surrogate=searched[0][1])
+
+    def robustness(self, free: Allocation) -> Robustness:
+        """Return the answers under changed assumptions."""
+        verifier = replace(self.verifier("robustness", self.space), units=self.effort.stiffness_units)
+        seeds = self.seeds("robustness")
+        return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
+
+    def _changed_models(self, seeds: SeedTree) -> tuple[Model, ...]:
+        """Return models drawn from what is uncertain of the model, none if nothing is said of it."""
+        if not self.model.uncertain:
+            return ()
+        source = self.model.uncertain[0]
+        shape = (self.effort.changed_stiffnesses, len(source.columns))
+        draws = source.standard_values(seeds.child("stiffness").generator().random(shape))
+        return tuple(self.model.changed(change) for change in draws)
+
+    def prices(self, free: Allocation) -> YieldLadder | None:
+        """Return the price of a good unit over yield targets, if the question prices the others."""
+        price = self.unit_price
+        if price is None:
+            return None
+        return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
+
+    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SobolIndices:
+        """Return the indices of the leading output at the zones and the settings of a design."""
+        errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
+        response = self.model.at(space.settings_of(design)).reading((leading,))
+        return sobol_indices(
+            Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share),
+            SobolEffort(start=blocks, limit=blocks),
+            FactorGroup.BLOCK if errors.is_correlated else FactorGroup.SOURCE,
+        ).of(leading)
+
+
+def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
+    """Return values of a range, denser towards its lower end, where zones are cheap."""
+    return np.unique(np.round(low + (high - low) * np.linspace(0.0, 1.0, steps) ** 2, 2))
+
+
+def allocate_drawing(
+    question: DrawingQuestion, record: Record, header: Header, checkpoint: Path | None = None
+) -> AllocationAnswer:
+    """Return the cheapest drawing that keeps the requirements.
+
+    Parameters
+    ----------
+    question
+        What is asked.
+    record
+        Keeps statuses and times.
+    header
+        Header of the answer, to which statuses and stages are added.
+    checkpoint
+        File that keeps the answers of the search for the front, so that an interrupted run goes on from them.
+
+    Raises
+    ------
+    InputError
+        What cannot be asked.
+    SolveError
+        Too many units failed.
+    """
+    question.require_answerable()
+    kept = Checkpoint(path=checkpoint, every=4, question=header.digest) if checkpoint else None
+    fixed = graded = trade = fronts = robust = None
+    with one_blas_thread():
+        if question.fixed_first and question.space.settings:
+            with record.stage("tolerances alone"):
+                fixed = question.fixed()
+            with record.stage("with modification"):
+                free = question.free(fixed)
+        else:
+            with record.stage("allocation"):
+                free = question.direct()
+        if question.grades:
+            with record.stage("grades"):
+                graded = question.graded(free)
+        if question.what_if:
+            with record.stage("modification trade"):
+                trade = question.trade(free)
+        before = record.counts
+        if question.front and question.limits_one_side_above:
+            with record.stage("fronts"):
+                fronts = question.fronts(graded or free, kept)
+        # What a checkpoint knew is not solved again: these units tell how the run went and not what was found.
+        searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
+        if question.what_if:
+            with record.stage("robustness"):
+                robust = question.robustness(free)
+        with record.stage("shares of variance"):
+            chosen = (graded or free).chosen
+            shares = question.shares(chosen.space, chosen.design)
+    statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
+    return AllocationAnswer(
+        header=replace(header, statuses=statuses, stages=record.stages),
+        model=question.model,
+        requirements=question.requirements,
+        space=question.space,
+        fixed=fixed,
+        free=free,
+        graded=graded,
+        shares=shares,
+        trade=trade,
+        fronts=fronts,
+        robustness=robust,
+        prices=question.prices(free),
+        loss=question.quality_loss,
+    )

@@ -1,0 +1,182 @@
+"""The commands on studies: ``run`` and its short names ``rank`` and ``allocate``, and ``check``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tolalloc.cli.console import (
+    AsJson,
+    UnitProgress,
+    announce_compilation,
+    messages,
+    print_json,
+    print_table,
+    say,
+    screen,
+)
+from tolalloc.cli.study_script import load_study
+from tolalloc.exceptions import InputError
+from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.report.answer import Answer
+    from tolalloc.study.study import Study
+
+Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
+Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
+Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
+Kept = Annotated[
+    Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
+]
+
+
+def run(
+    script: Script,
+    only: Annotated[str, typer.Option(help="Some of the questions, as ranking,allocation; all unless given.")] = "",
+    quick: Quick = False,
+    seed: Seed = None,
+    checkpoint: Kept = None,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a study: every question once, one folder, one report."""
+    study = _asked(script, quick, seed)
+    kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
+    _run(study, kinds, out or Path("runs") / study.name, checkpoint, as_json)
+
+
+def rank(script: Script, quick: Quick = False, seed: Seed = None, out: Out = None, as_json: AsJson = False) -> None:
+    """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
+    study = _asked(script, quick, seed)
+    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, as_json)
+
+
+def allocate(
+    script: Script,
+    limit: Annotated[
+        float | None, typer.Option(help="First limit of the study, in its unit, instead of its own.")
+    ] = None,
+    yield_target: Annotated[
+        float | None, typer.Option("--yield", help="Share of units that must keep the first limit, instead of its own.")
+    ] = None,
+    grades: Annotated[
+        bool, typer.Option("--grades", help="Zones of ISO 286 grades and preferred numbers alone.")
+    ] = False,
+    quick: Quick = False,
+    seed: Seed = None,
+    checkpoint: Kept = None,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
+    from tolalloc.study.questions import Allocation, named
+
+    study = _with_first_limit(_asked(script, quick, seed), limit, yield_target)
+    if grades:
+        own = named(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
+        graded = replace(own, grades=True) if isinstance(own, Allocation) else own
+        study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
+    _run(study, ("allocation",), out or Path("runs") / f"{study.name}-allocate", checkpoint, as_json)
+
+
+def _asked(script: Path, quick: bool, seed: int | None) -> Study:
+    """Return the study of a script with what the command line changes."""
+    study = load_study(script)
+    if seed is not None:
+        study = replace(study, seed=seed)
+    return study.with_effort("quick") if quick else study
+
+
+def _with_first_limit(study: Study, limit: float | None, yield_target: float | None) -> Study:
+    """Return the study with another first limit or yield.
+
+    Raises
+    ------
+    InputError
+        The study has no limits, or the first one has two sides.
+    """
+    if limit is None and yield_target is None:
+        return study
+    if not study.limits:
+        raise InputError(f"study {study.name}: it has no limits that --limit or --yield could change.")
+    leading, own = next(iter(study.limits.items()))
+    if limit is not None and own.upper is None:
+        raise InputError.at("tolalloc allocate", "--limit", limit, f"left out: {leading} has no upper limit to change")
+    changed = own if limit is None else replace(own, upper=limit)
+    if yield_target is not None:
+        from tolalloc.allocation.guarantee import AtYield
+
+        changed = replace(changed, show=AtYield(target=yield_target))
+    return replace(study, limits={**study.limits, leading: changed})
+
+
+def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, as_json: bool) -> None:
+    """Run some questions of a study, write its folder and say the answers."""
+    from tolalloc.study.questions import named
+    from tolalloc.study.runner import run as run_study
+
+    questions = named(kinds, tuple(study.questions), f"study {study.name}")
+    announce_compilation()
+    with UnitProgress() as progress:
+        found = run_study(study, folder, questions, progress, checkpoint)
+    messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
+    if as_json:
+        print_json({"folder": str(folder), **found.document.summary})
+        return
+    for answer in found.answers.values():
+        _show(answer)
+
+
+def _show(answer: Answer) -> None:
+    """Print the first table of an answer, its sentences and its warnings."""
+    if answer.tables:
+        frame = answer.to_frame()
+        columns = [column for column in answer.shown if column in frame.columns] or list(frame.columns[:6])
+        print_table(frame[columns].head(16), f"{answer.header.name}: {answer.kind}")
+    say(answer.document)
+
+
+def check(script: Script, as_json: AsJson = False) -> None:
+    """Check a study's names, units and bounds without running it."""
+    from tolalloc.study.prepared import Prepared
+
+    study = load_study(script)
+    prepared = Prepared(study=study)
+    if not any(question.reads for question in study.questions):
+        kinds = ", ".join(question.kind for question in study.questions)
+        print_json({"study": study.name, "questions": kinds}) if as_json else screen.print(
+            f"{script}: study {study.name} is in order; it asks: {kinds}.", soft_wrap=True
+        )
+        return
+    errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
+    if as_json:
+        print_json(
+            {
+                "study": study.name,
+                "model": prepared.model.name,
+                "sources": len(errors.sources),
+                "varying": len(errors.active),
+                "groups": list(space.groups),
+                "limits": {name: [limit.lower, limit.upper] for name, limit in study.limits.items()},
+                "questions": [question.kind for question in study.questions],
+            }
+        )
+        return
+    screen.print(f"{script}: study {study.name} is in order.", soft_wrap=True)
+    screen.print(
+        f"{prepared.model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} "
+        f"groups; it asks: {', '.join(question.kind for question in study.questions)}.",
+        soft_wrap=True,
+    )
+    for requirement in requirements:
+        screen.print(f"  limit: {requirement.sentence}", soft_wrap=True, markup=False)
+    for source in errors.active:
+        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
+        screen.print(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}", soft_wrap=True)
+    for sentence in errors.correlation.mappings(errors.sources):
+        screen.print(f"  {sentence}", soft_wrap=True, markup=False)

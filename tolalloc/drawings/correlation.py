@@ -1,0 +1,189 @@
+"""What varies together: correlated sources of a table, and jointly normal columns that stand on no drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations, zip_longest
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtri
+
+from tolalloc.drawings.sources import Source
+from tolalloc.exceptions import InputError, UnknownNameError
+
+_ROUNDING = 1e-10
+"""Eigenvalue of a correlation matrix above whose negative it counts as zero [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """Two correlated sources of a tolerance table, made on one spindle, in one fixture, or from one lot.
+
+    Parameters
+    ----------
+    one, other
+        Names of the sources; like columns of both go together, x with x and cos1 with cos1.
+    correlation
+        Of the standard normal numbers behind the columns; for normal sources that of the columns themselves, for others
+        near it [-].
+    place
+        Where it stands, for messages.
+    """
+
+    one: str
+    other: str
+    correlation: float
+    place: str = field(default="correlations", repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """All correlations of an error model, as a Gaussian copula: every source keeps its own distribution.
+
+    Parameters
+    ----------
+    pairs
+        Correlated pairs; all other pairs are independent.
+    origin
+        Where all of them stand, for messages.
+    """
+
+    pairs: tuple[Pair, ...] = ()
+    origin: str = field(default="correlations", repr=False)
+
+    def among(self, sources: Sequence[Source]) -> tuple[Pair, ...]:
+        """Return the pairs whose sources both vary and whose correlation is not zero."""
+        varying = {source.name for source in sources if source.zone > 0.0}
+        return tuple(pair for pair in self.pairs if pair.correlation and {pair.one, pair.other} <= varying)
+
+    def require_sound(self, sources: Sequence[Source]) -> None:
+        """Raise unless the pairs name sources with like columns and all correlations can hold together.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            The pair that is not allowed.
+        """
+        known = {source.name: source for source in sources}
+        seen: dict[frozenset[str], Pair] = {}
+        for pair in self.pairs:
+            _require_allowed(pair, known)
+            first = seen.setdefault(frozenset((pair.one, pair.other)), pair)
+            if abs(first.correlation - pair.correlation) > _ROUNDING:
+                raise InputError.at(
+                    f"{pair.place}, {pair.one} with {pair.other}",
+                    "correlation",
+                    pair.correlation,
+                    f"one value for both orders of a pair, and {first.place} says {first.correlation:g}",
+                )
+        self._require_no_contradiction(sources)
+
+    def _require_no_contradiction(self, sources: Sequence[Source]) -> None:
+        """Raise if no random numbers can have these correlations."""
+        matrix = self.source_matrix(sources)
+        values, vectors = np.linalg.eigh(matrix)
+        if values.size and values[0] < -_ROUNDING:
+            # The eigenvalue is the sum of these parts; the most negative one is the pair that asks for too much.
+            parts = np.triu(matrix * np.outer(vectors[:, 0], vectors[:, 0]), 1)
+            one, other = (int(at) for at in np.unravel_index(parts.argmin(), parts.shape))
+            names = [source.name for source in sources if source.zone > 0.0]
+            raise InputError.at(
+                self.origin,
+                "least eigenvalue of the correlation matrix",
+                float(f"{values[0]:.3g}"),
+                f"0 or more; the correlations contradict each other, above all {matrix[one, other]:g} of "
+                f"{names[one]} with {names[other]}",
+            )
+
+    def source_matrix(self, sources: Sequence[Source]) -> Float[np.ndarray, "source source"]:
+        """Return the correlation matrix of the varying sources [-]."""
+        names = [source.name for source in sources if source.zone > 0.0]
+        matrix = np.eye(len(names))
+        for pair in self.among(sources):
+            one, other = names.index(pair.one), names.index(pair.other)
+            matrix[one, other] = matrix[other, one] = pair.correlation
+        return matrix
+
+    def blocks(self, sources: Sequence[Source]) -> tuple[tuple[str, ...], ...]:
+        """Return the varying sources in sets that are independent of each other, in the order of the sources."""
+        members = {source.name: {source.name} for source in sources if source.zone > 0.0}
+        for pair in self.among(sources):
+            joined = members[pair.one] | members[pair.other]
+            members |= dict.fromkeys(joined, joined)
+        ordered = (tuple(name for name in members if name in block) for block in members.values())
+        return tuple(dict.fromkeys(ordered))
+
+    def mappings(self, sources: Sequence[Source]) -> tuple[str, ...]:
+        """Return a sentence for every set of sources that depend on each other: which they are, and how strongly."""
+        matrix = self.source_matrix(sources)
+        position = {name: at for at, name in enumerate(source.name for source in sources if source.zone > 0.0)}
+        sentences = []
+        for block in (block for block in self.blocks(sources) if len(block) > 1):
+            pairs: dict[float, list[str]] = {}
+            for one, other in combinations(block, 2):
+                correlation = float(matrix[position[one], position[other]])
+                pairs.setdefault(correlation, []).append(f"{one} with {other}")
+            if len(pairs) == 1:
+                sentences.append(f"{', '.join(block)}: correlation {next(iter(pairs)):g} of each with each")
+            else:
+                parts = [f"{value:g} ({', '.join(names)})" for value, names in pairs.items() if value]
+                sentences.append(f"{', '.join(block)}: correlation {', '.join(parts)}")
+        return tuple(sentences)
+
+
+def _require_allowed(pair: Pair, known: Mapping[str, Source]) -> None:
+    """Raise unless a pair names two sources with like columns, and a correlation."""
+    place = f"{pair.place}, {pair.one} with {pair.other}"
+    for name in (pair.one, pair.other):
+        if name not in known:
+            raise UnknownNameError.among(pair.place, "source", name, known)
+    if not -1 <= pair.correlation <= 1:
+        raise InputError.at(place, "correlation", pair.correlation, "-1 to 1")
+    if pair.one == pair.other:
+        raise InputError.at(place, "pair", pair.one, "two different sources")
+    columns = zip_longest(known[pair.one].columns, known[pair.other].columns, fillvalue="nothing")
+    for one, other in columns:
+        if one.removeprefix(pair.one) != other.removeprefix(pair.other):
+            raise InputError.at(
+                place,
+                "columns",
+                f"{one} with {other}",
+                "like columns of both sources, as two diameters, two bores or two pitches of the same orders have",
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CorrelatedSource:
+    """Columns that no drawing limits, common to all units: jointly normal, independent of every other source.
+
+    Parameters
+    ----------
+    name, columns
+        What a report calls it, and the columns that it moves.
+    covariance
+        Covariance of the columns, singular or zero if need be [column²].
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    covariance: Float[np.ndarray, "column column"]
+
+    @cached_property
+    def factor(self) -> Float[np.ndarray, "column column"]:
+        """The symmetric root of the covariance; Cholesky's does not exist where columns are fully correlated."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return correlated columns for independent uniform numbers in (0, 1)."""
+        return np.asarray(ndtri(uniform) @ self.factor.T)
+
+    @property
+    def mapping(self) -> str:
+        """Sentence that says which distribution it has."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        spread = ", ".join(f"{value:.2g} ({name})" for name, value in zip(self.columns, deviation, strict=True))
+        return f"jointly normal, σ = {spread}; the same for all units of a reducer"

@@ -1,0 +1,171 @@
+"""A drawing as a whole: the sources of its table, how they depend on each other, and what their zones cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tolalloc.drawings.correlation import Correlation
+from tolalloc.drawings.correlation_file import load_correlations
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.fields import ToleranceRow
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.table_file import require_columns
+from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
+from tolalloc.files import write_new
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Costs = str | Path | Mapping[str, Any]
+"""Process cost table by shipped name or path, or source → ways to make it; empty: what the table says, as 1/zone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """What is known of the parts before anything is computed.
+
+    Parameters
+    ----------
+    name
+        Tolerance table as it was named, for reports.
+    errors
+        The sources of the table with their correlations.
+    costs
+        Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads.
+    """
+
+    name: str
+    errors: ErrorModel
+    costs: Costs = ""
+
+    @classmethod
+    def of_rows(
+        cls,
+        rows: Iterable[Mapping[str, object]],
+        *,
+        place: str = "drawing",
+        processes: str | Path = "generic",
+        correlations: str | Path | Correlation = "",
+        costs: Costs = "",
+    ) -> Drawing:
+        """Return the drawing of rows written in Python, with the same checks as those of a file.
+
+        Parameters
+        ----------
+        rows
+            Field of `tolalloc.drawings.fields.ToleranceRow` → value; needed are id, plus, minus, unit, min, max, cost.
+        place
+            What messages and reports call the rows.
+        processes, correlations, costs
+            As in `load_drawing`; correlations may also be given as they are.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            The row, field and value that are not allowed.
+
+        Examples
+        --------
+        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
+
+        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
+        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
+        >>> hub.errors.columns, hub.sources[0].zone
+        (('hub',), 0.0002)
+        """
+        numbered = [(number, dict(row)) for number, row in enumerate(rows, start=1)]
+        for number, row in numbered:
+            require_columns(f"{place}, row {number} ({row.get('id', 'no id')})", tuple(row), ToleranceRow)
+        sources = sources_of_rows(numbered, processes, place, Path.cwd())
+        if not isinstance(correlations, Correlation):
+            correlations = load_correlations(correlations, sources) if correlations else Correlation()
+        return cls(name=place, errors=ErrorModel(sources, correlation=correlations), costs=costs)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The rows of the tolerance table."""
+        return self.errors.sources
+
+    @property
+    def correlation(self) -> Correlation:
+        """The correlations between the sources."""
+        return self.errors.correlation
+
+    @property
+    def content(self) -> tuple[Any, ...]:
+        """What tells it from other drawings wherever its files stand, for the digest of a study; without the costs."""
+        return (self.sources, self.correlation)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the tolerance table, units in the headers."""
+        return table_frame(self.sources)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
+
+        Raises
+        ------
+        InputError
+            The file is there already or cannot be made.
+        """
+        written = Path(path)
+        write_new(written, table_text(self.sources, written.parent))
+        return written
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the name and the table."""
+        from tolalloc.report.writer import html_table
+
+        return f"<p><b>{self.name}: {len(self.sources)} sources</b></p>\n{html_table(self.to_frame())}"
+
+
+def load_drawing(
+    table: str | Path,
+    processes: str | Path = "generic",
+    correlations: str | Path = "",
+    costs: Costs = "",
+    folder: Path | None = None,
+) -> Drawing:
+    """Return a drawing from its files, each by shipped name or path.
+
+    Parameters
+    ----------
+    table
+        Tolerance table, CSV or XLSX.
+    processes
+        Process capability library that rows of the table may name.
+    correlations
+        Correlations between sources; none if empty.
+    costs
+        Ways to make the features and what each costs, as a file or source → processes; if empty, every feature costs
+        what the table says at its zone, falling as 1/zone.
+    folder
+        Folder that relative paths start from, such as that of a study; the current one unless given.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+
+    Examples
+    --------
+    >>> baseline = load_drawing("rv20e_baseline")
+    >>> len(baseline.sources), f"{1e6 * baseline.sources[0].zone:.1f} µm"
+    (23, '4.0 µm')
+    """
+    sources = load_tolerance_table(beside(folder, table), beside(folder, processes))
+    correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
+    return Drawing(
+        name=str(table),
+        errors=ErrorModel(sources, correlation=correlation),
+        costs=costs if isinstance(costs, Mapping) else beside(folder, costs),
+    )
+
+
+def beside(folder: Path | None, name: str | Path) -> str | Path:
+    """Return where a file is that a study names; a shipped name stays as it is."""
+    path = Path(name)
+    return folder / path if folder and name and (path.suffix or (folder / path).is_file()) else name

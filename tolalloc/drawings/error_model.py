@@ -1,0 +1,184 @@
+"""The error model: all sources of a reducer together, and the random columns that they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtr, ndtri
+
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation
+from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE
+from tolalloc.drawings.sources import Source
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """All sources of a reducer: each random column is its zone times a standard value.
+
+    Parameters
+    ----------
+    sources
+        The rows of the tolerance table.
+    joint
+        What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and
+        its zone is 1. Rankings take it; allocation, tolerance tables and hand estimates have none.
+    correlation
+        Correlations between the sources of the table; a joint source is independent of all others.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        Correlations that name no source or cannot hold together.
+    """
+
+    sources: tuple[Source, ...]
+    joint: tuple[CorrelatedSource, ...] = ()
+    correlation: Correlation = field(default_factory=Correlation)
+
+    def __post_init__(self) -> None:
+        self.correlation.require_sound(self.sources)
+
+    @cached_property
+    def active(self) -> tuple[Source, ...]:
+        """Sources with a zone above zero, the ones that vary."""
+        return tuple(source for source in self.sources if source.zone > 0.0)
+
+    @property
+    def _varying(self) -> tuple[Source | CorrelatedSource, ...]:
+        return (*self.active, *self.joint)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the active sources, then of the joint ones."""
+        return tuple(column for source in self._varying for column in source.columns)
+
+    @cached_property
+    def still(self) -> dict[str, float]:
+        """Columns of the sources with zone zero, which stay in the middle of it [m]."""
+        return {
+            column: source.middle / source.lever
+            for source in self.sources
+            if source.zone == 0.0
+            for column in source.columns
+        }
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of all spectra, ascending [-]."""
+        return tuple(sorted({order for source in self.sources for order, _ in source.spectrum}))
+
+    @cached_property
+    def source_of_column(self) -> tuple[str, ...]:
+        """Name of the source of each column."""
+        return tuple(source.name for source in self._varying for _ in source.columns)
+
+    @cached_property
+    def blocks(self) -> tuple[tuple[str, ...], ...]:
+        """Names of what varies, in sets that are independent of each other."""
+        return (*self.correlation.blocks(self.sources), *((source.name,) for source in self.joint))
+
+    @property
+    def block_of_column(self) -> tuple[str, ...]:
+        """Name of the block of each column: its source, or correlated sources joined by " + "."""
+        block_of = {name: " + ".join(block) for block in self.blocks for name in block}
+        return tuple(block_of[name] for name in self.source_of_column)
+
+    @property
+    def is_correlated(self) -> bool:
+        """Whether some sources of the table depend on each other."""
+        return any(len(block) > 1 for block in self.blocks)
+
+    @cached_property
+    def _correlated_blocks(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of the sources that depend on each other."""
+        names = [source.name for source in self._varying]
+        return tuple(tuple(names.index(name) for name in block) for block in self.blocks if len(block) > 1)
+
+    @cached_property
+    def source_correlation(self) -> Float[np.ndarray, "source source"]:
+        """Correlation of the standard normal numbers behind like columns of what varies [-]."""
+        matrix = np.eye(len(self._varying))
+        matrix[: len(self.active), : len(self.active)] = self.correlation.source_matrix(self.sources)
+        return matrix
+
+    @cached_property
+    def normal_correlation(self) -> Float[np.ndarray, "column column"]:
+        """Correlation of the standard normal numbers behind all columns [-]."""
+        matrix, blocks = np.eye(len(self.columns)), self._correlated_blocks
+        for one, other in ((one, other) for block in blocks for one in block for other in block):
+            own = np.eye(len(self._varying[one].columns)) * self.source_correlation[one, other]
+            matrix[self.columns_of_source[one], self.columns_of_source[other]] = own
+        return matrix
+
+    @cached_property
+    def _factor(self) -> Float[np.ndarray, "source source"]:
+        """Symmetric root of the correlation; Cholesky's does not exist where sources are fully correlated [-]."""
+        values, vectors = np.linalg.eigh(self.source_correlation)
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+    @cached_property
+    def columns_of_source(self) -> tuple[slice, ...]:
+        """Where the columns of each source stand."""
+        ends = np.cumsum([len(source.columns) for source in self._varying]).tolist()
+        return tuple(slice(start, end) for start, end in zip([0, *ends], ends, strict=False))
+
+    @cached_property
+    def zones(self) -> Float[np.ndarray, " source"]:
+        """Zones of the active sources [m], then 1 for every joint one [-]."""
+        return np.array([*(source.zone for source in self.active), *(1.0 for _ in self.joint)])
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return all deviations per unit of zone for independent uniform numbers in (0, 1)."""
+        return self.marginal_values(self.dependent(uniform))
+
+    def dependent(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return uniform numbers with the correlation of the sources from independent ones in (0, 1) [-]."""
+        return self.mixed(uniform, self._factor)
+
+    def mixed(
+        self, uniform: Float[np.ndarray, "*sample column"], factor: Float[np.ndarray, "*#sample source source"]
+    ) -> Float[np.ndarray, "*sample column"]:
+        """Return independent uniform numbers in (0, 1) made dependent by F, with F·Fᵀ the `source_correlation` [-].
+
+        Notes
+        -----
+        A source that depends on no other keeps its numbers. The sums run source by source, so that no bit of a sample
+        depends on how many samples stand beside it, as it would in a library's product of matrices.
+        """
+        mixed = uniform.copy()
+        for block in self._correlated_blocks:
+            normal = [ndtri(uniform[..., self.columns_of_source[source]]) for source in block]
+            for source in block:
+                own = np.zeros_like(normal[0])
+                for other, numbers in zip(block, normal, strict=True):
+                    own += factor[..., source, other, np.newaxis] * numbers
+                mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), ABOVE_ZERO, BELOW_ONE)
+        return mixed
+
+    def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
+        parts = zip(self._varying, self.columns_of_source, strict=True)
+        return np.concatenate([source.standard_values(uniform[:, own]) for source, own in parts], axis=1)
+
+    def deviations(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
+        counts = [len(source.columns) for source in self._varying]
+        middles = [*(source.middle / source.lever for source in self.active), *(0.0 for _ in self.joint)]
+        middle = np.repeat(middles, counts)
+        return np.asarray(standard * np.repeat(zones, counts) + middle)
+
+    def deviations_of_normal(
+        self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns [m, angles rad] that are as probable as independent standard normal numbers.
+
+        Notes
+        -----
+        Beyond 8.2 standard deviations the uniform numbers reach 1 as closely as they can, and the deviations stay.
+        """
+        return self.deviations(self.standard_values(np.clip(ndtr(numbers), ABOVE_ZERO, BELOW_ONE)), zones)

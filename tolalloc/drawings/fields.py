@@ -1,0 +1,327 @@
+"""The fields of a tolerance table: the one list that says how each is named, checked, read, written and explained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from tolalloc.drawings.distributions import Distribution, require_shape
+from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
+from tolalloc.drawings.mixtures import batches_text, parsed_batches
+from tolalloc.drawings.sources import ANGULAR, Source
+from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
+from tolalloc.files import Record
+from tolalloc.units import MICROMETRE, MILLIMETRE
+
+LARGEST_ZONE = 2000.0
+"""Largest zone that is believed [µm]; a metre typed for a millimetre is far above it, and a model may ask for less."""
+
+_DECIMALS = 12
+"""Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""
+
+_WRITTEN_DECIMALS = 5
+"""Decimals of a micrometre that a written table has: half a zone of four decimals [-]."""
+
+UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
+
+Cell = str | int | float | Path | None
+"""What a source writes: a flag as yes or no, a path as seen from the table, nothing as an empty cell."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a tolerance table knows of a field beside its type, its limits and its default.
+
+    Parameters
+    ----------
+    meaning, unit
+        What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name.
+    attribute
+        Field of the source that is this cell; empty where several cells make it together.
+    scale
+        What a number of the cell is multiplied by for the source, if by anything [SI unit per unit].
+    write
+        Returns the cell of a source, where it is not its attribute.
+    """
+
+    meaning: str
+    unit: str = ""
+    attribute: str = ""
+    scale: float | None = None
+    write: Callable[[Source], Cell] | None = None
+
+    def read(self, cell: Cell) -> Cell:
+        """Return the attribute of the source for a cell."""
+        return cell * self.scale if self.scale and isinstance(cell, float) else cell
+
+    def cell(self, source: Source) -> Cell:
+        """Return the cell of a source."""
+        if self.write:
+            return self.write(source)
+        value: Cell = getattr(source, self.attribute)
+        return value / self.scale if self.scale and isinstance(value, float) else value
+
+
+def _plus(source: Source) -> float:
+    """Return the upper limit of a size, or the zone of everything else [µm]."""
+    zone = _micrometres(source.zone)
+    if source.feature is not Feature.SIZE:
+        return zone
+    return round(source.middle / MICROMETRE + zone / 2, _WRITTEN_DECIMALS)
+
+
+def _micrometres(length: float) -> float:
+    """Return a length as a table writes it [µm]."""
+    return round(length / MICROMETRE, _WRITTEN_DECIMALS)
+
+
+class ToleranceRow(Record):
+    """One row; the fields are the column headers without their unit."""
+
+    id: Annotated[
+        str,
+        Field(min_length=1),
+        Column("name of the source; `check` offers the nearest one if it is not known", attribute="name"),
+    ]
+    part: Annotated[str, Column("part that carries it; the id unless given", attribute="part")] = ""
+    feature: Annotated[
+        Feature,
+        Column(
+            "`size` (± zone), `position` (Ø zone of an axis), `pitch` (total cumulative deviation) or `runout` (full "
+            "indicator reading); size unless given",
+            attribute="feature",
+        ),
+    ] = Feature.SIZE
+    nominal: Annotated[float, Column("nominal size, for grades and for you", "mm", "nominal", MILLIMETRE)] = 0.0
+    plus: Annotated[float, Column("upper limit; the zone is plus − minus", "unit", write=_plus)]
+    minus: Annotated[
+        float,
+        Column(
+            "lower limit; 0 for all but sizes",
+            "unit",
+            write=lambda source: round(_plus(source) - _micrometres(source.zone), _WRITTEN_DECIMALS),
+        ),
+    ]
+    unit: Annotated[
+        str, Field(pattern="^(µm|um|mm)$"), Column("µm or mm, for plus, minus, min and max", write=lambda _: "µm")
+    ]
+    distribution: Annotated[
+        Distribution,
+        Column(
+            "`normal`, `uniform`, `triangular`, `lognormal`, `weibull`, `mixture` or `empirical`; normal unless given",
+            attribute="distribution",
+        ),
+    ] = Distribution.NORMAL
+    Cp: Annotated[float, Field(ge=0.1, le=10), Column("capability; 1 unless given", "-", "cp")] = 1.0
+    shift: Annotated[
+        float, Field(ge=-1, le=1), Column("mean shift over half the zone, sizes only", "half zone", "shift")
+    ] = 0.0
+    shape: Annotated[
+        float | None, Column("of lognormal and Weibull", "-", write=lambda source: source.shape or None)
+    ] = None
+    batches: Annotated[
+        str,
+        Column(
+            "of a mixture, as weight:shift:spread: `0.7:-0.3:0.8 0.3:0.5:0.6`, shift in half zones",
+            "weight:shift:spread",
+            write=lambda source: batches_text(source.batches),
+        ),
+    ] = ""
+    measured: Annotated[
+        str,
+        Column(
+            "CSV of at least 20 measured parts beside the table (`deviation [µm]`; of a position `x [µm],y [µm]` or "
+            "`radius [µm]`); distribution `empirical`",
+            write=lambda source: source.measured.path if source.measured else None,
+        ),
+    ] = ""
+    measured_zone: Annotated[
+        float | None,
+        Field(gt=0, le=LARGEST_ZONE),
+        Column(
+            "the zone that the measured parts were made to; today's unless given",
+            "unit",
+            write=lambda source: source.measured.zone / MICROMETRE if source.measured else None,
+        ),
+    ] = None
+    sorted: Annotated[
+        bool,
+        Column(
+            "yes: parts outside the zone are sorted out before assembly (a truncated distribution)", attribute="sorted"
+        ),
+    ] = False
+    process: Annotated[
+        str,
+        Column(
+            "how the feature is made today: row of a process capability library (`Study.processes`), which then gives "
+            "Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost table; "
+            "with Cp stated, the library need not know it",
+            attribute="process",
+        ),
+    ] = ""
+    group: Annotated[
+        str,
+        Column(
+            "rows of one group keep the ratios of their zones: both discs of one drawing; the id unless given",
+            attribute="group",
+        ),
+    ] = ""
+    locked: Annotated[bool, Column("yes: allocation leaves the zone as it is", attribute="locked")] = False
+    min: Annotated[
+        float,
+        Field(ge=0),
+        Column("smallest zone that may be asked for", "unit", write=lambda source: _micrometres(source.minimum)),
+    ]
+    max: Annotated[
+        float,
+        Field(ge=0),
+        Column("largest zone that may be asked for", "unit", write=lambda source: _micrometres(source.maximum)),
+    ]
+    cost: Annotated[
+        float,
+        Field(ge=0, le=1e9),
+        Column(
+            "cost of the feature at its zone; it falls as 1/zone unless a process cost table says otherwise",
+            "cost units",
+            "cost",
+            write=lambda source: round(source.cost, 12),
+        ),
+    ]
+    grade: Annotated[str, Column("carried through", attribute="grade")] = ""
+    spectrum: Annotated[
+        str,
+        Column(
+            "for pitch and run-out: order:relative amplitude, as `1:9.2 2:4.3 4:1`; `random:1.0/40` adds 40 "
+            "independent teeth",
+            "order:amplitude",
+            "written_spectrum",
+            write=lambda source: source.written_spectrum or spectrum_text(source.spectrum),
+        ),
+    ] = ""
+    each: Annotated[
+        int,
+        Field(ge=1, le=1000),
+        Column(
+            "like features that each deviate on their own, for `each_pin.…` and `disc{j}.each_tooth.…`: their number",
+            "-",
+            "each",
+        ),
+    ] = 1
+    over: Annotated[
+        float | None,
+        Field(gt=0, le=1000),
+        Column(
+            "for tilt, phase and rotation: the length over which the zone limits the deviation",
+            "mm",
+            write=lambda source: source.over / MILLIMETRE if source.over else None,
+        ),
+    ] = None
+    note: Annotated[str, Column("carried through", attribute="note")] = ""
+
+    @property
+    def zone(self) -> float:
+        """Full width; a difference of two decimal numbers is no decimal number [unit]."""
+        return round(self.plus - self.minus, _DECIMALS)
+
+    @model_validator(mode="after")
+    def _zone_makes_sense(self) -> ToleranceRow:
+        zone, factor = self.zone, UNITS[self.unit]
+        if not 0 <= zone * factor <= LARGEST_ZONE:
+            raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
+        if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
+            raise ValueError(f"minus and shift must be 0 for feature {self.feature.value}, whose zone is plus")
+        if zone > 0 and not self.locked and not 0 < self.min <= zone <= self.max <= LARGEST_ZONE / factor:
+            raise ValueError(
+                f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:g} µm: "
+                f"min {self.min:g}, zone {zone:g}, max {self.max:g} {self.unit}"
+            )
+        if zone > 0 and not self.locked and self.cost == 0:
+            raise ValueError("the cost must be above 0 for a zone that allocation may change; or lock it")
+        angular = self.id.rsplit(".", 1)[-1] in ANGULAR
+        if angular != (self.over is not None):
+            raise ValueError(
+                f"{self.id} {'is an angle and needs' if angular else 'is a length and has no'} over, the length in mm "
+                "over which the zone limits it"
+            )
+        needs_spectrum = self.feature in (Feature.PITCH, Feature.RUNOUT)
+        if needs_spectrum != bool(self.spectrum):
+            raise ValueError(
+                f"feature {self.feature.value} {'needs' if needs_spectrum else 'has no'} spectrum such as '1:9.2 2:4.3'"
+            )
+        if needs_spectrum and self.each > 1:
+            raise ValueError("each must be 1 for a feature with a spectrum; single teeth are sources of feature size")
+        return self
+
+    @model_validator(mode="after")
+    def _distribution_makes_sense(self) -> ToleranceRow:
+        kind, batches = self.distribution, parsed_batches(self.batches)
+        require_shape(kind, self.shape)
+        if (kind is Distribution.MIXTURE) != bool(batches):
+            raise ValueError("distribution mixture and batches such as '0.7:-0.3:0.8 0.3:0.5:0.6' go together")
+        if (kind is Distribution.EMPIRICAL) != bool(self.measured) or (self.measured_zone and not self.measured):
+            raise ValueError("distribution empirical, measured (the file of the parts) and measured_zone go together")
+        if kind is Distribution.MIXTURE and self.Cp != 1:
+            raise ValueError(f"the batches of a mixture state their spreads, so Cp must be 1: {self.Cp:g}")
+        if kind is Distribution.EMPIRICAL and (self.Cp != 1 or self.shift != 0 or self.plus == self.minus):
+            raise ValueError("measured parts show spread and mean, so Cp must be 1, shift 0 and the zone above 0")
+        if self.feature is Feature.SIZE:
+            return self
+        if any(batch.shift for batch in batches):
+            raise ValueError(f"the shift of a batch must be 0 for feature {self.feature.value}, which has no direction")
+        if self.feature is not Feature.POSITION:
+            self._require_sensible_waves()
+        return self
+
+    def _require_sensible_waves(self) -> None:
+        """Raise unless the distribution says something about waves over a turn."""
+        spectrum, teeth = parsed_spectrum(self.spectrum)
+        if self.distribution is Distribution.EMPIRICAL:
+            raise ValueError(f"distribution empirical is for sizes and positions, not for {self.feature.value}")
+        if teeth and self.distribution is not Distribution.NORMAL:
+            raise ValueError(f"a random part of the spectrum is normal: distribution {self.distribution.value}")
+        if len(spectrum) > 1 and (self.sorted or self.batches):
+            raise ValueError(
+                f"{'sorted' if self.sorted else 'mixture'} concerns all orders of a part at once, and each order "
+                f"deviates on its own here; it needs a spectrum of one order: {len(spectrum)} orders"
+            )
+
+    def source(self, folder: Path) -> Source:
+        """Return the source in SI units; its file of measured parts is looked for in the folder."""
+        factor = UNITS[self.unit] * MICROMETRE
+        middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
+        spectrum, teeth = parsed_spectrum(self.spectrum)
+        plain = {name: column for name, column in COLUMNS.items() if column.attribute}
+        stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
+        return Source(
+            **stated | {"part": self.part or self.id, "group": self.group or self.id},
+            zone=self.zone * factor,
+            middle=middle,
+            minimum=self.min * factor,
+            maximum=self.max * factor,
+            shape=self.shape or 0.0,
+            batches=parsed_batches(self.batches),
+            measured=self._measured_parts(folder, middle),
+            spectrum=spectrum,
+            teeth=teeth,
+            over=(self.over or 0.0) * MILLIMETRE,
+        )
+
+    def _measured_parts(self, folder: Path, middle: float) -> MeasuredParts | None:
+        if not self.measured:
+            return None
+        zone = (self.measured_zone or self.zone) * (UNITS[self.unit] * MICROMETRE)
+        return load_measured_parts((folder / self.measured).resolve(), self.feature, zone, middle)
+
+
+COLUMNS = {
+    name: next(item for item in field.metadata if isinstance(item, Column))
+    for name, field in ToleranceRow.model_fields.items()
+}
+"""Field → what a table knows of it."""
+
+HEADERS = {name: f"{name} [{column.unit}]" if column.unit else name for name, column in COLUMNS.items()}
+"""Field → header of its column."""

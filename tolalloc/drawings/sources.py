@@ -1,0 +1,249 @@
+"""Error sources: what stands on the drawing, and the columns of the model that it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Distribution, Family, Marginal
+from tolalloc.drawings.measured_parts import MeasuredParts
+from tolalloc.drawings.mixtures import Batch, Mixture, smoothed, smoothed_magnitude, smoothing_width
+from tolalloc.drawings.zones import Feature, Spectrum, ZoneMapping
+from tolalloc.units import MICROMETRE, MILLIMETRE
+
+ANGULAR = ("tilt", "phase", "rotation")
+"""Last part of the name of a source whose columns are angles."""
+
+_ROUNDING = 1e-9
+"""Mean of a deviation over its zone, up to which it is rounding [-]."""
+
+_POINTS_PER_WAVE = 32
+"""Points of the shortest wave of a spectrum; the range between them is at most 0.5 % too small."""
+
+
+def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozenset[str]:
+    """Return the columns that are taken as zero: those of a source that a pattern such as ``*.tilt`` names.
+
+    A pattern may name nothing that this reducer has; a misspelt one leaves its column without a value, and that is
+    refused.
+    """
+    return frozenset(
+        name
+        for name in columns
+        for pattern in patterns
+        if fnmatchcase(name, pattern) or fnmatchcase(name, f"{pattern}.*")
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """One tolerance on a drawing: one source of error, one or more columns of the model.
+
+    Parameters
+    ----------
+    name
+        Identifier; a column is this name, or this name and a component.
+    zone
+        Width, diameter, total pitch deviation or indicator reading of the zone [m].
+    minimum, maximum
+        Smallest and largest zone that may be asked for [m].
+    cost
+        Cost of the feature at its zone [cost units].
+    middle
+        Middle of the zone as a deviation from the nominal size, for sizes only [m].
+    nominal
+        Nominal size, for the drawing and its grades only [m].
+    cp
+        Process capability; at 1, 99.73 % of parts lie in the zone, or all where the distribution is bounded [-].
+    shift
+        Mean shift over half the zone, for sizes only [-].
+    shape
+        Shape of a lognormal or Weibull distribution, else 0 [-].
+    spectrum
+        Order → relative amplitude of pitch and run-out deviations [-].
+    teeth
+        Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-].
+    each
+        Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
+    over
+        For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
+    part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, note
+        As `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may state.
+    """
+
+    name: str
+    part: str
+    feature: Feature
+    zone: float
+    minimum: float
+    maximum: float
+    cost: float
+    middle: float = 0.0
+    nominal: float = 0.0
+    distribution: Distribution = Distribution.NORMAL
+    cp: float = 1.0
+    shift: float = 0.0
+    shape: float = 0.0
+    batches: tuple[Batch, ...] = ()
+    measured: MeasuredParts | None = None
+    sorted: bool = False
+    process: str = ""
+    spectrum: Spectrum = ()
+    teeth: int = 0
+    written_spectrum: str = ""
+    each: int = 1
+    over: float = 0.0
+    group: str = ""
+    locked: bool = False
+    grade: str = ""
+    note: str = ""
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the model's columns that this source moves."""
+        names = [f"{self.name}.{number + 1}" for number in range(self.each)] if self.each > 1 else [self.name]
+        if self.feature is Feature.SIZE:
+            return tuple(names)
+        if self.feature is Feature.POSITION:
+            return tuple(f"{name}.{axis}" for name in names for axis in ("x", "y"))
+        return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
+
+    @property
+    def lever(self) -> float:
+        """What divides a length inside the zone to give the column: 1, or the length that an angle is taken over."""
+        return self.over or 1.0
+
+    @property
+    def _base(self) -> Marginal:
+        """Deviation of a size, from the middle of its zone or its lower limit; radius or amplitude of all others."""
+        is_size = self.feature is Feature.SIZE
+        normal = NORMAL if is_size else RAYLEIGH
+        if self.distribution is Distribution.EMPIRICAL:
+            relative = self.measured.relative if self.measured else np.empty(0)
+            return smoothed(relative, smoothing_width(relative)) if is_size else smoothed_magnitude(relative)
+        if self.distribution is Distribution.MIXTURE:
+            return Mixture(normal, self.batches)
+        start = -1.0 if is_size else 0.0
+        return {
+            Distribution.NORMAL: normal,
+            Distribution.UNIFORM: Family("uniform", (start, 1.0 - start), 1.0),
+            Distribution.TRIANGULAR: Family("triang", (0.5, start, 1.0 - start), 1.0),
+            Distribution.LOGNORMAL: Family("lognorm", (self.shape,)),
+            Distribution.WEIBULL: Family("weibull_min", (self.shape,)),
+        }[self.distribution]
+
+    @cached_property
+    def zone_mapping(self) -> ZoneMapping:
+        """Distribution of the columns per unit of zone."""
+        return ZoneMapping(
+            feature=self.feature,
+            distribution=self.distribution,
+            base=self._base,
+            cp=self.cp,
+            shift=self.shift,
+            spectrum=self.spectrum,
+            teeth=self.teeth,
+            sorted=self.sorted,
+        )
+
+    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return the columns per unit of zone for independent uniform numbers in (0, 1)."""
+        own = uniform.reshape(uniform.shape[0] * self.each, -1)
+        return np.asarray(self.zone_mapping.standard_values(own).reshape(uniform.shape) / self.lever)
+
+    def at_limit(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return columns per unit of zone that fill the zone exactly, for independent uniform numbers in (0, 1)."""
+        own = uniform.reshape(uniform.shape[0] * self.each, -1)
+        return np.asarray(self.zone_mapping.at_limit(own).reshape(uniform.shape) / self.lever)
+
+    @property
+    def mapping(self) -> str:
+        """Sentence that says how the zone became a distribution."""
+        reading = f"{self.zone / MICROMETRE:.3g} µm, {self.feature.zone_meaning}"
+        if self.teeth:
+            reading += f", taken at {self.teeth} teeth"
+        if self.over:
+            reading += f" over a length of {self.over / MILLIMETRE:g} mm"
+        if self.each > 1:
+            reading += f", each of {self.each} on its own"
+        is_normal = self.distribution is Distribution.NORMAL and not self.sorted
+        process = f"; process {self.process}" if self.process else ""
+        return f"{reading}: {self._normal if is_normal else self._other}{process}"
+
+    @property
+    def _normal(self) -> str:
+        """What the zone became, where it became normal numbers."""
+        deviation = self.zone_mapping.wave_deviation * self.zone / MICROMETRE
+        if self.teeth:
+            return f"normal, σ = {deviation:.3g} µm per unit of the spectrum {self.written_spectrum} at Cp {self.cp:g}"
+        if self.spectrum:
+            waves = ", ".join(f"{deviation * amplitude:.3g} (order {order})" for order, amplitude in self.spectrum)
+            return f"normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
+        if self.feature is Feature.POSITION:
+            return f"normal, σ = {deviation:.3g} µm on each axis at Cp {self.cp:g}"
+        shift = f", mean shifted by {self.shift * self.zone / MICROMETRE / 2:.3g} µm" if self.shift else ""
+        return f"normal, σ = {deviation:.3g} µm at Cp {self.cp:g}{shift}"
+
+    @property
+    def _other(self) -> str:
+        """What the zone became, where it became anything else."""
+        mean, deviation = (number * self.zone / MICROMETRE for number in self.zone_mapping.moments)
+        if self.feature is Feature.SIZE:
+            off = f"{mean:+.3g}" if abs(mean) > _ROUNDING * self.zone / MICROMETRE else "0"
+            spread = f"{self._kind}, mean {off} µm off the middle, σ = {deviation:.3g} µm"
+        elif self.feature is Feature.POSITION:
+            spread = f"radius {self._kind}, mean {mean:.3g} µm, σ = {deviation:.3g} µm, any phase"
+        else:
+            waves = ", ".join(
+                f"{mean * amplitude:.3g} ± {deviation * amplitude:.3g} (order {order})"
+                for order, amplitude in self.spectrum
+            )
+            spread = f"amplitude of every order {self._kind}, mean ± σ = {waves} µm, any phase"
+        if self.distribution is not Distribution.EMPIRICAL:
+            spread += f", at Cp {self.cp:g}"
+        if len(self.spectrum) > 1:
+            return spread
+        inside = 100.0 * self.zone_mapping.inside
+        kept = f", the other {100.0 - inside:.2g} % sorted out" if self.sorted else ""
+        return f"{spread}, {inside:.4g} % of all parts inside the zone{kept}"
+
+    @property
+    def _kind(self) -> str:
+        """The distribution with its parameters."""
+        if self.measured:
+            return self.measured.sentence
+        if self.batches:
+            return "mixture of batches " + ", ".join(
+                f"{batch.weight:g} of all with shift {batch.shift:g} and spread {batch.spread:g}"
+                for batch in self.batches
+            )
+        return f"{self.distribution.value}, shape {self.shape:g}" if self.shape else self.distribution.value
+
+
+def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
+    """Return what a gauge would show of a source for its own columns, in such a way that it compares with the zone [m].
+
+    Notes
+    -----
+    A size: its deviation from the middle, for like features the largest magnitude. A position: twice the distance from
+    the true one, the largest of like features. Pitch and run-out: the range over a turn, or at the teeth for a spectrum
+    with a random part.
+    """
+    length = columns * source.lever - source.middle
+    if source.feature is Feature.SIZE:
+        return np.asarray(np.abs(length).max(axis=1) if source.each > 1 else length[:, 0])
+    if source.feature is Feature.POSITION:
+        return np.asarray(2.0 * np.hypot(length[:, 0::2], length[:, 1::2]).max(axis=1))
+    orders = np.array([order for order, _ in source.spectrum])
+    high, low = np.full(length.shape[0], -np.inf), np.full(length.shape[0], np.inf)
+    points = source.teeth or _POINTS_PER_WAVE * int(orders.max())
+    # Point by point, because all points of many units at once would fill the memory.
+    for turn in np.linspace(0.0, 2 * np.pi, points, endpoint=False):
+        wave = length @ np.column_stack([np.cos(orders * turn), np.sin(orders * turn)]).ravel()
+        high, low = np.maximum(high, wave), np.minimum(low, wave)
+    return np.asarray(high - low)

@@ -1,0 +1,276 @@
+"""A user's own function as a model: ranked, judged and allocated like the equivalent model of a reducer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import ANGULAR
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models import Evaluation, Model, Setting, SettingDerivatives
+from tolalloc.units import MILLIMETRE
+
+_STEP = 0.01
+"""Step of a difference to either side, over the zone [-]."""
+_FAILURES = (ArithmeticError, ValueError, OverflowError, FloatingPointError)
+"""What a function may raise for a sample that has no answer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionModel:
+    """A function of the dimensions on a drawing.
+
+    Parameters
+    ----------
+    function
+        Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is
+        the nominal plus the deviation [mm], of an angle the deviation [rad]; a function may take arrays of samples or
+        single numbers.
+    inputs
+        Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``.
+    outputs
+        Names of the outputs with their units.
+    settings
+        What the designer chooses beside the zones.
+    jacobian
+        Takes what the function takes and returns, for every output, the derivative by every input [unit of the output
+        per mm]; central differences of a hundredth of the zone unless given.
+    name
+        What a report calls the model.
+    """
+
+    function: Callable[..., Any]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    settings: tuple[Setting, ...] = ()
+    jacobian: Callable[..., Any] | None = None
+    name: str = "own model"
+
+    def __post_init__(self) -> None:
+        for field_name, names in (("inputs", self.inputs), ("outputs", self.outputs)):
+            if not names or len(set(names)) != len(names):
+                raise InputError.at(f"model {self.name}", field_name, names, "one name or more, each once")
+
+    def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
+        """Return the model at the sources of a drawing.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A source that is no input, or an input without a row.
+        """
+        nominal = {source.name: source.nominal for source in errors.sources}
+        for column in (*errors.columns, *errors.still):
+            if column not in self.inputs:
+                raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
+        given = {*errors.columns, *errors.still}
+        missing = [name for name in self.inputs if name not in given]
+        if missing:
+            raise InputError(
+                f"{place}, model {self.name}: the input {missing[0]!r} has no row in the drawing; give it one, with "
+                "zone 0 if it does not vary."
+            )
+        return BoundFunction(
+            source=self,
+            varied=errors.columns,
+            steps=_STEP * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
+            offsets=np.array([nominal.get(name, 0.0) + errors.still.get(name, 0.0) for name in self.inputs]),
+            values=tuple(setting.value for setting in self.settings),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundFunction(Model):
+    """A function at the sources of a drawing.
+
+    Parameters
+    ----------
+    source
+        The function with its names.
+    varied
+        Names of the inputs that vary, in the order of X.
+    steps
+        Step of every varied input to either side of a difference [m, angles rad].
+    offsets
+        Nominal of every input, with what a zone of 0 leaves it [m, angles rad].
+    values
+        Values of the settings in force [units of their names].
+    asked
+        Names of the outputs that a call returns; all unless given.
+    """
+
+    source: FunctionModel
+    varied: tuple[str, ...]
+    steps: Float[np.ndarray, " column"]
+    offsets: Float[np.ndarray, " input"]
+    values: tuple[float, ...] = ()
+    asked: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The name that its user gave."""
+        return self.source.name
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs that vary."""
+        return self.varied
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units."""
+        return self.asked or self.source.outputs
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """What the designer chooses beside the zones."""
+        return self.source.settings
+
+    @property
+    def exact(self) -> tuple[str, ...]:
+        """All outputs: a function is cheap enough for differences where it has no derivatives."""
+        return self.source.outputs
+
+    @property
+    def content(self) -> Any:
+        """Names, settings, and the function's code."""
+        code = getattr(self.source.function, "__code__", None)
+        known = (code.co_code, code.co_consts) if code else repr(self.source.function)
+        return (self.name, self.source.inputs, self.source.outputs, self.settings, known)
+
+    def at(self, values: Float[np.ndarray, " setting"]) -> BoundFunction:
+        """Return the model at other values of its settings."""
+        return replace(self, values=tuple(float(value) for value in values))
+
+    def reading(self, outputs: tuple[str, ...]) -> BoundFunction:
+        """Return the response of these outputs alone."""
+        for name in outputs:
+            if name not in self.source.outputs:
+                raise UnknownNameError.among(f"model {self.name}", "output", name, self.source.outputs)
+        return replace(self, asked=outputs)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample; one for which the function raises or returns no number fails."""
+        found = self._called(self.source.function, x, len(self.source.outputs))
+        values = found[:, [self.source.outputs.index(name) for name in self.outputs]]
+        return Evaluation(values=values, status=np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8))
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the first output of every sample with its derivatives."""
+        return self.derivatives(self.outputs[0], x)
+
+    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return an output of every sample with its derivatives, by the user's jacobian or by central differences."""
+        own = self.reading((output,))
+        found, settings = own(x), np.array(self.values)
+        by_setting = np.empty((x.shape[0], settings.size))
+        for at, setting in enumerate(self.settings):
+            step = setting.step * np.eye(settings.size)[at]
+            by_setting[:, at] = (own.at(settings + step)(x).values - own.at(settings - step)(x).values)[:, 0]
+            by_setting[:, at] /= 2 * setting.step
+        return SettingDerivatives(evaluation=found, by_column=self._by_column(own, x), by_setting=by_setting)
+
+    def _by_column(
+        self, own: BoundFunction, x: Float[np.ndarray, "sample column"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the derivative of one output by every column [unit of the output per m]."""
+        if self.source.jacobian is not None:
+            inputs, outputs = len(self.source.inputs), len(self.source.outputs)
+            found = self._called(self.source.jacobian, x, inputs * outputs).reshape(-1, outputs, inputs)
+            varied = [self.source.inputs.index(name) for name in self.varied]
+            own_rows = found[:, self.source.outputs.index(own.outputs[0])]
+            return np.asarray(own_rows[:, varied] * self._per_input[varied])
+        slopes = np.empty(x.shape)
+        for at, step in enumerate(np.diag(self.steps)):
+            slopes[:, at] = (own(x + step).values - own(x - step).values)[:, 0] / (2 * self.steps[at])
+        return slopes
+
+    @cached_property
+    def _per_input(self) -> Float[np.ndarray, " input"]:
+        """Input per metre, or per radian for an angle: lengths reach the function in millimetres."""
+        return np.array(
+            [1.0 if name.rsplit(".", 1)[-1] in ANGULAR else 1.0 / MILLIMETRE for name in self.source.inputs]
+        )
+
+    def _called(
+        self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
+    ) -> Float[np.ndarray, "sample value"]:
+        """Return what a function says of every sample, NaN where it says nothing."""
+        inputs = np.tile(self.offsets, (x.shape[0], 1))
+        inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
+        arguments = [*(inputs * self._per_input).T, *self.values]
+        with np.errstate(all="ignore"):
+            try:
+                found = np.asarray(function(*arguments), float).reshape(count, x.shape[0])
+            except (TypeError, *_FAILURES):
+                found = np.array([_one(function, [*row, *self.values], count) for row in inputs * self._per_input]).T
+        return np.ascontiguousarray(found.reshape(count, x.shape[0]).T)
+
+
+def _one(function: Callable[..., Any], arguments: Sequence[float], count: int) -> Float[np.ndarray, " value"]:
+    """Return what a function says of one sample, NaN where it raises."""
+    try:
+        return np.asarray(function(*arguments), float).reshape(count)
+    except _FAILURES:
+        return np.full(count, np.nan)
+
+
+def model(
+    function: Callable[..., Any],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    settings: Sequence[Setting] = (),
+    jacobian: Callable[..., Any] | None = None,
+    name: str = "",
+) -> FunctionModel:
+    """Return a model of your own: any function of the dimensions on a drawing.
+
+    The parameters are those of `FunctionModel`; the name is the function's unless given.
+
+    Examples
+    --------
+    >>> import tolalloc as ta
+    >>> gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
+    >>> gap.outputs
+    ('gap [mm]',)
+    """
+    called = name or getattr(function, "__name__", "own model").replace("_", " ").replace("<lambda>", "own model")
+    return FunctionModel(
+        function=function,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        settings=tuple(settings),
+        jacobian=jacobian,
+        name=called,
+    )
+
+
+def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], stop_time: float = 1.0) -> FunctionModel:
+    """Return a Functional Mock-up Unit as a model: parameters in, values at the end of a simulation out.
+
+    Parameters
+    ----------
+    path
+        The unit, an ``.fmu`` file (FMI 2 or 3).
+    inputs
+        Id of the drawing → name of the unit's parameter, which takes millimetres (angles: radians).
+    outputs
+        Name of the output with its unit → name of the unit's variable.
+    stop_time
+        Simulated time after which the outputs are read [s].
+
+    Raises
+    ------
+    InputError
+        The optional library that runs such units is not installed, or there is no such file.
+    """
+    from tolalloc.fmu import simulated
+
+    function = simulated(path, tuple(inputs.values()), tuple(outputs.values()), stop_time)
+    return FunctionModel(function=function, inputs=tuple(inputs), outputs=tuple(outputs), name=function.name)

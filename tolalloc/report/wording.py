@@ -1,0 +1,44 @@
+"""How the name of an output, which carries its unit, is said in sentences and headers."""
+
+from __future__ import annotations
+
+_SIGNS = {"arcsec": "″", "%": " %"}
+_UNDERSTOOD = " transmission error"
+"""What an engineer leaves out where nothing else is meant."""
+
+
+def unit_of(name: str) -> str:
+    """Return the unit in the name of an output.
+
+    >>> unit_of("lost motion [arcmin]")
+    'arcmin'
+    """
+    return name.split("[")[-1].split("]")[0]
+
+
+def quantity(name: str) -> str:
+    """Return the name of an output without its unit.
+
+    >>> quantity("lost motion [arcmin]")
+    'lost motion'
+    """
+    return name.split(" [")[0]
+
+
+def short(name: str) -> str:
+    """Return the shortest name of an output that is understood.
+
+    >>> short("peak-to-peak transmission error [arcsec]")
+    'peak-to-peak'
+    """
+    return quantity(name).removesuffix(_UNDERSTOOD)
+
+
+def with_unit(text: str, name: str) -> str:
+    """Return a number with the unit of an output as a sentence says it.
+
+    >>> with_unit("60", "peak-to-peak transmission error [arcsec]"), with_unit("1", "lost motion [arcmin]")
+    ('60″', '1 arcmin')
+    """
+    unit = unit_of(name)
+    return f"{text}{_SIGNS[unit]}" if unit in _SIGNS else f"{text} {unit}".strip()

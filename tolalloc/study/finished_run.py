@@ -1,0 +1,97 @@
+"""What the folder of a finished run says, read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from tolalloc.exceptions import InputError
+
+TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
+_RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
+_ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinishedRun:
+    """What a run folder says.
+
+    Parameters
+    ----------
+    name
+        How the comparison calls it.
+    summary, manifest
+        Answers of all its questions in one, and circumstances, units in the names.
+    ranking
+        Sources, largest total index first.
+    zones
+        The allocated tolerance table, or the one that was ranked.
+    """
+
+    name: str
+    summary: dict[str, Any]
+    manifest: dict[str, Any]
+    ranking: pd.DataFrame
+    zones: pd.DataFrame
+
+
+def read_run(folder: Path) -> FinishedRun:
+    """Return what a finished run's folder says.
+
+    Raises
+    ------
+    InputError
+        A file of the run is missing, broken or of another layout.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such run folder.")
+    said, manifest = _read_json(folder / "summary.json"), _read_json(folder / "manifest.json")
+    answers = [said[kind] for kind in ("ranking", "allocation") if isinstance(said.get(kind), dict)]
+    if not answers:
+        raise InputError(f"{folder / 'summary.json'}: it holds neither a ranking nor an allocation.")
+    summary = {name: value for answer in answers for name, value in answer.items()}
+    summary = _with(summary, ("study", "study hash", "quick", "yield [-]"), folder / "summary.json")
+    ranked = "ranking" if "ranking" in said else "shares"
+    zones = "allocation.csv" if "allocation" in said else "tables/tolerances.csv"
+    return FinishedRun(
+        name=str(summary["study"]),
+        summary=summary,
+        manifest=manifest,
+        ranking=_read_table(folder / "tables" / f"{ranked}.csv", _RANKED),
+        zones=_read_table(folder / zones, _ZONED),
+    )
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON; is the file truncated? ({error}).") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: holds a {type(found).__name__}; allowed is what a run writes.")
+    return found
+
+
+def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
+    try:
+        found = pd.read_csv(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
+    _with(dict.fromkeys(found.columns), columns, path)
+    return found
+
+
+def _with(found: dict[str, Any], names: tuple[str, ...], path: Path) -> dict[str, Any]:
+    """Return what was found, or say which name is missing."""
+    for name in names:
+        if name not in found:
+            raise InputError(f"{path}: {name} is missing; the run is of another version, run the study again.")
+    return found

@@ -1,0 +1,67 @@
+"""A limit of an output with what must be shown of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tolalloc.exceptions import InputError
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.guarantee import Guarantee
+    from tolalloc.capability.indices import Limits
+
+_YIELD = 0.9973
+"""Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """Limits of an output and what must be shown of them.
+
+    Parameters
+    ----------
+    upper, lower
+        Largest and smallest value allowed; an open side is None [unit of the output].
+    show
+        What must be shown: ``AtYield(target=…)``, ``AtCpk(target=…)``, ``WorstCase()``, ``RootSumSquare()``;
+        99.73 % of units unless given.
+
+    Raises
+    ------
+    InputError
+        No side, sides in the wrong order, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> Limit(upper=60.0).upper
+    60.0
+    """
+
+    upper: float | None = None
+    lower: float | None = None
+    show: Guarantee | None = None
+
+    def __post_init__(self) -> None:
+        from tolalloc.allocation.guarantee import Guarantee
+
+        if self.show is not None and not isinstance(self.show, Guarantee):
+            raise InputError.at("limit", "show", self.show, "AtYield(...), AtCpk(...), WorstCase() or RootSumSquare()")
+        _ = self.limits
+
+    @property
+    def guarantee(self) -> Guarantee:
+        """What must be shown."""
+        from tolalloc.allocation.guarantee import AtYield
+
+        return self.show or AtYield(target=_YIELD)
+
+    @property
+    def limits(self) -> Limits:
+        """The limits alone."""
+        from tolalloc.capability.indices import Limits
+
+        for side in (self.upper, self.lower):
+            if side is not None and not (isinstance(side, int | float) and abs(side) < float("inf")):
+                raise InputError.at("limit", "upper and lower", side, "finite numbers; an open side is None")
+        return Limits(upper=self.upper, lower=self.lower)

@@ -1,0 +1,124 @@
+"""A study with all its files read and all names matched; nothing is solved."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models import Model
+from tolalloc.report.answer import Header
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.design_space import DesignSpace
+    from tolalloc.allocation.requirement import Requirement
+    from tolalloc.study.study import Study
+
+_USUAL_YIELD = 0.9973
+"""Yield of a first limit that asks for something else, such as a Cpk [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """A study that may be asked.
+
+    Parameters
+    ----------
+    study
+        What was asked for.
+    """
+
+    study: Study
+
+    @property
+    def place(self) -> str:
+        """Where the study stands, for messages."""
+        return f"study {self.study.name}"
+
+    @cached_property
+    def errors(self) -> ErrorModel:
+        """The sources of the drawing."""
+        if self.study.drawing is None:
+            raise InputError(f"{self.place}: drawing is missing; give ta.drawing(...), the tolerance table.")
+        return self.study.drawing.errors
+
+    @cached_property
+    def model(self) -> Model:
+        """The model at the sources of the drawing."""
+        if self.study.model is None:
+            raise InputError(f"{self.place}: model is missing; give ta.reducer(...) or ta.model(...).")
+        return self.study.model.bound(self.errors, self.place)
+
+    @cached_property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the study limits, the leading output first.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            No limit, or limits of no output.
+        """
+        from tolalloc.allocation.requirement import Requirement
+
+        if not self.study.limits:
+            raise InputError(f"{self.place}: limits is empty; limit one output at least, the leading one first.")
+        for name in self.study.limits:
+            if name not in self.model.outputs:
+                raise UnknownNameError.among(self.place, "limit of", name, self.model.outputs)
+        return tuple(
+            Requirement(output=name, limits=limit.limits, guarantee=limit.guarantee)
+            for name, limit in self.study.limits.items()
+        )
+
+    @property
+    def target(self) -> float:
+        """Share of units that must keep the first limit [-]."""
+        from tolalloc.allocation.guarantee import AtYield
+
+        shown = self.requirements[0].guarantee
+        return shown.target if isinstance(shown, AtYield) else _USUAL_YIELD
+
+    @cached_property
+    def space(self) -> DesignSpace:
+        """Zones and settings that an allocation may choose."""
+        from tolalloc.allocation.cost.process_costs_file import load_process_costs, priced
+        from tolalloc.allocation.design_space import DesignSpace
+
+        costs = self.study.drawing.costs if self.study.drawing else ""
+        if isinstance(costs, Mapping):
+            # What a person writes in Python is a tolerance ± t, half a zone.
+            processes = priced(costs, self.errors.sources, "half zone")
+        else:
+            processes = load_process_costs(costs, self.errors.sources) if costs else {}
+        return DesignSpace(errors=self.errors, settings=self.model.settings, processes=processes)
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the study and of what its files hold, wherever they stand."""
+        study = self.study
+        content = (
+            (study.name, study.seed, study.largest_failed_share, study.effort, study.questions),
+            dict(study.limits),
+            self.model.content,
+            self.errors.sources,
+            self.errors.correlation,
+            self.space.processes,
+        )
+        return hashlib.sha256(repr(content).encode()).hexdigest()
+
+    @property
+    def header(self) -> Header:
+        """What every answer of this study says of it; statuses and stages come with the answer."""
+        return Header(
+            name=self.study.name,
+            model=self.model.name,
+            seed=self.study.seed,
+            quick=self.study.quick,
+            digest=self.digest,
+            conditions=self.model.conditions,
+            assumptions=self.model.assumptions,
+        )

@@ -1,0 +1,191 @@
+"""What a study may be asked: each question is one class that says what it reads and how it is answered."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tolalloc.exceptions import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
+    from tolalloc.progress import Record
+    from tolalloc.report.answer import Answer
+    from tolalloc.report.document import Document
+    from tolalloc.study.prepared import Prepared
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question(ABC):
+    """A question of a study.
+
+    A subclass names what it is called on the command line (``kind``), which fields of the study it reads (``reads``),
+    and answers from the prepared study.
+    """
+
+    kind: ClassVar[str]
+    reads: ClassVar[frozenset[str]] = frozenset(
+        {"model", "drawing", "limits", "seed", "largest_failed_share", "effort"}
+    )
+
+    def __new__(cls, *_: object, **given: object) -> Question:
+        """Refuse a field that the question does not have, by name and with the nearest one."""
+        known = [field.name for field in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise UnknownNameError.among(f"question {cls.kind}", "field", name, known)
+        return super().__new__(cls)
+
+    @abstractmethod
+    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:
+        """Return the answer.
+
+        Parameters
+        ----------
+        prepared
+            The checked study.
+        record
+            Told of stages and solved units.
+        checkpoint
+            File that keeps an interrupted search, if one is wanted.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranking(Question):
+    """Which error drives which output, which order and the rejects, and how sure that is.
+
+    >>> Ranking().kind
+    'ranking'
+    """
+
+    kind: ClassVar[str] = "ranking"
+
+    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+        """Return what drives the outputs at the zones of the drawing."""
+        from tolalloc.drawings.seeds import SeedTree
+        from tolalloc.sensitivity.answer import rank
+
+        study = prepared.study
+        return rank(
+            prepared.model.observed(record.observe),
+            prepared.errors,
+            {requirement.output: requirement.limits for requirement in prepared.requirements},
+            prepared.target,
+            study.effort.ranking,
+            SeedTree(study.seed).child("rank"),
+            study.largest_failed_share,
+            record,
+            prepared.header,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Allocation(Question):
+    """The cheapest drawing that keeps every limit, verified on fresh units.
+
+    Parameters
+    ----------
+    grades
+        Whether zones come from ISO 286 grades and preferred numbers alone.
+    fixed_first
+        Whether zones are first allocated with the settings of the model as they are: the answer then says what freeing
+        them is worth.
+    front
+        Whether cost is traded against the first limit.
+    what_if
+        Whether settings are traded against zones, and costs, stiffnesses and processes are changed.
+    unit_price
+        What becomes of units beyond the first limit; the yield with the cheapest good unit is then named.
+    quality_loss
+        What the leading output costs a user although it keeps its limit (Taguchi).
+
+    Examples
+    --------
+    >>> Allocation(grades=True).grades
+    True
+    """
+
+    kind: ClassVar[str] = "allocation"
+
+    grades: bool = False
+    fixed_first: bool = True
+    front: bool = True
+    what_if: bool = True
+    unit_price: UnitPrice | None = None
+    quality_loss: QualityLoss | None = None
+
+    def __post_init__(self) -> None:
+        from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
+
+        for name in ("grades", "fixed_first", "front", "what_if"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError.at("question allocation", name, getattr(self, name), "True or False")
+        if not isinstance(self.unit_price, UnitPrice | None):
+            raise InputError.at("question allocation", "unit_price", self.unit_price, "UnitPrice(...) or None")
+        if not isinstance(self.quality_loss, QualityLoss | None):
+            raise InputError.at("question allocation", "quality_loss", self.quality_loss, "QualityLoss(...) or None")
+
+    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:
+        """Return the cheapest drawing."""
+        from tolalloc.allocation.searches import DrawingQuestion, allocate_drawing
+
+        study = prepared.study
+        question = DrawingQuestion(
+            model=prepared.model.observed(record.observe),
+            space=prepared.space,
+            requirements=prepared.requirements,
+            effort=study.effort.allocation,
+            seed=study.seed,
+            largest_failed_share=study.largest_failed_share,
+            grades=self.grades,
+            fixed_first=self.fixed_first,
+            front=self.front,
+            what_if=self.what_if,
+            unit_price=self.unit_price,
+            quality_loss=self.quality_loss,
+            place=prepared.place,
+        )
+        return allocate_drawing(question, record, prepared.header, checkpoint)
+
+
+@dataclass(frozen=True)
+class Calculation(Question):
+    """A report that a function makes: a replica of a paper, a benchmark, anything beside ranking and allocation.
+
+    Parameters
+    ----------
+    build
+        Makes the report from whether it should be quick.
+    """
+
+    kind: ClassVar[str] = "calculation"
+    reads: ClassVar[frozenset[str]] = frozenset()
+
+    build: Callable[[bool], Document]
+
+    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+        """Return what the function made."""
+        from tolalloc.study.calculated import CalculatedAnswer
+
+        with record.stage(prepared.study.name):
+            return CalculatedAnswer.of(self.build(prepared.study.quick), prepared)
+
+
+def named(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:
+    """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults.
+
+    Raises
+    ------
+    UnknownNameError
+        A kind that is no question.
+    """
+    known: dict[str, Any] = {"ranking": Ranking, "allocation": Allocation}
+    own = {question.kind: question for question in asked}
+    for kind in kinds:
+        if kind not in known and kind not in own:
+            raise UnknownNameError.among(place, "question", kind, {*known, *own})
+    return tuple(own[kind] if kind in own else known[kind]() for kind in kinds)

@@ -1,0 +1,114 @@
+"""Running a study: every question once, one folder, one report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tolalloc.progress import Progress, Record, Silent
+from tolalloc.report.answer import Answer
+from tolalloc.report.document import Document, joined
+from tolalloc.report.folder import claimed
+from tolalloc.study.prepared import Prepared
+from tolalloc.study.questions import Question
+from tolalloc.study.study import Study
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A finished study.
+
+    Parameters
+    ----------
+    answers
+        Kind of question → answer, in the order of the study.
+    folder
+        Where the report stands; none if nothing was written.
+    document
+        The one report.
+    """
+
+    answers: dict[str, Answer]
+    folder: Path | None
+    document: Document
+
+    def __getitem__(self, kind: str) -> Answer:
+        return self.answers[kind]
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: every answer."""
+        return "\n".join(answer._repr_html_() for answer in self.answers.values())
+
+
+def answered(
+    study: Study, question: Question, progress: Progress | None = None, checkpoint: Path | None = None
+) -> Answer:
+    """Return the answer to one question."""
+    prepared = Prepared(study=study)
+    return question.answer(prepared, _record(prepared, question, progress), checkpoint)
+
+
+def _record(prepared: Prepared, question: Question, progress: Progress | None) -> Record:
+    outcomes = prepared.model.outcomes if "model" in question.reads else {}
+    return Record(progress or Silent(), outcomes)
+
+
+def run(
+    study: Study,
+    folder: Path,
+    questions: tuple[Question, ...] = (),
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+) -> Run:
+    """Ask the questions and write one folder; on any error nothing stays behind.
+
+    Parameters
+    ----------
+    study
+        What is asked.
+    folder
+        New or empty folder.
+    questions
+        Some of its questions; all unless given.
+    progress
+        Told how far the work has come.
+    checkpoint
+        File that keeps an interrupted search, if one is wanted.
+
+    Raises
+    ------
+    TolallocError
+        One sentence on what is wrong.
+    """
+    asked = questions or tuple(study.questions)
+    prepared = Prepared(study=study)
+    with claimed(folder):
+        answers = {
+            question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
+            for question in asked
+        }
+        from tolalloc.report.writer import write_document
+
+        document = _document(prepared, answers)
+        write_document(document, folder)
+        for answer in answers.values():
+            answer.add_files(folder)
+    return Run(answers=answers, folder=folder, document=document)
+
+
+def _document(prepared: Prepared, answers: dict[str, Answer]) -> Document:
+    """Return the one report: the answer itself where there is one, all of them under their study otherwise."""
+    study, first = prepared.study, next(iter(answers.values()))
+    known: dict[str, Any] = {
+        "study": study.name,
+        "study hash": first.header.digest,
+        "quick": study.quick,
+        "questions": list(answers),
+        "statuses": {kind: dict(answer.header.statuses) for kind, answer in answers.items()},
+        "stages": {kind: dict(answer.header.stages) for kind, answer in answers.items()},
+    }
+    title = first.title if len(answers) == 1 else f"{first.header.model}: {study.name}"
+    return joined(
+        title, first.subtitle, [(kind, answer.document) for kind, answer in answers.items()], **known, seed=study.seed
+    )

@@ -1,0 +1,202 @@
+"""What a user asks for: a model, a drawing, limits and questions, checked as a whole before anything long runs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.study.limit import Limit
+from tolalloc.study.questions import Allocation, Question, Ranking, named
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
+    from tolalloc.drawings.drawing import Drawing
+    from tolalloc.models import ModelSource
+    from tolalloc.progress import Progress
+    from tolalloc.report.answer import Answer
+    from tolalloc.sensitivity.answer import RankingAnswer
+    from tolalloc.study.effort import Effort
+    from tolalloc.study.runner import Run
+
+
+_NAME = r"[\w-][\w. -]*"
+
+
+def _full() -> Effort:
+    from tolalloc.study.effort import Effort
+
+    return Effort()
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: what is asked of a model at the zones of a drawing.
+
+    Parameters
+    ----------
+    model
+        What answers: ``ta.reducer(...)``, ``ta.model(...)``.
+    drawing
+        The tolerance table, ``ta.drawing(...)``.
+    limits
+        Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
+    questions
+        What is asked, in the order of the report.
+    name
+        Name of the study and of its run folder.
+    seed
+        Seed of every random number [-].
+    largest_failed_share
+        Share of units without an answer above which a question stops [-].
+    effort
+        How much may be computed.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A field that is not allowed, or that no question of the study reads.
+
+    Examples
+    --------
+    >>> import tolalloc as ta
+    >>> ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)}).seed
+    1
+    """
+
+    model: ModelSource | None = None
+    drawing: Drawing | None = None
+    limits: Mapping[str, Limit] = field(default_factory=dict)
+    questions: Sequence[Question] = (Ranking(), Allocation())
+    name: str = "study"
+    seed: int = 1
+    largest_failed_share: float = 0.01
+    effort: Effort = field(default_factory=_full)
+
+    def __new__(cls, *_: object, **given: object) -> Study:
+        """Refuse a field that a study does not have, by name and with the nearest one."""
+        known = [own.name for own in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise UnknownNameError.among(f"study {given.get('name', 'study')}", "field", name, known)
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        place = f"study {self.name}"
+        object.__setattr__(self, "questions", tuple(self.questions))
+        for name, value, good, allowed in (
+            (
+                "name",
+                self.name,
+                re.fullmatch(r"[\w-][\w. -]*", str(self.name)),
+                "letters, digits, '_', '-', '.', blanks",
+            ),
+            ("seed", self.seed, type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
+            ("largest_failed_share", self.largest_failed_share, 0 <= self.largest_failed_share < 0.5, "0 to 0.5"),
+            (
+                "questions",
+                self.questions,
+                self.questions and all(isinstance(q, Question) for q in self.questions),
+                "ta.Ranking(...), ta.Allocation(...) and other questions",
+            ),
+        ):
+            if not good:
+                raise InputError.at(place, name, value, allowed)
+        for output, limit in self.limits.items():
+            if not isinstance(limit, Limit):
+                raise InputError.at(place, f"limits[{output!r}]", limit, "ta.Limit(...)")
+        self._require_read(place)
+
+    def _require_read(self, place: str) -> None:
+        """Raise if a field is given that no question reads."""
+        read = frozenset().union(*(question.reads for question in self.questions)) | {"name", "questions", "effort"}
+        kinds = ", ".join(question.kind for question in self.questions)
+        for own in fields(self):
+            default = own.default_factory() if callable(own.default_factory) else own.default
+            if own.name not in read and getattr(self, own.name) != default:
+                raise InputError(
+                    f"{place}: no question of it reads {own.name} (it asks: {kinds}); leave it out or "
+                    "ask what reads it."
+                )
+
+    @property
+    def quick(self) -> bool:
+        """Whether the effort is the small one."""
+        return self.effort.is_quick
+
+    def with_effort(self, effort: Literal["quick", "full"] | Effort) -> Study:
+        """Return the study at another effort."""
+        from tolalloc.study.effort import QUICK
+
+        if isinstance(effort, str):
+            if effort not in ("quick", "full"):
+                raise UnknownNameError.among(f"study {self.name}", "effort", effort, ("quick", "full"))
+            return replace(self, effort=QUICK) if effort == "quick" else self
+        return replace(self, effort=effort)
+
+    def ask(
+        self,
+        question: Question | str,
+        effort: Literal["quick", "full"] | Effort = "full",
+        progress: Progress | None = None,
+        checkpoint: Path | None = None,
+    ) -> Answer:
+        """Return the answer to one question, of this study or any other.
+
+        Parameters
+        ----------
+        question
+            A question, or the kind of one of the study's.
+        effort
+            The study's own effort, or a quick one.
+        progress
+            Told how far the work has come; silent unless given.
+        checkpoint
+            File that keeps an interrupted search, if one is wanted.
+        """
+        from tolalloc.study.runner import answered
+
+        if isinstance(question, str):
+            question = named((question,), tuple(self.questions), f"study {self.name}")[0]
+        return answered(self.with_effort(effort), question, progress, checkpoint)
+
+    def rank(
+        self, effort: Literal["quick", "full"] | Effort = "full", progress: Progress | None = None
+    ) -> RankingAnswer:
+        """Return which error drives which output."""
+        return cast("RankingAnswer", self.ask("ranking", effort, progress))
+
+    def allocate(
+        self, effort: Literal["quick", "full"] | Effort = "full", progress: Progress | None = None
+    ) -> AllocationAnswer:
+        """Return the cheapest drawing that keeps every limit."""
+        return cast("AllocationAnswer", self.ask("allocation", effort, progress))
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        effort: Literal["quick", "full"] | Effort = "full",
+        progress: Progress | None = None,
+    ) -> Run:
+        """Ask every question, write one folder with one report, and return the answers.
+
+        Parameters
+        ----------
+        folder
+            New or empty folder; ``runs/NAME`` unless given.
+        effort
+            The study's own effort, or a quick one.
+        progress
+            Told how far the work has come; silent unless given.
+
+        Raises
+        ------
+        TolallocError
+            One sentence on what is wrong; nothing is written then.
+        """
+        from tolalloc.study.runner import run
+
+        return run(self.with_effort(effort), Path(folder or Path("runs") / self.name), progress=progress)
