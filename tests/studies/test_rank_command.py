@@ -121,6 +121,7 @@ def test_errors_of_the_housing_make_multiples_of_the_teeth_and_turning_ones_of_t
     assert (orders["with others low 5 % [-]"][first & (of_housing | of_discs)] > 0.2).sum() >= 3
 
 
+@pytest.mark.slow
 def test_seed_zero_is_a_seed_like_every_other(tmp_path):
     script = script_with(tmp_path)
     answers = []
@@ -137,6 +138,7 @@ def test_seed_zero_is_a_seed_like_every_other(tmp_path):
     assert any("one and the same study" in warning for warning in found["warnings"])
 
 
+@pytest.mark.slow
 def test_measured_parts_and_processes_reach_the_report(tmp_path):
     table = pd.read_csv(few_sources(tmp_path), dtype=str, keep_default_na=False)
     parts = SeedTree(1).generator().normal(0.2, 0.4, 60)
@@ -164,6 +166,7 @@ def test_measured_parts_and_processes_reach_the_report(tmp_path):
     assert process in page
 
 
+@pytest.mark.slow
 def test_correlated_sources_are_ranked_as_a_block_and_share_by_shapley(tmp_path):
     (tmp_path / "lot.csv").write_text(
         "sources,correlation,note\ndisc?.pitch,0.9,both discs on one machine\n", encoding="utf-8"
