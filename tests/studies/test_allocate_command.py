@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from tolalloc.cli.allocate import allocate
 
 from tests.studies.command import ROOT, command, process, tolalloc
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.cli.run import allocate
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import TolallocError
 
@@ -23,20 +23,31 @@ PROCESSES = """sources,process,model,fixed [cost units],factor,min [µm],max [µ
 housing.pitch,ground,reciprocal,,,,,today
 housing.pitch,broached,reciprocal,0.8,25,22,,wide zones only
 """
-SMALL = """effort=Effort(verification_units=128, shared_units=16,
-    search=SearchEffort(steps=2, front=FrontEffort(
-        population=8, generations=4, population_on_kernel=8, generations_on_kernel=2, designs=10, rounds=1, points=3)),
-    allocation=AllocationEffort(graded_steps=2, exact_points=8, flank_steps=2, radial_steps=2, changed_costs=4,
-        changed_stiffnesses=1, stiffness_units=128, share_blocks=8, yields=(0.9, 0.95)))"""
-IMPORTS = """from tolalloc.allocation.cost.unit_price import UnitPrice
-from tolalloc.allocation.guarantee import AtCpk, AtYield
+PRICED = """sources,process,model,fixed [cost units],factor,change [cost units],note
+housing.pitch,ground,reciprocal,,,,today
+housing.pitch,broached,reciprocal,0.8,5,{change},another machine
+"""
+SMALL = """AllocationEffort(
+        verification_units=128, shared_units=16, graded_steps=2, exact_points=8, setting_steps=(2, 2), changed_costs=4,
+        changed_stiffnesses=1, stiffness_units=128, share_blocks=8, yields=(0.9, 0.95),
+        search=SearchEffort(steps=2, front=FrontEffort(population=8, generations=4, population_on_kernel=8,
+            generations_on_kernel=2, designs=10, rounds=1, points=3)))"""
+STUDY = """import tolalloc as ta
+from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.search import SearchEffort
-from tolalloc.capability.indices import Limits
-from tolalloc.study.definition import Study
-from tolalloc.study.effort import AllocationEffort, Effort
+
+MOST = ta.AtYield(target=0.95)
+study = ta.Study(
+    ta.reducer("rv20e", neglected=("*",), flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0){reducer}),
+    ta.drawing("few.csv"{drawing}),
+    limits={{ta.PEAK_TO_PEAK: ta.Limit({first}){others}}},
+    questions=(ta.Allocation({asked}),),
+    name="drawn",
+    effort={effort},
+)
 """
-LOST = "'lost motion [arcmin]'"
+LOST = "ta.LOST_MOTION"
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -48,21 +59,13 @@ def run_with_threads(threads: int, *arguments: object) -> subprocess.CompletedPr
     return process("allocate", *arguments, NUMBA_NUM_THREADS=str(threads))
 
 
-def script_with(path: Path, fields: str = "", effort: str = SMALL) -> Path:
-    """Write a study of few sources, one of which can be made in two ways."""
+def script_with(path: Path, effort: str = f"ta.Effort(allocation={SMALL})", **texts: str) -> Path:
+    """Write a study of few sources, one of which can be made in two ways, with texts at the named places."""
     few_sources(path)
     (path / "costs.csv").write_text(PROCESSES, encoding="utf-8")
-    values = {
-        "name": "'drawn'",
-        "tolerances": repr(str(path / "few.csv")),
-        "neglected": "('*',)",
-        "yield_target": "0.95",
-        "limit_arcsec": "50.0",
-    }
-    given = ", ".join(f"{name}={value}" for name, value in values.items() if f"{name}=" not in fields)
-    script = path / "study.py"
-    script.write_text(f"{IMPORTS}study = Study({', '.join(filter(None, (given, fields, effort)))})\n", encoding="utf-8")
-    return script
+    given = {"first": "upper=50.0, show=MOST", "others": "", "reducer": "", "drawing": "", "asked": "", **texts}
+    (path / "study.py").write_text(STUDY.format(effort=effort, **given), encoding="utf-8")
+    return path / "study.py"
 
 
 def few_sources(path: Path, **columns: str) -> Path:
@@ -84,11 +87,13 @@ def numbers(value: object) -> list[float]:
 @pytest.fixture(scope="module")
 def allocated(tmp_path_factory) -> tuple[Path, str]:
     path = tmp_path_factory.mktemp("allocate")
-    fields = (
-        f"process_costs={str(path / 'costs.csv')!r}, unit_price=UnitPrice(inspection=0.1, scrap=5.0), "
-        "stiffness='rv20e_table6'"
+    script = script_with(
+        path,
+        effort="ta.Effort()",
+        drawing=", costs='costs.csv'",
+        asked="unit_price=ta.UnitPrice(inspection=0.1, scrap=5.0)",
+        reducer=", stiffness='rv20e_table6'",
     )
-    script = script_with(path, fields, effort="")
     result = run(script, "--quick", "--grades", "--seed", 0, "--out", path / "report")
     assert result.returncode == 0, result.stderr
     return path / "report", result.stdout + result.stderr
@@ -143,7 +148,7 @@ def test_the_answer_reads_well(allocated):
 
 def test_the_answer_for_programs_is_finite(allocated):
     folder, _ = allocated
-    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["allocation"]
     assert answer["seed"] == 0
     assert answer["met"] is True
     assert answer["blocking requirement"] is None
@@ -160,6 +165,28 @@ def test_the_drawing_is_read_back_and_carries_grades(allocated):
     assert set(sources) == set(KEPT)
     assert sources["pin.diameter"].grade.startswith("IT")
     assert sources["disc1.pitch"].zone == sources["disc2.pitch"].zone
+
+
+@pytest.mark.parametrize("change", [0.0, 0.5])
+def test_the_cost_is_one_number_in_summary_drawing_and_table(tmp_path, change):
+    """All are read back from the files; what is paid once, to leave today's process, is no cost of the next study."""
+    script = script_with(
+        tmp_path, drawing=", costs='priced.csv'", asked="fixed_first=False, front=False, what_if=False"
+    )
+    (tmp_path / "priced.csv").write_text(PRICED.format(change=change), encoding="utf-8")
+    folder = tmp_path / "report"
+    result = tolalloc("run", script, "--only", "allocation", "--out", folder)
+    assert result.returncode == 0, result.stderr
+    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["allocation"]
+    cost, header = answer["cost [cost units]"], "cost [cost units]"
+    assert pd.read_excel(folder / "drawing.xlsx", sheet_name="drawing")[header].sum() == pytest.approx(cost, rel=1e-9)
+    assert pd.read_csv(folder / "tables" / "drawing.csv")[header].sum() == pytest.approx(cost, rel=1e-9)
+    assert sum(row[header] for row in answer["drawing"]) == pytest.approx(cost, rel=1e-9)
+    table = {source.name: source for source in load_tolerance_table(folder / "allocation.csv")}
+    assert sum(source.cost for source in table.values()) + change == pytest.approx(cost, rel=1e-9)
+    assert table["housing.pitch"].process == "broached"
+    before = load_tolerance_table(tmp_path / "few.csv")
+    assert sum(own.cost * own.zone / table[own.name].zone for own in before) != pytest.approx(cost, rel=0.05)
 
 
 def test_every_header_of_the_tables_has_a_unit(allocated):
@@ -191,7 +218,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
     plain = run_with_threads(2, script, "--json", "--out", tmp_path / "plain")
     for result in (whole, again, plain):
         assert result.returncode == 0, result.stderr
-        answers.append(json.loads(result.stdout))
+        answers.append(json.loads(result.stdout)["allocation"])
     assert answers[0] == answers[1] == answers[2]
     before = kept.read_bytes()
     other = run(script, "--limit", 40, "--out", tmp_path / "limit", "--checkpoint", kept)
@@ -202,20 +229,27 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("fields", "blocking", "unit"),
+    ("texts", "blocking", "unit"),
     [
-        ("limit_arcsec=5.0, unit_price=UnitPrice(scrap=5.0)", "peak-to-peak transmission error [arcsec]", "arcsec"),
         (
-            f"other_limits={{{LOST}: Limits(upper=0.01)}}, grades=True, unit_price=UnitPrice(scrap=5.0)",
+            {"first": "upper=5.0, show=MOST", "asked": "unit_price=ta.UnitPrice(scrap=5.0)"},
+            "peak-to-peak transmission error [arcsec]",
+            "arcsec",
+        ),
+        (
+            {
+                "others": f", {LOST}: ta.Limit(upper=0.01, show=MOST)",
+                "asked": "grades=True, unit_price=ta.UnitPrice(scrap=5.0)",
+            },
             "lost motion [arcmin]",
             "arcmin",
         ),
     ],
 )
-def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp_path, fields, blocking, unit):
-    result = run(script_with(tmp_path, fields), "--json", "--out", tmp_path / "report")
+def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp_path, texts, blocking, unit):
+    result = run(script_with(tmp_path, **texts), "--json", "--out", tmp_path / "report")
     assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    answer = json.loads(result.stdout)["allocation"]
     assert answer["met"] is False
     assert answer["blocking requirement"] == blocking
     beyond = answer["beyond its limit by [unit of the output]"]
@@ -230,9 +264,8 @@ def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"yield_target": 2.0}, ["yield_target is 2.0", "0.5 up to but not 1"]),
-        ({"limit": -3.0}, ["limit_arcsec is -3.0", "above 0"]),
-        ({"limit": math.nan}, ["limit_arcsec is nan", "above 0"]),
+        ({"yield_target": 2.0}, ["yield is 2.0", "0.5 up to but not 1"]),
+        ({"limit": math.nan}, ["limit", "nan", "finite"]),
         ({"seed": -1}, ["seed is -1", "0 or a positive integer"]),
         ({"checkpoint": Path("nowhere/kept.npz")}, ["no folder", "nowhere"]),
         ({"checkpoint": ROOT / "README.md"}, ["README.md", "no complete checkpoint"]),
@@ -245,42 +278,41 @@ def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
 
 
 @pytest.mark.parametrize(
-    ("fields", "words"),
+    ("texts", "words"),
     [
-        ("other_limits={'lost motoin [arcmin]': Limits(upper=1.0)}", ["other_limits", "lost motion [arcmin]"]),
-        (f"guarantees={{{LOST}: AtCpk(target=1.33)}}", ["guarantees", "peak-to-peak"]),
+        ({"others": ", 'lost motoin [arcmin]': ta.Limit(upper=1.0)"}, ["limit of", "lost motion [arcmin]"]),
+        ({"others": f", {LOST}: ta.Limit(upper=1.0, show=ta.AtCpk(target=0.0))"}, ["Cpk is 0.0", "above 0"]),
+        ({"others": f", {LOST}: ta.Limit(upper=1.0, show=1.33)"}, ["show", "1.33", "AtCpk"]),
+        ({"others": f", {LOST}: 1.0"}, ["limits['lost motion [arcmin]'] is 1.0", "Limit(...)"]),
+        ({"others": f", {LOST}: ta.Limit(upper=float('inf'))"}, ["limit", "inf", "finite"]),
+        ({"others": f", {LOST}: ta.Limit(lower=2.0, upper=1.0)"}, ["upper limit is 1.0", "above the lower one"]),
         (
-            f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: AtCpk(target=0.0)}}",
-            ["Cpk is 0.0", "above 0"],
-        ),
-        (f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: 1.33}}", ["guarantees", "1.33", "AtCpk"]),
-        (f"other_limits={{{LOST}: 1.0}}", ["other_limits", "1.0", "Limits(...)"]),
-        (f"other_limits={{{LOST}: Limits(upper=float('inf'))}}", ["other_limits", "inf", "finite"]),
-        (f"other_limits={{{LOST}: Limits(lower=2.0, upper=1.0)}}", ["upper limit is 1.0", "above the lower one"]),
-        (
-            f"other_limits={{{LOST}: Limits(upper=1.0)}}, guarantees={{{LOST}: AtYield(target=0.999)}}",
+            {"others": f", {LOST}: ta.Limit(upper=1.0, show=ta.AtYield(target=0.999))"},
             ["effort.verification_units for lost motion", "128", "2995 or more"],
         ),
-        ("yield_target=0.999", ["effort.verification_units is 128", "2995 or more"]),
-        ("unit_price=UnitPrice(inspection=-1.0)", ["inspection is -1.0", "0 or above"]),
-        ("unit_price=5.0", ["unit_price is 5.0", "UnitPrice"]),
-        ("process_costs='rv20f'", ["rv20f", "rv20e"]),
+        (
+            {"first": "upper=50.0, show=ta.AtYield(target=0.999)"},
+            ["effort.verification_units for peak-to-peak", "128", "2995 or more"],
+        ),
+        ({"asked": "unit_price=ta.UnitPrice(inspection=-1.0)"}, ["inspection is -1.0", "0 or above"]),
+        ({"asked": "unit_price=5.0"}, ["unit_price is 5.0", "UnitPrice"]),
+        ({"drawing": ", costs='rv20f'"}, ["rv20f", "rv20e"]),
     ],
 )
-def test_bad_fields_are_refused_in_one_sentence(tmp_path, fields, words):
-    refused_here({"script": script_with(tmp_path, fields), "out": tmp_path / "report"}, *words)
+def test_bad_fields_are_refused_in_one_sentence(tmp_path, texts, words):
+    refused_here({"script": script_with(tmp_path, **texts), "out": tmp_path / "report"}, *words)
 
 
 @pytest.mark.parametrize(
     ("effort", "words"),
     [
-        ("allocation=AllocationEffort(graded_steps=0)", ["allocation.graded_steps is 0", "1 or more"]),
-        ("allocation=AllocationEffort(exact_points=1)", ["allocation.exact_points is 1", "2 or more"]),
-        ("allocation=AllocationEffort(exact_points=2.5)", ["allocation.exact_points is 2.5", "whole number"]),
-        ("allocation=AllocationEffort(share_blocks=100)", ["allocation.share_blocks is 100", "power of two"]),
-        ("allocation=AllocationEffort(yields=())", ["allocation.yields is ()", "between 0 and 1"]),
-        ("allocation=AllocationEffort(yields=(0.9, 1.0))", ["allocation.yields is (0.9, 1.0)"]),
-        ("shared_units=0", ["effort.shared_units is 0", "2 or more"]),
+        ("graded_steps=0", ["allocation.graded_steps is 0", "1 or more"]),
+        ("exact_points=1", ["allocation.exact_points is 1", "2 or more"]),
+        ("exact_points=2.5", ["allocation.exact_points is 2.5", "whole number"]),
+        ("share_blocks=100", ["allocation.share_blocks is 100", "power of two"]),
+        ("yields=()", ["allocation.yields is ()", "between 0 and 1"]),
+        ("yields=(0.9, 1.0)", ["allocation.yields is (0.9, 1.0)"]),
+        ("shared_units=0", ["effort.allocation.shared_units is 0", "2 or more"]),
         ("search=SearchEffort(steps=0)", ["search.steps is 0", "1 or more"]),
         ("search=SearchEffort(reach=1.0)", ["search.reach is 1.0", "above 1"]),
         ("search=SearchEffort(front=FrontEffort(designs=0))", ["search.front.designs is 0", "10 or more"]),
@@ -289,7 +321,11 @@ def test_bad_fields_are_refused_in_one_sentence(tmp_path, fields, words):
 )
 def test_an_effort_that_makes_no_sense_is_refused(tmp_path, effort, words):
     refused_here(
-        {"script": script_with(tmp_path, effort=f"effort=Effort({effort})"), "out": tmp_path / "report"}, *words
+        {
+            "script": script_with(tmp_path, effort=f"ta.Effort(allocation=AllocationEffort({effort}))"),
+            "out": tmp_path / "report",
+        },
+        *words,
     )
 
 
@@ -374,5 +410,5 @@ def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
 def test_the_shell_sees_one_sentence_and_exit_code_2(tmp_path):
     result = run(script_with(tmp_path), "--yield", 2, "--out", tmp_path / "report")
     assert result.returncode == 2
-    assert result.stderr == "Error: study drawn: yield_target is 2.0; allowed is 0.5 up to but not 1.\n"
+    assert result.stderr == "Error: requirement: yield is 2.0; allowed is 0.5 up to but not 1.\n"
     assert result.stdout == ""

@@ -9,46 +9,34 @@ from math import exp, sqrt
 import numpy as np
 import pytest
 from openpyxl import load_workbook
-from tolalloc.study.allocation import allocate_study
-from tolalloc.study.definition import Study
 from typer.testing import CliRunner
 
+import tolalloc as ta
+from tests.prepared import prepared
+from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer.cost_formulas import cost_formula
-from tolalloc.allocation.answer.drawing import drawing_table, drawn_sources, full_drawing_table, write_drawing
+from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.model import SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Points
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.capability.indices import Limits
+from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.study.effort import QUICK
 
-UM, RADIAL = 1e-6, "radial clearance at tip and root [µm]"
+UM = 1e-6
+SEARCH = QUICK_ALLOCATION.search
+FRONT = replace(SEARCH.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3)
 SMALL = replace(
-    QUICK,
-    search=replace(
-        QUICK.search,
-        steps=2,
-        front=replace(
-            QUICK.search.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3
-        ),
-    ),
-    allocation=replace(
-        QUICK.allocation, graded_steps=2, exact_points=4, flank_steps=1, radial_steps=2, changed_costs=1, share_blocks=8
-    ),
+    QUICK_ALLOCATION,
+    search=replace(SEARCH, steps=2, front=FRONT),
+    graded_steps=2,
+    exact_points=4,
+    setting_steps=(1, 2),
+    changed_costs=1,
+    share_blocks=8,
 )
-
-
-class Silence:
-    """Progress that nobody watches."""
-
-    def begin(self, stage):
-        pass
-
-    def advance(self, units):
-        pass
 
 
 class Workbook:
@@ -128,9 +116,14 @@ def test_many_points_need_no_nested_conditions():
     assert "IF" not in formula
 
 
+def allocated(**changes):
+    """Return the answer of the baseline's study with fields changed, at a small effort."""
+    return prepared(effort=ta.Effort(allocation=SMALL, is_quick=True), **changes).study.allocate()
+
+
 @pytest.fixture(scope="module")
 def graded():
-    return allocate_study(Study(name="graded", grades=True, effort=SMALL), Silence())
+    return allocated(name="graded", questions=(ta.Allocation(grades=True),))
 
 
 @pytest.fixture(scope="module")
@@ -140,22 +133,19 @@ def priced(tmp_path_factory):
     sources = [replace(own, locked=own.group not in free) for own in load_tolerance_table("rv20e_baseline")]
     table = tmp_path_factory.mktemp("table") / "locked.csv"
     table_frame(sources).to_csv(table, index=False)
-    study = Study(
+    results = allocated(
         name="priced",
-        tolerances=table,
-        limit_arcsec=70.0,
-        process_costs="rv20e",
-        other_limits={RADIAL: Limits(lower=-20.0)},
-        effort=SMALL,
+        drawing={"table": table, "costs": "rv20e"},
+        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=70.0), RADIAL: ta.Limit(lower=-20.0)},
+        questions=(ta.Allocation(),),
     )
-    results = allocate_study(study, Silence())
-    chosen = results.joint.chosen
+    chosen = results.free.chosen
     first, (side,) = chosen.checks[0], chosen.checks[1].sides
     root_sum_square = side.stack.root_sum_square
     more = float(root_sum_square @ chosen.design[:-2])
     stack = replace(side.stack, worst_case=root_sum_square, budget=side.stack.budget + more)
     checks = (first, replace(chosen.checks[1], sides=(replace(side, stack=stack),)))
-    return replace(results, joint=replace(results.joint, chosen=replace(chosen, checks=checks)))
+    return replace(results, free=replace(results.free, chosen=replace(chosen, checks=checks)))
 
 
 @pytest.fixture(scope="module", params=["graded", "priced"])
@@ -239,7 +229,7 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
         zip((own.name for own in results.drawn.errors.active), results.drawn.zones(results.chosen.design), strict=True)
     )
     assert [own.name for own in read] == [own.name for own in results.space.errors.sources]
-    for own, before, after in zip(read, results.space.errors.sources, drawn_sources(results), strict=True):
+    for own, before, after in zip(read, results.space.errors.sources, results.drawn_sources, strict=True):
         # The file has five decimals of a micrometre.
         assert own.zone == pytest.approx(meant.get(own.name, 0.0), abs=0.51e-5 * UM)
         assert own.locked == before.locked
@@ -249,7 +239,7 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
     paid_once = sum(made.change for made in results.drawn.made_by(results.chosen.design).values())
     assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost - paid_once, rel=1e-9)
     if results.graded:
-        np.testing.assert_allclose([own.zone for own in read], [own.zone for own in drawn_sources(results)], rtol=1e-12)
+        np.testing.assert_allclose([own.zone for own in read], [own.zone for own in results.drawn_sources], rtol=1e-12)
         assert {own.grade for own in read if own.zone} == set(results.graded.labels)
 
 
@@ -261,7 +251,7 @@ def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
     made = priced.drawn.made_by(priced.chosen.design)
     assert set(again) == set(made)
     assert any(process.change > 0 for process in made.values())  # else nothing would be paid once
-    for before, drawn, after in zip(priced.space.errors.sources, drawn_sources(priced), read, strict=True):
+    for before, drawn, after in zip(priced.space.errors.sources, priced.drawn_sources, read, strict=True):
         if before.name not in made:
             assert (after.process, after.cost) == (before.process, before.cost)
             continue
@@ -305,8 +295,9 @@ def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
     _, folder = drawn
     script = folder / "again.py"
     script.write_text(
-        "from tolalloc.study.definition import Study\n"
-        f'study = Study(name="again", tolerances={str(folder / "allocation.csv")!r})\n'
+        "import tolalloc as ta\n"
+        f'study = ta.Study(ta.reducer("rv20e"), ta.drawing({str(folder / "allocation.csv")!r}), name="again",\n'
+        "    limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)})\n"
     )
     answered = CliRunner().invoke(app, ["check", str(script)])
     assert answered.exit_code == 0, answered.output
@@ -315,9 +306,9 @@ def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
 @pytest.mark.slow
 def test_the_tables_of_the_drawing_add_up(drawn):
     results, _ = drawn
-    short, full = drawing_table(results), full_drawing_table(results)
+    short, full = results.drawing_table, full_drawing_table(results)
     assert short["cost [cost units]"].sum() == pytest.approx(results.chosen.cost)
-    assert short["cost before [cost units]"].sum() == pytest.approx(results.joint.baseline.cost)
+    assert short["cost before [cost units]"].sum() == pytest.approx(results.free.baseline.cost)
     assert short["share of variance [%]"].sum() == pytest.approx(100)
     assert len(full) == len(results.space.errors.sources)
     if not results.graded:

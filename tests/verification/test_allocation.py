@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from scipy.stats import kurtosis, norm
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared as baseline
+from tolalloc import LOST_MOTION, PEAK_TO_PEAK
+from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.design_space import ClearanceRange
 from tolalloc.allocation.fronts import exact_front
 from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
 from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
@@ -25,22 +26,20 @@ from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK
 
-LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
 UNITS = 1152
 
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="test"))
+    return baseline()
 
 
 def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int = 4) -> Verifier:
     first = replace(prepared.requirements[0], limits=Limits(upper=limit))
     return Verifier(
         space=prepared.space,
-        kernel=prepared.kernel,
+        model=prepared.model,
         requirements=(first, *others),
         seeds=SeedTree(seed),
         units=UNITS,
@@ -54,6 +53,7 @@ class KnownTrial:
     failed: int = 0
     output: str = "x [mm]"
     design: np.ndarray = field(default_factory=lambda: np.array([1.0, 2.0, 3.0, 4.0]))
+    groups: int = 2
 
     def derived(self):
         return self.values, np.outer(self.values, [1.0, 0.0, 0.0, 0.0]) / self.design[0]
@@ -63,19 +63,19 @@ class KnownTrial:
 
 
 def test_clearances_and_amounts_map_one_to_one(prepared):
-    space, modification = prepared.space, prepared.reducer.modification
-    again = space.modification(space.uniform(1.0, modification))
+    space, modification = prepared.space, prepared.model.reducer.modification
+    again = prepared.model.modification(space.settings_of(space.uniform(1.0)))
     assert again.equidistant == pytest.approx(modification.equidistant, abs=1e-15)
     assert again.shift == pytest.approx(modification.shift, abs=1e-15)
     assert modification.radial_clearance == pytest.approx(8e-6)
-    assert modification.flank_clearance(prepared.reducer.cycloid_stage) == pytest.approx(1.04e-6, abs=5e-9)
+    assert modification.flank_clearance(prepared.model.reducer.cycloid_stage) == pytest.approx(1.04e-6, abs=5e-9)
 
 
 @pytest.mark.parametrize("build", [root_sum_square_stack, worst_case_stack])
 def test_local_model_has_the_given_value_and_gradient(generator, build):
     design = np.append(generator.uniform(0.3, 2, 6), [1.0, 8.0])
     gradient = np.append(generator.uniform(0.5, 20, 6), [4.0, -1.0])
-    stack = build("x", design, 2.5, gradient)
+    stack = build("x", design, 2.5, gradient, groups=6)
 
     def excess(at):
         return stack.load(at[..., :-2], at[..., -2:]) - stack.budget
@@ -87,7 +87,7 @@ def test_local_model_has_the_given_value_and_gradient(generator, build):
 
 
 def test_a_group_whose_larger_zone_relieves_a_limit_has_no_weight():
-    stack = root_sum_square_stack("x", np.array([1.0, 1.0, 2.0, 8.0]), 0.0, np.array([3.0, -2.0, 1.0, 1.0]))
+    stack = root_sum_square_stack("x", np.array([1.0, 1.0, 2.0, 8.0]), 0.0, np.array([3.0, -2.0, 1.0, 1.0]), groups=2)
     assert stack.root_sum_square[0] > 0
     assert stack.root_sum_square[1] == 0
 
@@ -170,7 +170,7 @@ def test_a_worst_case_adds_and_a_lower_limit_turns_it():
 
 def test_cost_is_reciprocal_where_the_table_alone_prices(prepared):
     space, scale = prepared.space, 0.7
-    design = space.uniform(scale, prepared.reducer.modification)
+    design = space.uniform(scale)
     assert space.cost(design) == pytest.approx(sum(source.cost for source in space.errors.active) / scale)
 
 
@@ -190,7 +190,7 @@ def test_a_group_is_made_by_the_cheapest_process_that_all_its_members_have(prepa
     space, members = with_alternatives(prepared, "disc bores", 0.1)
     at, cost = space.groups.index("disc bores"), sum(member.cost for member in members)
     assert [made.name for made in space.features[at].processes] == ["turned", "ground"]
-    designs = np.tile(space.uniform(1.0, prepared.reducer.modification), (4, 1))
+    designs = np.tile(space.uniform(1.0), (4, 1))
     designs[:, at] = [0.2, 0.5 - 1e-12, 0.9, 1.9]  # the second is turned but for rounding, and that is cheaper
     ground = len(members) * (1 + 0.1 / designs[:, at])
     own = np.array([ground[0], min(ground[1], cost / 0.5), min(ground[2], cost / 0.9), cost / 1.9])
@@ -219,7 +219,7 @@ def test_gradient_of_the_quantile_agrees_with_common_random_numbers(prepared):
     """
     space, verifier = prepared.space, verifier_of(prepared)
     verifier = replace(verifier, requirements=(replace(verifier.requirements[0], guarantee=AtYield(target=0.95)),))
-    design = space.uniform(0.6, prepared.reducer.modification)
+    design = space.uniform(0.6)
     here = verifier.verify(design, "gradient")
     stack = here.sides[0].stack
     gradient = np.append(stack.root_sum_square**2 * design[:-2], stack.slopes)
@@ -246,7 +246,7 @@ def three(prepared):
         Requirement(output=LOST_MOTION, limits=Limits(upper=0.45), guarantee=AtYield(target=0.99)),
         Requirement(output=RADIAL, limits=Limits(lower=2.0, upper=30.0), guarantee=AtCpk(target=1.0)),
     )
-    return verifier, verifier.verify(prepared.space.uniform(0.5, prepared.reducer.modification), "three")
+    return verifier, verifier.verify(prepared.space.uniform(0.5), "three")
 
 
 @pytest.mark.slow
@@ -302,8 +302,8 @@ def test_processes_change_only_where_that_clearly_pays(three, prepared):
 @pytest.mark.slow
 def test_locked_clearances_stay(three, prepared):
     _, found = three
-    flank, radial = (found.design[-2:] * 1e-6).tolist()
-    locked = replace(prepared.space, clearances=ClearanceRange(flank=(flank, flank), radial=(radial, radial)))
+    settings = zip(prepared.space.settings, found.settings, strict=True)
+    locked = replace(prepared.space, settings=tuple(replace(own, lower=at, upper=at) for own, at in settings))
     stacks = aimed(found, [found])
     step = Programs(locked, 4).step(stacks, locked.process_positions(found.design), found.design, 2.5)
     np.testing.assert_allclose(step[-2:], found.design[-2:], rtol=1e-12)
@@ -313,7 +313,7 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
     requirement = Requirement(output=RADIAL, limits=Limits(lower=-20.0), guarantee=WorstCase())
     verifier = verifier_of(prepared, requirement)
     verifier = replace(verifier, requirements=(replace(verifier.requirements[0], guarantee=WorstCase()), requirement))
-    found = verifier.verify(prepared.space.uniform(0.5, prepared.reducer.modification), "worst")
+    found = verifier.verify(prepared.space.uniform(0.5), "worst")
     assert found.sides[0].value > found.outputs[PEAK_TO_PEAK].max()
     assert found.sides[1].value < found.outputs[RADIAL].min()
     for side in found.sides:
@@ -324,7 +324,7 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
 
 def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
     verifier = verifier_of(prepared, limit=8.0)
-    by_hand = scale_by_hand(verifier, prepared.reducer.modification, 2)
+    by_hand = scale_by_hand(verifier, 2)
     found = allocate(verifier, by_hand, SearchEffort(steps=2))
     assert not found.chosen.met
     assert found.chosen.blocking.requirement.output == PEAK_TO_PEAK
@@ -335,7 +335,7 @@ def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
 
 def test_the_bound_and_the_price_are_those_of_the_chosen_models(prepared):
     verifier = verifier_of(prepared)
-    found = allocate(verifier, scale_by_hand(verifier, prepared.reducer.modification, 2), SearchEffort(steps=2))
+    found = allocate(verifier, scale_by_hand(verifier, 2), SearchEffort(steps=2))
     assert found.chosen.met
     assert -1e-9 < found.gap < 0.2
     name, price = next(iter(found.prices.items()))

@@ -6,20 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
 import tolalloc.allocation.robustness as module
+from tests.prepared import prepared as baseline
+from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import SumOfCosts, Weighted
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.robustness import COST_CHANGE, Robustness, Variant, robustness
 from tolalloc.allocation.search import SearchEffort, allocate
-from tolalloc.allocation.trade import ModificationTrade, modification_trade
+from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.rv.model import FLANK, RADIAL
+from tolalloc.rv.reducer.files import load_identified_stiffness
 
 UNITS = 1152
 
@@ -27,7 +30,7 @@ UNITS = 1152
 def verifier_of(prepared, limit: float = 60.0) -> Verifier:
     return Verifier(
         space=prepared.space,
-        kernel=prepared.kernel,
+        model=prepared.model,
         requirements=(replace(prepared.requirements[0], limits=Limits(upper=limit)),),
         seeds=SeedTree(4),
         units=UNITS,
@@ -43,7 +46,7 @@ def allocated(verifier, steps=6):
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="test"))
+    return baseline()
 
 
 @pytest.fixture(scope="module")
@@ -64,57 +67,57 @@ def response(prepared, allocation):
     uniform = next(SeedTree(3).uniform_chunks(64, len(errors.columns)))
     return QuantileResponse(
         space=prepared.space,
-        kernel=prepared.kernel,
+        model=prepared.model,
+        output=PEAK_TO_PEAK,
         standard=errors.standard_values(uniform),
         spread=allocation.chosen.spread,
     )
 
 
 def trade_of(cost, flank=(1.0, 2.0, 4.0), radial=(5.0, 7.0, 12.0, 20.0)):
-    return ModificationTrade(
-        flank=np.array(flank, dtype=float), radial=np.array(radial, dtype=float), cost=np.array(cost), error=0.0
-    )
+    values = (np.array(flank, dtype=float), np.array(radial, dtype=float))
+    return SettingTrade(names=(FLANK, RADIAL), values=values, cost=np.array(cost), error=0.0)
 
 
 def test_prices_of_a_micrometre_are_the_slopes_of_the_cost():
     flank, radial = np.array([1.0, 2.0, 4.0]), np.array([5.0, 7.0, 12.0, 20.0])
     cost = np.add.outer(30 + 2 * flank + flank**2, 0.5 * radial**2 - radial)
     trade = trade_of(cost)
-    np.testing.assert_allclose(trade.price_of_flank[1], 2 + 2 * flank[1])  # inside: exact for a parabola
-    np.testing.assert_allclose(trade.price_of_radial[:, 1:-1], np.tile(radial[1:-1] - 1, (3, 1)))
-    np.testing.assert_allclose(trade.price_of_flank[0], np.diff(cost[:2], axis=0)[0] / (flank[1] - flank[0]))
-    assert trade.cheapest == (1.0, 5.0)
+    np.testing.assert_allclose(trade.price(0)[1], 2 + 2 * flank[1])  # inside: exact for a parabola
+    np.testing.assert_allclose(trade.price(1)[:, 1:-1], np.tile(radial[1:-1] - 1, (3, 1)))
+    np.testing.assert_allclose(trade.price(0)[0], np.diff(cost[:2], axis=0)[0] / (flank[1] - flank[0]))
+    assert trade.cheapest.tolist() == [1.0, 5.0]
 
 
 def test_a_pair_without_a_cost_has_no_price_and_is_not_the_cheapest():
     trade = trade_of([[np.nan, 40.0], [30.0, 31.0]], (1, 2), (5, 6))
-    assert trade.cheapest == (2.0, 5.0)
-    assert np.isnan(trade.price_of_flank[0, 0])
-    assert np.isnan(trade_of([[40.0]], (1,), (5,)).price_of_flank).all()
+    assert trade.cheapest.tolist() == [2.0, 5.0]
+    assert np.isnan(trade.price(0)[0, 0])
+    assert np.isnan(trade_of([[40.0]], (1,), (5,)).price(0)).all()
     assert np.isnan(trade_of([[np.nan]], (1,), (5,)).cheapest).all()
 
 
 def test_at_the_clearances_of_the_optimum_the_trade_finds_its_cost(allocation, response):
     """What the model misses so near the chosen design is worth a percent or two."""
     at = allocation.inside.shared
-    trade = modification_trade(response, allocation, at[:1], at[1:])
+    trade = setting_trade(response, allocation, (at[:1], at[1:]))
     assert trade.cost[0, 0] == pytest.approx(allocation.inside.cost + allocation.locked_cost, rel=0.02)
     assert trade.error < 0.05
 
 
 def test_far_from_the_chosen_clearances_the_kernel_has_the_last_word(prepared, allocation, response):
-    trade = modification_trade(response, allocation, np.array([1.0, 5.0]), np.array([5.0, 20.0]))
+    trade = setting_trade(response, allocation, (np.array([1.0, 5.0]), np.array([5.0, 20.0])))
     assert trade.cost[0, 0] == trade.cost.min()
     assert trade.cost[1, 1] == trade.cost.max()  # the first model alone says that nothing keeps the limit there
     assert trade.error < 0.5
-    again = modification_trade(response, allocation, np.array([5.0]), np.array([20.0]))
+    again = setting_trade(response, allocation, (np.array([5.0]), np.array([20.0])))
     assert again.cost[0, 0] == pytest.approx(trade.cost[1, 1], rel=1e-5)
 
 
 def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_limit(prepared, allocation, response):
     """Uniform scaling at the same clearances keeps the same quantile of the same units, so it cannot be cheaper."""
     clearances = np.array([1.0, 12.0])
-    trade = modification_trade(response, allocation, clearances[:1], clearances[1:])
+    trade = setting_trade(response, allocation, (clearances[:1], clearances[1:]))
     chosen, stack = allocation.chosen.design, allocation.stacks[0]
     left = stack.budget - float(stack.load(chosen[:-2], chosen[-2:]))
     limit = float(response(chosen[np.newaxis]).values[0, 0]) + left
@@ -129,7 +132,7 @@ def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_li
 
 
 def test_where_no_zones_keep_the_limit_the_trade_has_no_cost(unreachable, response):
-    trade = modification_trade(response, unreachable, np.array([1.0, 5.0]), np.array([5.0]))
+    trade = setting_trade(response, unreachable, (np.array([1.0, 5.0]), np.array([5.0])))
     assert np.isnan(trade.cost).all()
     assert np.isnan(trade.error)
 
@@ -139,7 +142,7 @@ def test_a_failed_unit_gives_no_cost(monkeypatch, allocation, response):
     monkeypatch.setattr(
         QuantileResponse, "__call__", lambda self, x: replace(answer(self, x), status=np.ones(len(x), np.uint8))
     )
-    trade = modification_trade(response, allocation, np.array([1.0]), np.array([5.0]))
+    trade = setting_trade(response, allocation, (np.array([1.0]), np.array([5.0])))
     assert np.isnan(trade.cost).all()
 
 
@@ -175,7 +178,7 @@ def test_costs_all_changed_alike_change_nothing(prepared, allocation):
 def test_under_changed_costs_no_drawing_is_cheaper_than_the_one_made_for_them(prepared, allocation):
     found = robustness(verifier_of(prepared), allocation, (), SeedTree(1), 12)
     assert len(found.costs) == 12
-    assert not found.stiffness
+    assert not found.uncertain
     assert found.second_best is None
     regrets = np.array([variant.regret for variant in found.costs])
     assert regrets.min() > -1e-7
@@ -198,25 +201,32 @@ def test_costs_are_changed_to_corners_and_what_is_lost_counts_locked_zones(monke
         assert now.regret * now.cost == pytest.approx(before.regret * before.cost, abs=1e-9)
 
 
+def uncertain_of(prepared) -> Verifier:
+    """Return who judges a model of whose stiffness something is not known, with the same kernel."""
+    model = replace(prepared.model, identified=load_identified_stiffness("rv20e_table6"))
+    return replace(verifier_of(prepared), model=model)
+
+
 def test_an_unchanged_kernel_changes_neither_what_is_kept_nor_the_cost(prepared, allocation):
     """The models come from other units than those of the optimum; their weights are uncertain by a few percent."""
-    few = replace(verifier_of(prepared), units=1110)  # so few show the yield only if not one is rejected
-    found = robustness(few, allocation, (prepared.kernel,), SeedTree(1), 1)
-    assert found.stiffness[0].kept
-    assert found.stiffness[0].regret == pytest.approx(0.0, abs=0.03)
+    few = replace(uncertain_of(prepared), units=1110)  # so few show the yield only if not one is rejected
+    found = robustness(few, allocation, (prepared.model,), SeedTree(1), 1)
+    assert found.uncertain[0].kept
+    assert found.uncertain[0].regret == pytest.approx(0.0, abs=0.03)
 
 
 def test_a_reducer_that_breaks_the_limit_is_counted(prepared, allocation):
-    kernel = prepared.kernel
-    worse = replace(kernel, fixed={**kernel.fixed, "planet1.eccentricity.x": 80e-6})
-    found = robustness(verifier_of(prepared), allocation, (kernel, worse), SeedTree(1), 1).stiffness
+    model = prepared.model
+    kernel = replace(model.kernel, fixed={**model.kernel.fixed, "planet1.eccentricity.x": 80e-6})
+    worse = replace(model, kernel=kernel)
+    found = robustness(uncertain_of(prepared), allocation, (model, worse), SeedTree(1), 1).uncertain
     assert [variant.kept for variant in found] == [True, False]
     assert np.isnan(found[1].regret)
     assert found[1].cost > found[0].cost
 
 
 def test_the_second_best_processes_are_other_ones_and_cost_more():
-    prepared = prepare(Study(name="test", process_costs="rv20e"))
+    prepared = baseline(drawing={"costs": "rv20e"})
     free, errors = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}, prepared.space.errors
     sources = tuple(replace(source, locked=source.group not in free) for source in errors.sources)
     space = replace(prepared.space, errors=replace(errors, sources=sources))
@@ -242,13 +252,13 @@ def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth():
         groups=("a", "b", "c"),
         optimum=np.array([1.0, 1.0, 2.0]),
         costs=(variant([1.05, 0.92, 2.0]), variant([0.95, 1.0, 2.19])),
-        stiffness=(variant([1.0, 1.0, 2.21]),),
+        uncertain=(variant([1.0, 1.0, 2.21]),),
         second_best=None,
     )
     assert known.same.tolist() == [True, True, False]
-    assert replace(known, stiffness=()).same.tolist() == [True, True, True]
+    assert replace(known, uncertain=()).same.tolist() == [True, True, True]
     assert replace(known, second_best=variant([0.9, 1.0, 2.0])).same.tolist() == [False, True, False]
-    nothing = replace(known, costs=(), stiffness=())
+    nothing = replace(known, costs=(), uncertain=())
     assert nothing.same.tolist() == [False, False, False]
     assert nothing.ratios.shape == (0, 3)
 

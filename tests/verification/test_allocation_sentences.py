@@ -6,55 +6,34 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.allocation.answer.cautions import warnings
-from tolalloc.allocation.answer.document import allocation_document
-from tolalloc.allocation.answer.paragraphs import cheapest_clearances, quantiles
-from tolalloc.study.allocation import allocate_study
-from tolalloc.study.definition import Study
 
+import tolalloc as ta
+from tolalloc import LOST_MOTION
+from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
-from tolalloc.allocation.answer.sentences import answer, least_saving
-from tolalloc.allocation.cost.unit_price import UnitPrice, YieldLadder
-from tolalloc.allocation.guarantee import AtCpk
+from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.allocation.search import Allocation
-from tolalloc.allocation.trade import ModificationTrade
-from tolalloc.capability.indices import Limits
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.study.effort import QUICK
+from tolalloc.report.document import Section
+from tolalloc.rv.reducer.files import load_identified_stiffness
 
+TARGET = 0.95
 KEPT = {"housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter"}
-LOST, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
+SEARCH = QUICK_ALLOCATION.search
+FRONT = replace(SEARCH.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3)
 SMALL = replace(
-    QUICK,
+    QUICK_ALLOCATION,
     verification_units=512,
     shared_units=16,
-    search=replace(
-        QUICK.search,
-        front=replace(
-            QUICK.search.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3
-        ),
-    ),
-    allocation=replace(
-        QUICK.allocation,
-        graded_steps=4,
-        exact_points=4,
-        flank_steps=1,
-        radial_steps=2,
-        changed_costs=3,
-        share_blocks=8,
-        yields=(0.8, 0.95, 0.9999),
-    ),
+    search=replace(SEARCH, front=FRONT),
+    graded_steps=4,
+    exact_points=4,
+    setting_steps=(1, 2),
+    changed_costs=3,
+    share_blocks=8,
+    yields=(0.8, 0.95, 0.9999),
 )
-
-
-class Silence:
-    """Progress that nobody watches."""
-
-    def begin(self, stage):
-        pass
-
-    def advance(self, units):
-        pass
 
 
 @pytest.fixture(scope="module")
@@ -62,28 +41,35 @@ def results(tmp_path_factory):
     table = tmp_path_factory.mktemp("said") / "few.csv"
     sources = [source for source in load_tolerance_table("rv20e_baseline") if source.name in KEPT]
     table_frame(sources).to_csv(table, index=False)
-    study = Study(
+    shown = ta.AtYield(target=TARGET)
+    study = ta.Study(
+        ta.reducer("rv20e", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), neglected=("*",)),
+        ta.drawing(table),
+        limits={
+            ta.PEAK_TO_PEAK: ta.Limit(upper=50.0, show=shown),
+            LOST_MOTION: ta.Limit(upper=0.5, show=ta.AtCpk(target=1.33)),
+            RADIAL: ta.Limit(lower=-8.0, show=shown),
+        },
+        questions=(ta.Allocation(grades=True, unit_price=ta.UnitPrice(scrap=5.0)),),
         name="said",
-        tolerances=str(table),
-        neglected=("*",),
-        limit_arcsec=50.0,
-        yield_target=0.95,
-        other_limits={LOST: Limits(upper=0.5), RADIAL: Limits(lower=-8.0)},
-        guarantees={LOST: AtCpk(target=1.33)},
-        grades=True,
-        unit_price=UnitPrice(scrap=5.0),
-        effort=SMALL,
+        effort=ta.Effort(allocation=SMALL, is_quick=True),
     )
-    found = allocate_study(study, Silence())
+    found = study.allocate()
     assert found.chosen.met
-    assert found.alone.chosen.met
+    assert found.fixed.chosen.met
     return found
 
 
 def said(results, start: str) -> str:
     """Return the one sentence of the answer with a beginning."""
-    (sentence,) = [own for own in answer(results) if own.startswith(start)]
+    (sentence,) = [own for own in results.sentences if own.startswith(start)]
     return sentence
+
+
+def section(results, start: str) -> Section:
+    """Return the one section of the report whose heading has a beginning."""
+    (found,) = [own for own in results.sections if own.heading.startswith(start)]
+    return found
 
 
 def costing(allocation: Allocation, cost: float) -> Allocation:
@@ -98,13 +84,13 @@ def missing(allocation: Allocation, beyond: float = 3.0) -> Allocation:
 
 
 def test_the_certificate_says_what_the_dual_bound_says(results):
-    joint = results.joint
+    joint = results.free
     sentence = said(results, "Certified: by the local models")
     assert f"that keep the limits cost less than {joint.bound:.2f}; it costs {joint.gap:.1%} more" in sentence
     points = 100 * (joint.inside.cost - joint.optimum.cost) / joint.bound
     assert points > 0.1
     assert f"{points:.1f} points of that for the margin of one standard error" in sentence
-    at_once = replace(results, joint=replace(joint, inside=joint.optimum))
+    at_once = replace(results, free=replace(joint, inside=joint.optimum))
     assert "margin" not in said(at_once, "Certified")
     graded = said(results, "On grades")
     assert f"that keeps the limits costs less than {results.graded.bound:.2f}." in graded
@@ -112,16 +98,16 @@ def test_the_certificate_says_what_the_dual_bound_says(results):
 
 def test_nothing_is_certified_of_a_miss(results):
     graded = missing(results.graded)
-    lost = replace(results, joint=missing(results.joint), graded=graded)
-    sentences = answer(lost)
-    assert allocation_document(lost).summary["certified bound [cost units]"] is None
+    lost = replace(results, free=missing(results.free), graded=graded)
+    sentences = lost.sentences
+    assert lost.summary["certified bound [cost units]"] is None
     assert not [own for own in sentences if "Certified" in own or "costs less than" in own or "at the rate of" in own]
     assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
 
 
 def test_the_certificate_table_has_both_rooms(results):
     table = optimality_tables.certificate_table(results).set_index("search")
-    row, joint = table.loc["tolerances and modification"], results.joint
+    row, joint = table.loc["tolerances and modification"], results.free
     assert row["certified bound, at the limits [cost units]"] == joint.bound
     assert row["certified bound, inside [cost units]"] == joint.inside.bound + joint.locked_cost
     assert row["certified bound, inside [cost units]"] > row["certified bound, at the limits [cost units]"]
@@ -131,43 +117,41 @@ def test_the_certificate_table_has_both_rooms(results):
 
 
 def test_the_modification_saves_only_what_the_searches_can_tell(results):
-    joint = costing(results.joint, 10.0 * results.joint.bound)
+    joint = costing(results.free, 10.0 * results.free.bound)
     cost = joint.chosen.cost
-    plain = replace(
-        results, joint=costing(results.joint, results.joint.bound), alone=costing(results.alone, 1e3 * cost)
-    )
-    tight = replace(plain, alone=replace(plain.alone, optimum=replace(plain.alone.optimum, bound=1e3 * cost)))
+    plain = replace(results, free=costing(results.free, results.free.bound), fixed=costing(results.fixed, 1e3 * cost))
+    tight = replace(plain, fixed=replace(plain.fixed, optimum=replace(plain.fixed.optimum, bound=1e3 * cost)))
     assert "certified" not in said(tight, "The modification saves")
-    small = replace(results, joint=joint, alone=costing(results.alone, 1.1 * cost))
+    small = replace(results, free=joint, fixed=costing(results.fixed, 1.1 * cost))
     sentence = said(small, f"The modification saves {0.1 * cost:.2f} cost units (9.1%)")
-    assert f"ended {small.alone.gap:.1%} above its own certified bound, so up to that much of it may" in sentence
+    assert f"ended {small.fixed.gap:.1%} above its own certified bound, so up to that much of it may" in sentence
     for factor in (1.0, 0.9):
-        same = replace(results, joint=joint, alone=costing(results.alone, factor * cost))
-        assert "Nothing cheaper was found with the modification free" in " ".join(answer(same))
-        assert "modification saves" not in " ".join(answer(same))
+        same = replace(results, free=joint, fixed=costing(results.fixed, factor * cost))
+        assert "Nothing cheaper was found with the modification free" in " ".join(same.sentences)
+        assert "modification saves" not in " ".join(same.sentences)
 
 
 def test_a_search_that_missed_says_what(results):
-    alone = said(replace(results, alone=missing(results.alone)), "Tolerances alone were not verified")
+    alone = said(replace(results, fixed=missing(results.fixed)), "Tolerances alone were not verified")
     assert "limit 50 arcsec: it keeps 53 arcsec (shown for 95.00% of units), 3 arcsec beyond; the" in alone
-    joint = replace(results, joint=missing(results.joint, 7.0))
+    joint = replace(results, free=missing(results.free, 7.0))
     assert "57 arcsec" in said(joint, "With tolerances and modification free no design was verified")
-    assert "modification saves" not in " ".join(answer(joint))
-    both = replace(joint, alone=missing(results.alone))
+    assert "modification saves" not in " ".join(joint.sentences)
+    both = replace(joint, fixed=missing(results.fixed))
     assert "53 arcsec" in said(both, "Nor with tolerances alone")
-    unknown = replace(results, alone=missing(results.alone, np.inf))
+    unknown = replace(results, fixed=missing(results.fixed, np.inf))
     assert "too many units have no answer" in said(unknown, "Tolerances alone")
 
 
 def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
-    joint, chosen = results.joint, results.chosen
+    joint, chosen = results.free, results.chosen
     hand = joint.by_hand
     least = hand.cost * min(1.0, hand.quantile_bound / joint.limit)
-    assert least_saving(results) == pytest.approx(1 - chosen.cost / least)
+    assert results.least_saving == pytest.approx(1 - chosen.cost / least)
     sentence = said(results, "Cost ")
     assert f"with the modification as it is ({hand.cost:.2f})" in sentence
     assert f"used the limit to its last arcsecond ({least:.2f})" in sentence
-    assert allocation_document(results).summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
+    assert results.summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
 
 
 def ladder(prices) -> YieldLadder:
@@ -193,9 +177,9 @@ def test_the_cheapest_good_unit_at_the_end_of_the_ladder_is_no_optimum(results, 
 def test_where_no_yield_has_a_price_one_sentence_says_so(results):
     nothing = replace(results, prices=ladder([np.nan] * 3))
     assert said(nothing, "No good unit has a price: no yield")
-    assert what_if_tables.prices_table(nothing).empty
-    assert "nan" not in " ".join(answer(nothing))
-    assert not [own for own in answer(replace(results, prices=None)) if "good unit" in own]
+    assert not [own for own in nothing.sections if own.heading == "What a good unit costs"]
+    assert "nan" not in " ".join(nothing.sentences)
+    assert not [own for own in replace(results, prices=None).sentences if "good unit" in own]
 
 
 def test_a_yield_that_the_units_cannot_show_has_no_price(results):
@@ -206,12 +190,12 @@ def test_a_yield_that_the_units_cannot_show_has_no_price(results):
 def test_costs_are_changed_to_corners(results):
     assert "In 3 random corners of ±20 % on every cost the free zones are at most" in said(results, "In 3 random")
     assert len(results.robustness.costs) == 3
-    assert "free zones cost more by [%]" in what_if_tables.variants_table(results).columns
+    assert "free zones cost more by [%]" in what_if_tables.variants_table(results.robustness).columns
 
 
 def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
-    table = tables.requirements_table(results)
-    sample, target, at = results.chosen.sample, results.target, "quantile of the units [unit of the output]"
+    table = results.requirements_table
+    sample, target, at = results.chosen.sample, TARGET, "quantile of the units [unit of the output]"
     value = table[at][0]
     kept = np.count_nonzero(sample.values <= value) / sample.evaluation.status.size
     before = np.count_nonzero(sample.values < value) / sample.evaluation.status.size
@@ -220,68 +204,68 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
     radial = results.chosen.outputs[RADIAL]
     assert np.count_nonzero(radial >= table[at][2]) / radial.size >= target > np.mean(radial > table[at][2])
     assert np.isnan(table[at][1])  # a Cpk
-    first = quantiles(results)[0]
+    first = section(results, "Requirements").paragraphs[0]
     assert (
         f"95.00% of these units keep at most {value:.4g} arcsec; {results.chosen.quantile_bound:.4g} arcsec is" in first
     )
 
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
-    side = results.joint.chosen.sides[0]
+    side = results.free.chosen.sides[0]
     assert tables.limit_price(side, 0.9) == (0.9, "arcsec")
     assert tables.limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
-    price = results.joint.prices[side.stack.name]
+    price = results.free.prices[side.stack.name]
     sentence = said(results, "peak-to-peak transmission error: at its limit of 50 arcsec")
     assert f"at the rate of {price:.3g} cost units per arcsec" in sentence
 
 
 def test_prices_below_the_noise_of_the_solver_are_nothing(results):
-    optimum = results.joint.optimum
+    optimum = results.free.optimum
     noise = tables.solver_noise(optimum)
     assert noise >= max(optimum.gap, 0.0) * optimum.cost
     quiet = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 0.1 * noise / optimum.zones.max()))
-    found = optimality_tables.bounds_table(replace(results, joint=replace(results.joint, optimum=quiet)))
+    found = optimality_tables.bounds_table(replace(results, free=replace(results.free, optimum=quiet)))
     for end in ("smallest", "largest"):
         assert (found[f"marginal price of the {end} [cost units/µm]"] == 0.0).all()
     loud = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 10 * noise / optimum.zones.min()))
-    found = optimality_tables.bounds_table(replace(results, joint=replace(results.joint, optimum=loud)))
+    found = optimality_tables.bounds_table(replace(results, free=replace(results.free, optimum=loud)))
     assert (found["marginal price of the smallest [cost units/µm]"] > 0.0).all()
 
 
 def test_failed_units_are_counted_by_a_yield_alone(results):
+    statuses = {"equilibrium found": 9, "no equilibrium": 2}
     (sentence,) = [
         own
-        for own in warnings(replace(results, statuses={"equilibrium found": 9, "no equilibrium": 2}))
-        if "no equilibrium" in own
+        for own in replace(results, header=replace(results.header, statuses=statuses)).warnings
+        if "no answer" in own
     ]
-    assert sentence == "2 units have no equilibrium; a yield counts them as outside the limits, a Cpk leaves them out."
+    assert sentence == "2 units have no answer; a yield counts them as outside the limits, a Cpk leaves them out."
 
 
 def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
     kept = results.robustness.costs[0]
-    stiffness = (kept, replace(kept, kept=False, regret=np.nan))
-    lost = replace(results, robustness=replace(results.robustness, stiffness=stiffness))
-    assert "With 1 of 2 drawn stiffnesses the free zones are no longer shown to keep every limit." in warnings(lost)
-    assert not [own for own in warnings(results) if "stiffness" in own]
-    assert "nan" not in " ".join(answer(lost))
+    uncertain = (kept, replace(kept, kept=False, regret=np.nan))
+    model = replace(results.model, identified=load_identified_stiffness("rv20e_table6"))
+    lost = replace(results, model=model, robustness=replace(results.robustness, uncertain=uncertain))
+    sentence = "With 1 of 2 drawn stiffness values the free zones are no longer shown to keep every limit."
+    assert sentence in lost.warnings
+    assert not [own for own in results.warnings if "stiffness" in own]
+    assert "nan" not in " ".join(lost.sentences)
 
 
 def test_a_trade_without_any_cost_is_said_in_words(results):
-    trade = ModificationTrade(
-        **{**vars(results.trade), "cost": np.full_like(results.trade.cost, np.nan), "error": np.nan}
-    )
+    trade = replace(results.trade, cost=np.full_like(results.trade.cost, np.nan), error=np.nan)
     nothing = replace(results, trade=trade)
-    assert cheapest_clearances(nothing) == (
-        "With no pair of clearances that was tried were zones found that keep all requirements.",
-    )
-    assert figures.trade_figures(nothing) == ()
-    assert len(figures.trade_figures(results)) == 2
-    for section in allocation_document(nothing).sections:
-        assert "nan" not in " ".join(section.paragraphs)
+    told = section(nothing, "Modification against tolerances")
+    assert told.paragraphs == ("With no choice that was tried were zones found that keep all requirements.",)
+    assert told.figures == ()
+    assert len(section(results, "Modification against tolerances").figures) == 2
+    for own in nothing.sections:
+        assert "nan" not in " ".join(own.paragraphs)
 
 
 def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
-    front = figures.front_figure(results)
+    front = figures.front_figure(results, results.fronts)
     assert "the search keeps the other requirements by their local models" in front.title
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched

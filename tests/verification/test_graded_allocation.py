@@ -7,12 +7,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
-from tolalloc.allocation.design_space import ClearanceRange
+from tests.prepared import prepared as baseline
 from tolalloc.allocation.grade.iso286 import grade_zones
 from tolalloc.allocation.grade.ladder import SERIES, ZONES
-from tolalloc.allocation.graded import AMOUNT_STEP, allocate_grades, group_ladders, group_options, with_shared_zones
+from tolalloc.allocation.graded import allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
@@ -20,17 +19,19 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
 UNITS, UM = 1152, 1e-6
+AMOUNT_STEP = 0.5
+"""Step of an amount of the modification on the drawing [µm]."""
 
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="test"))
+    return baseline()
 
 
 def verifier_of(prepared, space=None, limit: float = 60.0) -> Verifier:
     return Verifier(
         space=space or prepared.space,
-        kernel=prepared.kernel,
+        model=prepared.model,
         requirements=(replace(prepared.requirements[0], limits=Limits(upper=limit)),),
         seeds=SeedTree(6),
         units=UNITS,
@@ -42,9 +43,15 @@ def start_of(verifier, scale: float = 0.7, clearances=(1.2, 6.4)):
     return verifier.verify(np.clip(design, verifier.space.lower, verifier.space.upper), "start")
 
 
-def amounts_of(space, design):
-    found = space.modification(design)
+def amounts_of(prepared, design):
+    found = prepared.model.modification(prepared.space.settings_of(design))
     return np.array([found.equidistant, found.shift]) / UM
+
+
+def between(space, flank, radial):
+    """Return the space with the clearances between two values each [µm]."""
+    ends = zip(space.settings, (flank, radial), strict=True)
+    return replace(space, settings=tuple(replace(own, lower=low, upper=high) for own, (low, high) in ends))
 
 
 def with_sources(space, change):
@@ -82,10 +89,10 @@ def test_all_members_of_a_group_carry_one_zone_and_its_name(prepared, found):
     assert {SERIES, "IT3"} <= set(labels.values())
 
 
-def test_every_choice_has_round_amounts_and_clearances_inside_their_range(found):
+def test_every_choice_has_round_amounts_and_clearances_inside_their_range(prepared, found):
     shared = found.space.shared
     for design in found.tried[1:]:
-        steps = amounts_of(found.space, design.design) / AMOUNT_STEP
+        steps = amounts_of(prepared, design.design) / AMOUNT_STEP
         np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
         assert np.all(design.design[-2:] >= shared.lower - 1e-6)
         assert np.all(design.design[-2:] <= shared.upper + 1e-6)
@@ -133,10 +140,10 @@ def test_the_choice_is_the_best_of_all_there_are(prepared):
     scales = np.array(
         [*product(*(zones / first for zones, first in zip(ladders, found.space.first_zones, strict=True)))]
     )
-    middle = np.round(amounts_of(found.space, start.design) / AMOUNT_STEP) * AMOUNT_STEP
+    middle = np.round(amounts_of(prepared, start.design) / AMOUNT_STEP) * AMOUNT_STEP
     steps = AMOUNT_STEP * np.arange(-4, 5)
     allowed, costs = np.zeros(len(scales), dtype=bool), found.space.cost(np.hstack([scales, np.ones((len(scales), 2))]))
-    stage, shared = prepared.reducer.cycloid_stage, found.space.shared
+    stage, shared = prepared.model.reducer.cycloid_stage, found.space.shared
     for equidistant, shift in product(middle[0] + steps, middle[1] + steps):
         clearances = np.array([equidistant - shift * stage.flank_ratio, equidistant - shift])
         if np.all((clearances >= shared.lower - 1e-9) & (clearances <= shared.upper + 1e-9)):
@@ -152,19 +159,17 @@ def test_the_choice_is_the_best_of_all_there_are(prepared):
 
 
 def test_a_locked_modification_stays_however_odd_it_is(prepared):
-    now, stage = prepared.reducer.modification, prepared.reducer.cycloid_stage
-    flank, radial = now.flank_clearance(stage), now.radial_clearance
-    locked = replace(prepared.space, clearances=ClearanceRange(flank=(flank,) * 2, radial=(radial,) * 2))
-    verifier = verifier_of(prepared, locked, limit=70.0)
+    now = prepared.model.reducer.modification
+    verifier = verifier_of(prepared, prepared.space.fixed, limit=70.0)
     found = allocate_grades(verifier, start_of(verifier), 2)
     assert found.chosen.met
     np.testing.assert_allclose(
-        amounts_of(found.space, found.chosen.design), [now.equidistant / UM, now.shift / UM], rtol=1e-9
+        amounts_of(prepared, found.chosen.design), [now.equidistant / UM, now.shift / UM], rtol=1e-9
     )
 
 
 def test_a_clearance_that_leaves_no_round_amounts_is_kept_all_the_same(prepared):
-    narrow = replace(prepared.space, clearances=ClearanceRange(flank=(1.23e-6, 1.23e-6), radial=(5e-6, 20e-6)))
+    narrow = between(prepared.space, (1.23, 1.23), (5.0, 20.0))
     verifier = verifier_of(prepared, narrow, limit=70.0)
     found = allocate_grades(verifier, start_of(verifier), 1)
     np.testing.assert_allclose(found.chosen.design[-2:], [1.23, 6.4], rtol=1e-9)
@@ -196,7 +201,7 @@ def test_an_unreachable_limit_ends_with_the_least_violating_choice(prepared):
 
 
 def test_every_step_is_made_by_a_process_that_holds_it():
-    space = with_shared_zones(prepare(Study(name="test", process_costs="rv20e")).space)
+    space = with_shared_zones(baseline(drawing={"costs": "rv20e"}).space)
     for feature, first, options in zip(space.features, space.first_zones, group_options(space), strict=True):
         assert len({option.process for option in options}) == len(feature.processes) > 1
         for option in options:
@@ -211,7 +216,7 @@ def test_every_step_is_made_by_a_process_that_holds_it():
 
 
 def test_processes_that_hold_no_step_are_refused():
-    space = prepare(Study(name="test", process_costs="rv20e")).space
+    space = baseline(drawing={"costs": "rv20e"}).space
     processes = {
         **space.processes,
         "pin.diameter": tuple(

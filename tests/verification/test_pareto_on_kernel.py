@@ -7,19 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared as baseline
+from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
-from tolalloc.allocation.pareto.design_problem import RADIAL_CLEARANCE, DesignProblem
+from tolalloc.allocation.pareto.design_problem import DesignProblem, large
 from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
 from tolalloc.allocation.pareto.indicators import nondominated
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.rv.model import RADIAL
 
 POPULATION = 80
+WIDE = large(RADIAL, -1)
 
 
 def digest(found) -> str:
@@ -28,7 +31,7 @@ def digest(found) -> str:
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="test"))
+    return baseline()
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +39,11 @@ def quantile(prepared) -> QuantileResponse:
     errors = prepared.space.errors
     uniform = SeedTree(8).uniform_chunk(0, len(errors.columns))[:16]
     return QuantileResponse(
-        space=prepared.space, kernel=prepared.kernel, standard=errors.standard_values(uniform), spread=2.5
+        space=prepared.space,
+        model=prepared.model,
+        output=PEAK_TO_PEAK,
+        standard=errors.standard_values(uniform),
+        spread=2.5,
     )
 
 
@@ -67,7 +74,7 @@ def test_wrong_ladders_are_refused(prepared, quantile):
 
 def test_other_requirements_are_violated_by_what_their_models_say(prepared, quantile):
     space = prepared.space
-    groups, design = len(space.groups), space.uniform(1.0, prepared.reducer.modification)
+    groups, design = len(space.groups), space.uniform(1.0)
     stack = Stack(
         name="lost motion",
         worst_case=np.zeros(groups),
@@ -76,7 +83,7 @@ def test_other_requirements_are_violated_by_what_their_models_say(prepared, quan
         slopes=np.array([0.0, 0.1]),
     )
     side = Side(sign=1, limit=0.5, value=0.4, doubt=0.01, scale=0.5, stack=stack)
-    problem = DesignProblem(space=space, quantile=quantile, further=(RADIAL_CLEARANCE,), sides=(side,))
+    problem = DesignProblem(space=space, quantile=quantile, further=(WIDE,), sides=(side,))
     answers = problem(problem.genes_of(design[np.newaxis]))
     assert problem.constraints == ("lost motion",)
     assert answers.values[0, 0] == pytest.approx(space.cost(design[np.newaxis])[0])
@@ -134,7 +141,7 @@ def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(
 def test_on_the_kernel_ladders_and_a_third_objective_hold(prepared, quantile):
     space = prepared.space
     ladders = {group: ladder_of(space, group) for group in space.groups[:2]}
-    front, _ = kernel_front(prepared, quantile, ladders=ladders, further=(RADIAL_CLEARANCE,))
+    front, _ = kernel_front(prepared, quantile, ladders=ladders, further=(WIDE,))
     np.testing.assert_array_equal(front.further[:, 0], front.designs[:, -1])
     for at, ladder in enumerate(ladders.values()):
         assert np.isclose(front.designs[:, at, np.newaxis], ladder, rtol=1e-12).any(axis=1).all()
