@@ -36,18 +36,10 @@ _LARGEST_ZONE = 200.0 * MICROMETRE
 
 @dataclass(frozen=True, kw_only=True)
 class BoundReducer:
-    """The equivalent model at the sources of a drawing.
+    """The equivalent model at the sources of a drawing."""
 
-    Parameters
-    ----------
-    kernel
-        The model at the reducer's own modification.
-    neglected
-        Patterns of the sources that are taken as zero because the drawing does not list them.
-    """
-
-    kernel: KernelResponse
-    neglected: tuple[str, ...]
+    kernel: KernelResponse  # The model at the reducer's own modification
+    neglected: tuple[str, ...]  # Patterns of the sources that are taken as zero because the drawing does not list them
 
     @property
     def assumptions(self) -> tuple[str, ...]:

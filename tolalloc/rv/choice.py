@@ -24,32 +24,19 @@ _FARTHEST = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class ReducerChoice:
-    """A reducer as a study names it; it becomes a `tolalloc.rv.model.ReducerModel` with the study's drawing.
+    """A reducer as a study names it; it becomes a `tolalloc.rv.model.ReducerModel` with the study's drawing."""
 
-    Parameters
-    ----------
-    reducer
-        The reducer with the stiffness in use.
-    identified
-        Identified stiffnesses that replaced its own, if any.
-    torque
-        Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m].
-    flank_clearance, radial_clearance
-        Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
-        as they are unless given [µm].
-    neglected
-        Sources that a drawing may leave out, taken as zero; ``*`` stands for anything.
-    unit
-        Built unit whose curve is shown, if any.
-    """
-
-    reducer: Reducer
-    identified: IdentifiedStiffness | None = None
+    reducer: Reducer  # The reducer with the stiffness in use
+    identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
+    # Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m]
     torque: float | None = None
+    # Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root
+    # [µm]
     flank_clearance: tuple[float, float] | None = None
-    radial_clearance: tuple[float, float] | None = None
+    radial_clearance: tuple[float, float] | None = None  # As they are unless given [µm]
+    # Sources that a drawing may leave out, taken as zero; ``*`` stands for anything
     neglected: tuple[str, ...] = NEGLECTED
-    unit: BuiltUnit | None = None
+    unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
 
     @property
     def name(self) -> str:

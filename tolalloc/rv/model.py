@@ -40,32 +40,17 @@ _MOST_COLUMNS = 100
 
 @dataclass(frozen=True, kw_only=True)
 class ReducerModel(Model):
-    """The equivalent model of a reducer at the sources of a drawing.
+    """The equivalent model of a reducer at the sources of a drawing."""
 
-    Parameters
-    ----------
-    kernel
-        Its peak-to-peak at the modification in force.
-    flank, radial
-        Smallest and largest clearance that the modification may leave on the flank and at tip and root; none locks
-        it [m].
-    identified
-        Stiffnesses that replaced the reducer's own, if any.
-    clearances
-        Values of the settings in force; those of the reducer's own modification unless given [µm].
-    unit
-        Built unit whose curve is shown beside others, if any.
-    bound_assumptions
-        What binding the drawing to the reducer assumed.
-    """
-
-    kernel: KernelResponse
+    kernel: KernelResponse  # Its peak-to-peak at the modification in force
+    # Smallest and largest clearance that the modification may leave on the flank and at tip and root [m]
     flank: tuple[float, float] | None = None
-    radial: tuple[float, float] | None = None
-    identified: IdentifiedStiffness | None = None
+    radial: tuple[float, float] | None = None  # None locks it [m]
+    identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
+    # Values of the settings in force; those of the reducer's own modification unless given [µm]
     clearances: tuple[float, float] | None = None
-    unit: BuiltUnit | None = None
-    bound_assumptions: tuple[str, ...] = ()
+    unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
+    bound_assumptions: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
 
     @property
     def reducer(self) -> Reducer:

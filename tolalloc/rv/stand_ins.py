@@ -19,21 +19,11 @@ from tolalloc.units import ARCSECOND
 
 @dataclass(frozen=True, kw_only=True)
 class Corrected:
-    """A response with one output, brought by a straight line to that of a better one.
+    """A response with one output, brought by a straight line to that of a better one."""
 
-    Parameters
-    ----------
-    response
-        What answers.
-    offset
-        Added to its answers [output].
-    factor
-        What its answers are multiplied by before [-].
-    """
-
-    response: Response
-    offset: float
-    factor: float
+    response: Response  # What answers
+    offset: float  # Added to its answers [output]
+    factor: float  # What its answers are multiplied by before [-]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -65,17 +55,10 @@ class ContactCandidate:
     Angles miss the kinks where the extremes are, so the peak-to-peak comes out too small, by nearly the same amount
     for every unit; the line makes up for it. At 936 angles the RV-20E's line, fitted at the zones of its table, is off
     by 0.4″ on average at a quarter of them and by less at larger ones.
-
-    Parameters
-    ----------
-    kernel
-        The model with the full search.
-    angles
-        Angles of the turn [-].
     """
 
-    kernel: KernelResponse
-    angles: int
+    kernel: KernelResponse  # The model with the full search
+    angles: int  # Angles of the turn [-]
 
     @property
     def name(self) -> str:
@@ -91,22 +74,13 @@ class ContactCandidate:
 
 @dataclass(frozen=True, kw_only=True)
 class CurveRegression:
-    """Fitted curves of the transmission error, answered by their peak-to-peak.
+    """Fitted curves of the transmission error, answered by their peak-to-peak."""
 
-    Parameters
-    ----------
-    columns, outputs
-        As in `tolalloc.models.Response`.
-    modes
-        The fitted principal modes of the curves.
-    estimator
-        The fitted estimator of the modes' amounts.
-    """
-
+    # As in `tolalloc.models.Response`
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
-    modes: Any
-    estimator: Any
+    modes: Any  # The fitted principal modes of the curves
+    estimator: Any  # The fitted estimator of the modes' amounts
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the peak-to-peak of the fitted curves."""
@@ -126,17 +100,10 @@ class CurveCandidate:
 
     A regression flattens what it cannot follow, so the peak-to-peak comes out too small; a line makes up for it on
     average. Fitting takes a LASSO per mode, which is minutes for some 60 columns.
-
-    Parameters
-    ----------
-    kernel
-        What the curves come from.
-    modes
-        Principal modes that are kept [-].
     """
 
-    kernel: KernelResponse
-    modes: int = 20
+    kernel: KernelResponse  # What the curves come from
+    modes: int = 20  # Principal modes that are kept [-]
 
     @property
     def name(self) -> str:

@@ -43,37 +43,17 @@ _DRAWN = 120
 
 @dataclass(frozen=True, kw_only=True)
 class TransmissionErrorAnswer(Answer):
-    """One unit under one torque.
-
-    Parameters
-    ----------
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    equilibria
-        At equally spaced angles of one output turn.
-    extremes
-        Largest and smallest transmission error, refined.
-    loop
-        Hysteresis loop of this unit and of the perfect reducer.
-    reversed_by
-        What reversing the rotation adds to the curve [rad].
-    attribution
-        Which source makes how much; none unless asked for.
-    equally_spaced
-        Equally spaced angles of the search [-].
-    cautions
-        What the model itself must warn of.
-    """
+    """One unit under one torque."""
 
     kind: ClassVar[str] = "transmission error"
-    torque: float
-    equilibria: Equilibria
-    extremes: Extremes
-    loop: HysteresisLoop
-    reversed_by: Float[np.ndarray, " angle"]
-    attribution: Attribution | None
-    equally_spaced: int
-    cautions: tuple[str, ...]
+    torque: float  # Torque on the carrier; negative resists the rotation [N·m]
+    equilibria: Equilibria  # At equally spaced angles of one output turn
+    extremes: Extremes  # Largest and smallest transmission error, refined
+    loop: HysteresisLoop  # Hysteresis loop of this unit and of the perfect reducer
+    reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
+    attribution: Attribution | None  # Which source makes how much; none unless asked for
+    equally_spaced: int  # Equally spaced angles of the search [-]
+    cautions: tuple[str, ...]  # What the model itself must warn of
 
     @property
     def title(self) -> str:

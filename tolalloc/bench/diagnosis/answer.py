@@ -24,31 +24,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisAnswer(Answer):
-    """A diagnosed unit; the header has its name, and what the binding of the drawing to the reducer assumes.
+    """A diagnosed unit; the header has its name, and what the binding of the drawing to the reducer assumes."""
 
-    Parameters
-    ----------
-    reducer, torque
-        Its nominal design, and the torque on the carrier at which it was measured [N·m].
-    errors
-        What the drawings say of its parts.
-    curve
-        Its cleaned curve.
-    noise
-        What separates a reading from the model.
-    level
-        Probability that the named sources must have of containing the dominant one [-].
-    diagnosis
-        What was found.
-    """
-
+    # Its nominal design, and the torque on the carrier at which it was measured [N·m]
     reducer: Reducer
     torque: float
-    errors: ErrorModel
-    curve: MeasuredCurve
-    noise: Noise
-    level: float
-    diagnosis: Diagnosis
+    errors: ErrorModel  # What the drawings say of its parts
+    curve: MeasuredCurve  # Its cleaned curve
+    noise: Noise  # What separates a reading from the model
+    level: float  # Probability that the named sources must have of containing the dominant one [-]
+    diagnosis: Diagnosis  # What was found
     kind: ClassVar[str] = "diagnosis"
 
     @cached_property

@@ -25,18 +25,10 @@ LogDensity = Callable[[Float[np.ndarray, "particle column"]], Float[np.ndarray, 
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbourhood:
-    """A normal density that is easy to draw from.
+    """A normal density that is easy to draw from."""
 
-    Parameters
-    ----------
-    centre
-        Its mean [-].
-    precision
-        Inverse of its covariance [-].
-    """
-
-    centre: Float[np.ndarray, " column"]
-    precision: Float[np.ndarray, "column column"]
+    centre: Float[np.ndarray, " column"]  # Its mean [-]
+    precision: Float[np.ndarray, "column column"]  # Inverse of its covariance [-]
 
     @cached_property
     def _root(self) -> Float[np.ndarray, "column column"]:

@@ -29,68 +29,42 @@ TAILS = (0.025, 0.975)
 
 @dataclass(frozen=True, kw_only=True)
 class CurveFit:
-    """How the curve is explained.
+    """How the curve is explained."""
 
-    Parameters
-    ----------
-    carrier_angle
-        Angles of the readings that were used [rad].
-    measured, fitted
-        Readings, and mean curve of the errors that they allow, each without its mean [rad].
-    band
-        95 % interval of those curves [rad].
-    chi_square, freedom
-        Mean sum of squared residuals in standard deviations, and what it would be on average, were the model true [-].
-    explained
-        Whether residuals as large have a probability of `IMPLAUSIBLE` or more.
-    """
-
-    carrier_angle: Float[np.ndarray, " angle"]
+    carrier_angle: Float[np.ndarray, " angle"]  # Angles of the readings that were used [rad]
+    # Readings, and mean curve of the errors that they allow, each without its mean [rad]
     measured: Float[np.ndarray, " angle"]
     fitted: Float[np.ndarray, " angle"]
-    band: Float[np.ndarray, "2 angle"]
+    band: Float[np.ndarray, "2 angle"]  # 95 % interval of those curves [rad]
+    # Mean sum of squared residuals in standard deviations, and what it would be on average, were the model true [-]
     chi_square: float
     freedom: int
-    explained: bool
+    explained: bool  # Whether residuals as large have a probability of `IMPLAUSIBLE` or more
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
-    """What the curve of a unit tells of its parts.
+    """What the curve of a unit tells of its parts."""
 
-    Parameters
-    ----------
-    sources, columns
-        Names of the sources and of their columns.
-    deviations
-        Columns of units that have this curve, all equally likely [m, angles rad].
-    reading_mean, reading_interval
-        What the gauge of each source would show, mean and 95 % interval [m].
-    dominant_probability
-        Probability that each source is the dominant one; 0 for all where the curve is not explained [-].
-    named
-        Fewest sources that contain the dominant one at the level asked for, likeliest first; none where the curve is
-        not explained.
-    twins
-        Pairs of sources that no curve tells apart: a unit turned by half a turn is the same reducer.
-    groups
-        Columns that this curve does not tell apart, and what it tells of them together; for one of two twins.
-    fit
-        Measured and fitted curve.
-    evaluations, failed
-        Curves solved, and those among them that failed [-].
-    """
-
+    # Names of the sources and of their columns
     sources: tuple[str, ...]
     columns: tuple[str, ...]
+    # Columns of units that have this curve, all equally likely [m, angles rad]
     deviations: Float[np.ndarray, "particle column"]
+    # What the gauge of each source would show, mean and 95 % interval [m]
     reading_mean: Float[np.ndarray, " source"]
     reading_interval: Float[np.ndarray, "2 source"]
+    # Probability that each source is the dominant one; 0 for all where the curve is not explained [-]
     dominant_probability: Float[np.ndarray, " source"]
+    # Fewest sources that contain the dominant one at the level asked for, likeliest first; none where the curve is not
+    # explained
     named: tuple[str, ...]
+    # Pairs of sources that no curve tells apart: a unit turned by half a turn is the same reducer
     twins: tuple[tuple[str, str], ...]
+    # Columns that this curve does not tell apart, and what it tells of them together; for one of two twins
     groups: tuple[InseparableColumns, ...]
-    fit: CurveFit
+    fit: CurveFit  # Measured and fitted curve
+    # Curves solved, and those among them that failed [-]
     evaluations: int
     failed: int
 

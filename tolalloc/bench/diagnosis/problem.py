@@ -28,20 +28,11 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """What separates a reading from the model.
+    """What separates a reading from the model."""
 
-    Parameters
-    ----------
-    reading
-        Standard deviation of one reading, independent of all others [rad].
-    discrepancy
-        Standard deviation of what the model leaves out [rad].
-    correlation_angle
-        Angle over which what is left out stays alike: its correlation falls as exp(−½(Δ/angle)²) [rad].
-    """
-
-    reading: float = 0.5 * ARCSECOND
-    discrepancy: float = 0.5 * ARCSECOND
+    reading: float = 0.5 * ARCSECOND  # Standard deviation of one reading, independent of all others [rad]
+    discrepancy: float = 0.5 * ARCSECOND  # Standard deviation of what the model leaves out [rad]
+    # Angle over which what is left out stays alike: its correlation falls as exp(−½(Δ/angle)²) [rad]
     correlation_angle: float = 1.5 * DEGREE
 
     def __post_init__(self) -> None:
@@ -60,21 +51,11 @@ class Noise:
 
 @dataclass(frozen=True, kw_only=True)
 class ThinnedCurve:
-    """Readings of one curve that a diagnosis starts from.
+    """Readings of one curve that a diagnosis starts from."""
 
-    Parameters
-    ----------
-    carrier_angle
-        Their angles [rad].
-    values
-        Transmission error [rad].
-    covariance
-        Of their noise and of what the model leaves out [rad²].
-    """
-
-    carrier_angle: Float[np.ndarray, " angle"]
-    values: Float[np.ndarray, " angle"]
-    covariance: Float[np.ndarray, "angle angle"]
+    carrier_angle: Float[np.ndarray, " angle"]  # Their angles [rad]
+    values: Float[np.ndarray, " angle"]  # Transmission error [rad]
+    covariance: Float[np.ndarray, "angle angle"]  # Of their noise and of what the model leaves out [rad²]
 
     @property
     def freedom(self) -> int:
@@ -140,24 +121,12 @@ class _OneTurn(EquivalentModel):
 
 @dataclass(frozen=True, kw_only=True)
 class CurveProblem:
-    """Errors of one unit as standard normal numbers, and how badly they explain its curve.
+    """Errors of one unit as standard normal numbers, and how badly they explain its curve."""
 
-    Parameters
-    ----------
-    kernel
-        The real model; its columns are those of the errors.
-    errors
-        What is known of the errors before the curve is read.
-    zones
-        Zones of the sources that vary [m].
-    readings
-        The curve.
-    """
-
-    kernel: KernelResponse
-    errors: ErrorModel
-    zones: Float[np.ndarray, " source"]
-    readings: ThinnedCurve
+    kernel: KernelResponse  # The real model; its columns are those of the errors
+    errors: ErrorModel  # What is known of the errors before the curve is read
+    zones: Float[np.ndarray, " source"]  # Zones of the sources that vary [m]
+    readings: ThinnedCurve  # The curve
 
     @cached_property
     def _model(self) -> EquivalentModel:

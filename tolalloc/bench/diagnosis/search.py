@@ -30,64 +30,29 @@ _SAME_DEPTH = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisEffort:
-    """How much a diagnosis may compute.
+    """How much a diagnosis may compute."""
 
-    Parameters
-    ----------
-    angles
-        Most readings of a turn that are used [-].
-    scouts
-        Particles led from the drawings' distribution to one that knows the curve roughly [-].
-    rough
-        Error of a reading for the scouts, over the spread of the curves that the drawings allow [-].
-    climbers
-        Scouts from which steps are taken [-].
-    attempts
-        Most attempts from fresh scouts [-].
-    nearby
-        Most searches around the best so far in each attempt [-].
-    particles
-        Size of the population that is sampled around the explanation [-].
-    weight
-        Weight of the readings in the normal distribution that the population starts from [-].
-    settling
-        Moves of the population at the end [-].
-    judged
-        Sampled units whose dominant source is looked for [-].
-    """
-
-    angles: int = 240
-    scouts: int = 320
-    rough: float = 1.0
-    climbers: int = 16
-    attempts: int = 5
-    nearby: int = 8
-    particles: int = 512
-    weight: float = 0.01
-    settling: int = 20
-    judged: int = 128
+    angles: int = 240  # Most readings of a turn that are used [-]
+    scouts: int = 320  # Particles led from the drawings' distribution to one that knows the curve roughly [-]
+    rough: float = 1.0  # Error of a reading for the scouts, over the spread of the curves that the drawings allow [-]
+    climbers: int = 16  # Scouts from which steps are taken [-]
+    attempts: int = 5  # Most attempts from fresh scouts [-]
+    nearby: int = 8  # Most searches around the best so far in each attempt [-]
+    particles: int = 512  # Size of the population that is sampled around the explanation [-]
+    weight: float = 0.01  # Weight of the readings in the normal distribution that the population starts from [-]
+    settling: int = 20  # Moves of the population at the end [-]
+    judged: int = 128  # Sampled units whose dominant source is looked for [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """The errors that explain a curve best.
+    """The errors that explain a curve best."""
 
-    Parameters
-    ----------
-    numbers
-        Standard normal numbers [-].
-    information
-        What the readings tell of them nearby: sum of squared derivatives [-].
-    objective
-        Half the sum of squares of residuals and numbers [-].
-    plausible
-        Probability of residuals at least as large, were the model true [-].
-    """
-
-    numbers: Float[np.ndarray, " column"]
+    numbers: Float[np.ndarray, " column"]  # Standard normal numbers [-]
+    # What the readings tell of them nearby: sum of squared derivatives [-]
     information: Float[np.ndarray, "column column"]
-    objective: float
-    plausible: float
+    objective: float  # Half the sum of squares of residuals and numbers [-]
+    plausible: float  # Probability of residuals at least as large, were the model true [-]
 
     def neighbourhood(self, weight: float) -> Neighbourhood:
         """Return what would be known if the model were linear and the readings had this weight [-]."""

@@ -50,26 +50,16 @@ def named_set(probability: Float[np.ndarray, " source"], level: float) -> tuple[
 
 @dataclass(frozen=True, kw_only=True)
 class InseparableColumns:
-    """Columns that a curve does not tell apart, and what it tells of them together.
+    """Columns that a curve does not tell apart, and what it tells of them together."""
 
-    Parameters
-    ----------
-    columns, sources
-        Their names, and the names of their sources.
-    alone
-        Standard deviation of each over its standard deviation by the drawing [-].
-    combination
-        The unit sum of columns, each over its standard deviation by the drawing, that is known best [-].
-    value, together
-        Mean and standard deviation of that sum; by the drawings it has mean 0 and standard deviation 1 [-].
-    """
-
+    # Their names, and the names of their sources
     columns: tuple[str, ...]
     sources: tuple[str, ...]
-    alone: Float[np.ndarray, " column"]
+    alone: Float[np.ndarray, " column"]  # Standard deviation of each over its standard deviation by the drawing [-]
+    # The unit sum of columns, each over its standard deviation by the drawing, that is known best [-]
     combination: Float[np.ndarray, " column"]
-    value: float
-    together: float
+    value: float  # Mean and standard deviation of that sum [-]
+    together: float  # By the drawings it has mean 0 and standard deviation 1 [-]
 
 
 def groups(

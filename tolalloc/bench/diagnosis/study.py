@@ -31,42 +31,19 @@ PLACE = "tolalloc diagnose"
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisStudy:
-    """Which unit is to be diagnosed.
+    """Which unit is to be diagnosed."""
 
-    Parameters
-    ----------
-    curve
-        CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``.
-    reducer
-        Nominal design, with the stiffness in use.
-    errors
-        What the drawings say of its parts.
-    torque_nm
-        Torque on the carrier, negative where it resists the rotation; the test torque unless given [N·m].
-    noise_arcsec
-        Standard deviation of one reading [arcsec].
-    discrepancy_arcsec
-        Standard deviation of what the model leaves out [arcsec].
-    angle_offset_deg
-        Added to every angle of the bench [deg].
-    level
-        Probability that the named sources must have of containing the dominant one [-].
-    seed
-        Seed of every random number [-].
-    effort
-        How much may be computed.
-    """
-
-    curve: Path
-    reducer: Reducer
-    errors: ErrorModel
+    curve: Path  # CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``
+    reducer: Reducer  # Nominal design, with the stiffness in use
+    errors: ErrorModel  # What the drawings say of its parts
+    # Torque on the carrier, negative where it resists the rotation; the test torque unless given [N·m]
     torque_nm: float | None = None
-    noise_arcsec: float = 0.5
-    discrepancy_arcsec: float = 0.5
-    angle_offset_deg: float = 0.0
-    level: float = 0.97
-    seed: int = 1
-    effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)
+    noise_arcsec: float = 0.5  # Standard deviation of one reading [arcsec]
+    discrepancy_arcsec: float = 0.5  # Standard deviation of what the model leaves out [arcsec]
+    angle_offset_deg: float = 0.0  # Added to every angle of the bench [deg]
+    level: float = 0.97  # Probability that the named sources must have of containing the dominant one [-]
+    seed: int = 1  # Seed of every random number [-]
+    effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
 
     def __post_init__(self) -> None:
         for name, value, good, allowed in (

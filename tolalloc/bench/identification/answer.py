@@ -30,53 +30,30 @@ from tolalloc.units import ARCSECOND
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationAnswer(Answer):
-    """Stiffnesses from measured units, their uncertainty, and how simpler explanations compare.
+    """Stiffnesses from measured units, their uncertainty, and how simpler explanations compare."""
 
-    Parameters
-    ----------
-    measurements, reducer
-        What was measured, and the reducer as it was given.
-    data
-        All readings in one row.
-    parameters
-        The unknowns.
-    found
-        The least objective, on the model itself.
-    at_start, at_found
-        What the model says should have been read, before and after.
-    at_written
-        The same for what the stiffness file states.
-    information, written
-        What the data fix around the least objective, and around what the stiffness file states.
-    profiles, bootstrap
-        The same without a parabola, and coordinates for units drawn anew; no bootstrap for a few units [-].
-    drift
-        How far the least objective of the polynomials is from that of the model, over the standard deviation [-].
-    estimates
-        Every parameter with its uncertainty.
-    choices, chosen
-        Simpler and richer choices of parameters, and the simplest that is as good as the best; none for a few units.
-    polynomial
-        What profiles, bootstrap and choices asked instead of the model.
-    """
-
+    # What was measured, and the reducer as it was given
     measurements: Measurements
     reducer: Reducer
-    data: AllReadings
-    parameters: tuple[Parameter, ...]
-    found: Identified
+    data: AllReadings  # All readings in one row
+    parameters: tuple[Parameter, ...]  # The unknowns
+    found: Identified  # The least objective, on the model itself
+    # What the model says should have been read, before and after
     at_start: Prediction
     at_found: Prediction
-    at_written: Prediction
+    at_written: Prediction  # The same for what the stiffness file states
+    # What the data fix around the least objective, and around what the stiffness file states
     information: Information
     written: Information
+    # How far the least objective of the polynomials is from that of the model, over the standard deviation [-]
     drift: float
-    profiles: tuple[ParameterProfile, ...]
-    estimates: tuple[ParameterEstimate, ...]
-    bootstrap: Float[np.ndarray, "resample parameter"] | None
+    profiles: tuple[ParameterProfile, ...]  # The same without a parabola, and coordinates for units drawn anew [-]
+    estimates: tuple[ParameterEstimate, ...]  # Every parameter with its uncertainty
+    bootstrap: Float[np.ndarray, "resample parameter"] | None  # No bootstrap for a few units [-]
+    # Simpler and richer choices of parameters, and the simplest that is as good as the best
     choices: tuple[ParameterChoice, ...]
-    chosen: ParameterChoice | None
-    polynomial: BoxPolynomial
+    chosen: ParameterChoice | None  # None for a few units
+    polynomial: BoxPolynomial  # What profiles, bootstrap and choices asked instead of the model
     kind: ClassVar[str] = "identification"
 
     @property

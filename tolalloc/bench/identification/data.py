@@ -18,49 +18,23 @@ PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingBlock:
-    """Readings that belong together.
+    """Readings that belong together."""
 
-    Parameters
-    ----------
-    kind
-        `PEAK_TO_PEAK`, `CURVE` or `LOOP`.
-    number
-        Which of the measured curves or loops; 0 for the peak-to-peaks [-].
-    rows
-        Its readings among all.
-    centred
-        Whether its mean has been removed, from readings and model alike.
-    """
-
-    kind: str
-    number: int
-    rows: slice
-    centred: bool
+    kind: str  # `PEAK_TO_PEAK`, `CURVE` or `LOOP`
+    number: int  # Which of the measured curves or loops; 0 for the peak-to-peaks [-]
+    rows: slice  # Its readings among all
+    centred: bool  # Whether its mean has been removed, from readings and model alike
 
 
 @dataclass(frozen=True, kw_only=True)
 class AllReadings:
-    """All readings of all units in one row.
+    """All readings of all units in one row."""
 
-    Parameters
-    ----------
-    measured
-        Readings [rad].
-    noise
-        Standard deviation of each; one arcsecond where nobody stated it [rad].
-    unit
-        Position of the unit that each belongs to [-].
-    blocks
-        Where they came from, in order.
-    noise_stated
-        Whether the noise was stated; if not, it is estimated from what the fit leaves.
-    """
-
-    measured: Float[np.ndarray, " datum"]
-    noise: Float[np.ndarray, " datum"]
-    unit: Int[np.ndarray, " datum"]
-    blocks: tuple[ReadingBlock, ...]
-    noise_stated: bool
+    measured: Float[np.ndarray, " datum"]  # Readings [rad]
+    noise: Float[np.ndarray, " datum"]  # Standard deviation of each; one arcsecond where nobody stated it [rad]
+    unit: Int[np.ndarray, " datum"]  # Position of the unit that each belongs to [-]
+    blocks: tuple[ReadingBlock, ...]  # Where they came from, in order
+    noise_stated: bool  # Whether the noise was stated; if not, it is estimated from what the fit leaves
 
     @property
     def units(self) -> Int[np.ndarray, " unit"]:

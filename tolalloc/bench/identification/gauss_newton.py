@@ -23,33 +23,15 @@ Batch = tuple[Float[np.ndarray, "point parameter"], Float[np.ndarray, " point"]]
 
 @dataclass(frozen=True, kw_only=True)
 class Identified:
-    """Answer of one run of one method, and how it got there.
+    """Answer of one run of one method, and how it got there."""
 
-    Parameters
-    ----------
-    method
-        Name of the method.
-    seed
-        Seed of the run; none if nothing is random [-].
-    coordinates
-        Where the least objective was found [-].
-    objective
-        Half the weighted sum of squares there [-].
-    evaluated
-        How often all readings were predicted up to the end of each batch [-].
-    least
-        Least objective until then [-].
-    status
-        Why it ended.
-    """
-
-    method: str
-    seed: int | None
-    coordinates: Float[np.ndarray, " parameter"]
-    objective: float
-    evaluated: Int[np.ndarray, " batch"]
-    least: Float[np.ndarray, " batch"]
-    status: str
+    method: str  # Name of the method
+    seed: int | None  # Seed of the run; none if nothing is random [-]
+    coordinates: Float[np.ndarray, " parameter"]  # Where the least objective was found [-]
+    objective: float  # Half the weighted sum of squares there [-]
+    evaluated: Int[np.ndarray, " batch"]  # How often all readings were predicted up to the end of each batch [-]
+    least: Float[np.ndarray, " batch"]  # Least objective until then [-]
+    status: str  # Why it ended
 
     @classmethod
     def among(cls, batches: Sequence[Batch], method: str, seed: int | None, status: str) -> Identified:

@@ -28,20 +28,11 @@ _SMALL = 0.05  # loadings below this share of the largest are not written [-]
 
 @dataclass(frozen=True, kw_only=True)
 class Direction:
-    """One combination of coordinates that the readings fix independently of the others.
+    """One combination of coordinates that the readings fix independently of the others."""
 
-    Parameters
-    ----------
-    loading
-        Share of each coordinate, of length 1, its largest positive [-].
-    deviation
-        Standard deviation that the readings leave along it [-].
-    half_width
-        Half the box's extent along it: the standard deviation must be well below for the readings to say anything [-].
-    """
-
-    loading: Float[np.ndarray, " parameter"]
-    deviation: float
+    loading: Float[np.ndarray, " parameter"]  # Share of each coordinate, of length 1, its largest positive [-]
+    deviation: float  # Standard deviation that the readings leave along it [-]
+    # Half the box's extent along it: the standard deviation must be well below for the readings to say anything [-]
     half_width: float
 
     @property
@@ -70,38 +61,21 @@ class Direction:
 
 @dataclass(frozen=True, kw_only=True)
 class Information:
-    """What the readings say around the least objective, to first order.
+    """What the readings say around the least objective, to first order."""
 
-    Parameters
-    ----------
-    matrix
-        Fisher information of the coordinates from the readings over the variance factor, and from the prior [-].
-    variance_factor
-        Variance of the noise over the one that the data carry: 1 where it was stated and can be believed, else the
-        reduced χ² [-].
-    freedom
-        Readings less parameters [-].
-    reduced_chi_square
-        Sum of squared residuals over noise, per degree of freedom [-].
-    lower, upper
-        Bounds of the coordinates [-].
-    coordinates
-        Where it was taken [-].
-    estimated
-        Whether the variance factor was estimated from the residuals; if not, the noise is known.
-    logarithmic
-        Which coordinates are logarithms; the bias is not.
-    """
-
+    # Fisher information of the coordinates from the readings over the variance factor, and from the prior [-]
     matrix: Float[np.ndarray, "parameter parameter"]
+    # Variance of the noise over the one that the data carry: 1 where it was stated and can be believed, else the
+    # reduced χ² [-]
     variance_factor: float
-    freedom: int
-    reduced_chi_square: float
+    freedom: int  # Readings less parameters [-]
+    reduced_chi_square: float  # Sum of squared residuals over noise, per degree of freedom [-]
+    # Bounds of the coordinates [-]
     lower: Float[np.ndarray, " parameter"]
     upper: Float[np.ndarray, " parameter"]
-    coordinates: Float[np.ndarray, " parameter"]
-    estimated: bool
-    logarithmic: Bool[np.ndarray, " parameter"]
+    coordinates: Float[np.ndarray, " parameter"]  # Where it was taken [-]
+    estimated: bool  # Whether the variance factor was estimated from the residuals; if not, the noise is known
+    logarithmic: Bool[np.ndarray, " parameter"]  # Which coordinates are logarithms; the bias is not
 
     @property
     def directions(self) -> tuple[Direction, ...]:

@@ -40,24 +40,14 @@ _STIFFNESS_SPAN = 2.0  # bounds of a stiffness unless told otherwise: half to do
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One unknown. Searches move its coordinate, which is of order one for every kind of parameter.
+    """One unknown. Searches move its coordinate, which is of order one for every kind of parameter."""
 
-    Parameters
-    ----------
-    name
-        One of `SYMBOLS`.
-    low, high
-        Bounds: a stiffness [N/m], the bias [arcsec], the torque over the stated one [-].
-    start
-        Where searches begin, and what the parameter stays at when it is not identified [as low].
-    prior
-        Standard deviation of the coordinate around ``start`` that is known beforehand; infinite if nothing is [-].
-    """
-
-    name: str
+    name: str  # One of `SYMBOLS`
+    # Bounds: a stiffness [N/m], the bias [arcsec], the torque over the stated one [-]
     low: float
     high: float
-    start: float
+    start: float  # Where searches begin, and what the parameter stays at when it is not identified [as low]
+    # Standard deviation of the coordinate around ``start`` that is known beforehand; infinite if nothing is [-]
     prior: float = inf
 
     @property

@@ -29,18 +29,11 @@ UnitObserver = Callable[[int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """What should have been read, at one point.
+    """What should have been read, at one point."""
 
-    Parameters
-    ----------
-    values
-        Readings, their means removed as in the data; not a number where there is no equilibrium [rad].
-    by_coordinate
-        Their derivatives by the coordinates of the parameters [rad].
-    """
-
+    # Readings, their means removed as in the data; not a number where there is no equilibrium [rad]
     values: Float[np.ndarray, " datum"]
-    by_coordinate: Float[np.ndarray, "datum parameter"]
+    by_coordinate: Float[np.ndarray, "datum parameter"]  # Their derivatives by the coordinates of the parameters [rad]
 
 
 @runtime_checkable
@@ -58,27 +51,13 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class KernelPredictor:
-    """The equivalent model itself.
+    """The equivalent model itself."""
 
-    Parameters
-    ----------
-    reducer
-        Nominal design; what is not a parameter keeps its stiffness.
-    parameters
-        The unknowns, in the order of the coordinates.
-    measurements
-        Units, angles and torques.
-    data
-        The same readings in one row.
-    observe
-        Told how many units have been answered for.
-    """
-
-    reducer: Reducer
-    parameters: tuple[Parameter, ...]
-    measurements: Measurements
-    data: AllReadings
-    observe: UnitObserver = lambda _: None
+    reducer: Reducer  # Nominal design; what is not a parameter keeps its stiffness
+    parameters: tuple[Parameter, ...]  # The unknowns, in the order of the coordinates
+    measurements: Measurements  # Units, angles and torques
+    data: AllReadings  # The same readings in one row
+    observe: UnitObserver = lambda _: None  # Told how many units have been answered for
 
     def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
         """Return readings and derivatives at one point."""

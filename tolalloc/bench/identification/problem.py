@@ -18,32 +18,19 @@ from tolalloc.exceptions import InputError, SolveError
 class IdentificationProblem:
     """Half the sum of squares of all residuals over their noise, and of the coordinates over their prior deviation.
 
-    Parameters
-    ----------
-    parameters
-        The unknowns.
-    data
-        The readings.
-    predictor
-        What says what should have been read.
-    weight
-        How often each unit counts: 1, 0 for one that is left out, more in a bootstrap sample [-].
-    evenly
-        Whether the bounds count as knowledge: an even distribution between them, by its mean and variance.
-    place
-        Where the data were read, for errors.
-
     Notes
     -----
     liu2020, equations (15)–(16), with weights. Theory page, equation (38).
     """
 
-    parameters: tuple[Parameter, ...]
-    data: AllReadings
-    predictor: Predictor
+    parameters: tuple[Parameter, ...]  # The unknowns
+    data: AllReadings  # The readings
+    predictor: Predictor  # What says what should have been read
+    # How often each unit counts: 1, 0 for one that is left out, more in a bootstrap sample [-]
     weight: Float[np.ndarray, " unit"]
+    # Whether the bounds count as knowledge: an even distribution between them, by its mean and variance
     evenly: bool = False
-    place: str = "identify"
+    place: str = "identify"  # Where the data were read, for errors
     _root: Float[np.ndarray, " datum"] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -22,24 +22,12 @@ BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterProfile:
-    """How much worse the best fit gets as one parameter is held at each value between its bounds.
+    """How much worse the best fit gets as one parameter is held at each value between its bounds."""
 
-    Parameters
-    ----------
-    coordinate
-        Values at which it was held, bounds and ends of the interval included [-].
-    rise
-        Twice the rise of the objective above its least [-].
-    threshold
-        Rise at which the 95 % interval ends [-].
-    interval
-        Where the rise crosses the threshold to either side of the least, or the bound [-].
-    """
-
-    coordinate: Float[np.ndarray, " value"]
-    rise: Float[np.ndarray, " value"]
-    threshold: float
-    interval: tuple[float, float]
+    coordinate: Float[np.ndarray, " value"]  # Values at which it was held, bounds and ends of the interval included [-]
+    rise: Float[np.ndarray, " value"]  # Twice the rise of the objective above its least [-]
+    threshold: float  # Rise at which the 95 % interval ends [-]
+    interval: tuple[float, float]  # Where the rise crosses the threshold to either side of the least, or the bound [-]
 
     def widened(self, interval: Float[np.ndarray, " 2"]) -> ParameterProfile:
         """Return the profile with an interval that holds another one, cut at the bounds."""
@@ -152,31 +140,16 @@ def _crossing(fits: _HeldFits, values: Float[np.ndarray, " value"], threshold: f
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterEstimate:
-    """One parameter as the answer states it.
+    """One parameter as the answer states it."""
 
-    Parameters
-    ----------
-    parameter
-        Which one.
-    value
-        Most probable if the bounds count as an even distribution: next to the least objective where the data say much,
-        the middle of the bounds where they say nothing [as parameter].
-    uncertainty
-        Its standard uncertainty, of the logarithm but for the bias [-, arcsec].
-    interval
-        95 % profile interval [as parameter].
-    identified
-        Whether the interval keeps away from at least one bound.
-    on_bound
-        Whether the least objective stands on a bound.
-    """
-
-    parameter: Parameter
+    parameter: Parameter  # Which one
+    # Most probable if the bounds count as an even distribution: next to the least objective where the data say much,
+    # the middle of the bounds where they say nothing [as parameter]
     value: float
-    uncertainty: float
-    interval: tuple[float, float]
-    identified: bool
-    on_bound: bool
+    uncertainty: float  # Its standard uncertainty, of the logarithm but for the bias [-, arcsec]
+    interval: tuple[float, float]  # 95 % profile interval [as parameter]
+    identified: bool  # Whether the interval keeps away from at least one bound
+    on_bound: bool  # Whether the least objective stands on a bound
 
     @property
     def sentence(self) -> str:

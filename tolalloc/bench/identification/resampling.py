@@ -35,27 +35,13 @@ def bootstrap(
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterChoice:
-    """One choice of what is fitted, judged by the units that it has not seen.
+    """One choice of what is fitted, judged by the units that it has not seen."""
 
-    Parameters
-    ----------
-    parameters
-        What is fitted; nothing is the reducer as it was given.
-    left
-        Residual of every reading after the fit to all units [rad].
-    unseen
-        Residual of every reading after the fit to all units but its own [rad].
-    noise
-        Standard deviation of every reading [rad].
-    unit
-        Unit of every reading [-].
-    """
-
-    parameters: tuple[Parameter, ...]
-    left: Float[np.ndarray, " datum"]
-    unseen: Float[np.ndarray, " datum"]
-    noise: Float[np.ndarray, " datum"]
-    unit: Int[np.ndarray, " datum"]
+    parameters: tuple[Parameter, ...]  # What is fitted; nothing is the reducer as it was given
+    left: Float[np.ndarray, " datum"]  # Residual of every reading after the fit to all units [rad]
+    unseen: Float[np.ndarray, " datum"]  # Residual of every reading after the fit to all units but its own [rad]
+    noise: Float[np.ndarray, " datum"]  # Standard deviation of every reading [rad]
+    unit: Int[np.ndarray, " datum"]  # Unit of every reading [-]
 
     @property
     def name(self) -> str:

@@ -23,26 +23,14 @@ _DEGREES = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3}
 
 @dataclass(frozen=True)
 class StandIn:
-    """The readings as polynomials of the coordinates inside the bounds; the bias is added exactly.
+    """The readings as polynomials of the coordinates inside the bounds; the bias is added exactly."""
 
-    Parameters
-    ----------
-    parameters
-        The unknowns, in the order of the coordinates; those that the polynomial has and this lacks stay at their start.
-    fitted
-        Parameters of the polynomial.
-    polynomial
-        The fitted polynomial of all readings.
-    data
-        The readings.
-    offset
-        Added to every reading, so that they are the model's at one point; 0 unless `anchored` [rad].
-    """
-
+    # The unknowns, in the order of the coordinates; those that the polynomial has and this lacks stay at their start
     parameters: tuple[Parameter, ...]
-    fitted: tuple[Parameter, ...]
-    polynomial: BoxPolynomial
-    data: AllReadings
+    fitted: tuple[Parameter, ...]  # Parameters of the polynomial
+    polynomial: BoxPolynomial  # The fitted polynomial of all readings
+    data: AllReadings  # The readings
+    # Added to every reading, so that they are the model's at one point; 0 unless `anchored` [rad]
     offset: float | Float[np.ndarray, " datum"] = 0.0
 
     def of(self, parameters: tuple[Parameter, ...]) -> StandIn:

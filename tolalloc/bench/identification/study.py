@@ -34,24 +34,15 @@ STARTS = 8
 class IdentificationStudy:
     """What is to be identified.
 
-    Parameters
-    ----------
-    parameters
-        The unknowns.
-    seed
-        Seed of every random number [-].
-    data
-        Where the data were read, for errors.
-
     Raises
     ------
     InputError
         No unknown besides the bias, one of them twice, or a negative seed.
     """
 
-    parameters: tuple[Parameter, ...]
-    seed: int = 1
-    data: str = "measurements"
+    parameters: tuple[Parameter, ...]  # The unknowns
+    seed: int = 1  # Seed of every random number [-]
+    data: str = "measurements"  # Where the data were read, for errors
 
     def __post_init__(self) -> None:
         place = "tolalloc identify"

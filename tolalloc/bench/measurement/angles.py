@@ -96,7 +96,7 @@ def in_order(readings: RawReadings) -> tuple[RawReadings, str]:
     if count == 0:
         return readings, ""
     if count > BACKWARD_SHARE * steps.size or steps.min() < -1.01 * median:
-        # RawReadings that were turned round stand in the reverse order of the file.
+        # Readings that were turned round stand in the reverse order of the file.
         pairs = np.flatnonzero(back)
         rows = np.maximum(readings.row[pairs], readings.row[pairs + 1])
         row = int(rows.min())

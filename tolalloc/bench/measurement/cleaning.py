@@ -41,24 +41,13 @@ SAME_TORQUE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Cleaned:
-    """Clean readings.
+    """Clean readings."""
 
-    Parameters
-    ----------
-    along
-        Angles or torques, ascending [rad or N·m].
-    values
-        RawReadings without their mean [rad].
-    noise_factor
-        Standard deviation of one of these over that of a reading of the instrument, root mean square [-].
-    repairs
-        What was mended, a sentence each.
-    """
-
-    along: Float[np.ndarray, " reading"]
-    values: Float[np.ndarray, " reading"]
+    along: Float[np.ndarray, " reading"]  # Angles or torques, ascending [rad or N·m]
+    values: Float[np.ndarray, " reading"]  # Readings without their mean [rad]
+    # Standard deviation of one of these over that of a reading of the instrument, root mean square [-]
     noise_factor: float
-    repairs: tuple[str, ...]
+    repairs: tuple[str, ...]  # What was mended, a sentence each
 
 
 Step = Callable[[RawReadings], tuple[RawReadings, str]]
@@ -73,7 +62,7 @@ def clean_curve(readings: RawReadings, offset: float = 0.0, start_stop: float = 
     Raises
     ------
     InputError
-        RawReadings that cannot be mended without a guess.
+        Readings that cannot be mended without a guess.
     """
     readings, repairs = _in_turn(
         readings,
@@ -109,7 +98,7 @@ def clean_loop(readings: RawReadings) -> Cleaned:
     Raises
     ------
     InputError
-        RawReadings that cannot be mended without a guess.
+        Readings that cannot be mended without a guess.
     """
     readings, repairs = _in_turn(
         readings,

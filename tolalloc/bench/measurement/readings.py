@@ -1,4 +1,4 @@
-"""RawReadings of an instrument: two columns of a CSV file, units in its header, into arrays in SI units."""
+"""Readings of an instrument: two columns of a CSV file, units in its header, into arrays in SI units."""
 
 from __future__ import annotations
 
@@ -23,18 +23,10 @@ FEWEST = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """A column that a file may hold.
+    """A column that a file may hold."""
 
-    Parameters
-    ----------
-    name
-        Header without its unit.
-    units
-        Unit as written → factor to SI [-].
-    """
-
-    name: str
-    units: dict[str, float]
+    name: str  # Header without its unit
+    units: dict[str, float]  # Unit as written → factor to SI [-]
 
 
 _SMALL_ANGLES = {
@@ -54,33 +46,15 @@ TORQUE = Quantity(name="torque", units={"N·m": 1.0, "Nm": 1.0})
 
 @dataclass(frozen=True, kw_only=True)
 class RawReadings:
-    """RawReadings in the order of the file; not a number where the instrument gave none.
+    """Readings in the order of the file; not a number where the instrument gave none."""
 
-    Parameters
-    ----------
-    path
-        Where they were read.
-    header
-        Header of the column that they are taken along, as in the file.
-    factor
-        SI units per unit of that column [-].
-    row
-        Line of each reading as counted in the file [-].
-    along
-        Angle or torque at which each was taken [rad or N·m].
-    values
-        What the instrument showed [rad].
-    averaged
-        RawReadings that each value is the mean of [-].
-    """
-
-    path: Path
-    header: str
-    factor: float
-    row: Int[np.ndarray, " reading"]
-    along: Float[np.ndarray, " reading"]
-    values: Float[np.ndarray, " reading"]
-    averaged: Float[np.ndarray, " reading"]
+    path: Path  # Where they were read
+    header: str  # Header of the column that they are taken along, as in the file
+    factor: float  # SI units per unit of that column [-]
+    row: Int[np.ndarray, " reading"]  # Line of each reading as counted in the file [-]
+    along: Float[np.ndarray, " reading"]  # Angle or torque at which each was taken [rad or N·m]
+    values: Float[np.ndarray, " reading"]  # What the instrument showed [rad]
+    averaged: Float[np.ndarray, " reading"]  # Readings that each value is the mean of [-]
 
     def chosen(self, which: np.ndarray) -> RawReadings:
         """Return the readings that a mask or a list of positions names, in its order."""

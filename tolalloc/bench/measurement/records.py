@@ -12,108 +12,54 @@ from tolalloc.rv.reducer.unit_file import BuiltUnit
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredCurve:
-    """Transmission error of one unit over the output angle.
+    """Transmission error of one unit over the output angle."""
 
-    Parameters
-    ----------
-    unit
-        Position in `Measurements.units` [-].
-    torque
-        Torque on the carrier, negative against the rotation [N·m].
-    carrier_angle
-        Angles of the readings, ascending [rad].
-    transmission_error
-        RawReadings without their mean, output side [rad].
-    noise
-        Standard deviation of one reading as it stands here, None where the file does not state it [rad].
-    repairs
-        What was mended, prefixed by the file.
-    """
-
-    unit: int
-    torque: float
-    carrier_angle: Float[np.ndarray, " reading"]
-    transmission_error: Float[np.ndarray, " reading"]
+    unit: int  # Position in `Measurements.units` [-]
+    torque: float  # Torque on the carrier, negative against the rotation [N·m]
+    carrier_angle: Float[np.ndarray, " reading"]  # Angles of the readings, ascending [rad]
+    transmission_error: Float[np.ndarray, " reading"]  # Readings without their mean, output side [rad]
+    # Standard deviation of one reading as it stands here, None where the file does not state it [rad]
     noise: float | None = None
-    repairs: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()  # What was mended, prefixed by the file
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredLoop:
-    """Twist of the carrier of one unit against torque, the sun held.
+    """Twist of the carrier of one unit against torque, the sun held."""
 
-    Parameters
-    ----------
-    unit
-        Position in `Measurements.units` [-].
-    carrier_angle
-        Angle at which the loop was measured [rad].
-    torque
-        Torques on the carrier, ascending, none of them 0 [N·m].
-    twist
-        RawReadings without their mean, output side [rad].
-    noise, repairs
-        As of a curve [rad].
-    """
-
-    unit: int
-    carrier_angle: float
-    torque: Float[np.ndarray, " level"]
-    twist: Float[np.ndarray, " level"]
+    unit: int  # Position in `Measurements.units` [-]
+    carrier_angle: float  # Angle at which the loop was measured [rad]
+    torque: Float[np.ndarray, " level"]  # Torques on the carrier, ascending, none of them 0 [N·m]
+    twist: Float[np.ndarray, " level"]  # Readings without their mean, output side [rad]
+    # As of a curve [rad]
     noise: float | None = None
     repairs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredPeakToPeak:
-    """Largest minus smallest transmission error over one output turn, one value per unit.
+    """Largest minus smallest transmission error over one output turn, one value per unit."""
 
-    Parameters
-    ----------
-    unit
-        Positions in `Measurements.units` [-].
-    values
-        Peak-to-peaks, output side [rad].
-    torque
-        Torque on the carrier, negative against the rotation [N·m].
-    noise
-        Standard deviation of one value, None where the file does not state it [rad].
-    repairs
-        What was mended, prefixed by the file.
-    """
-
-    unit: Int[np.ndarray, " n"]
-    values: Float[np.ndarray, " n"]
-    torque: float
-    noise: float | None = None
-    repairs: tuple[str, ...] = ()
+    unit: Int[np.ndarray, " n"]  # Positions in `Measurements.units` [-]
+    values: Float[np.ndarray, " n"]  # Peak-to-peaks, output side [rad]
+    torque: float  # Torque on the carrier, negative against the rotation [N·m]
+    noise: float | None = None  # Standard deviation of one value, None where the file does not state it [rad]
+    repairs: tuple[str, ...] = ()  # What was mended, prefixed by the file
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measurements:
-    """Measured errors of the parts of some units, and what the finished units did.
+    """Measured errors of the parts of some units, and what the finished units did."""
 
-    Parameters
-    ----------
-    name, source
-        What was measured, and where.
-    units
-        Errors of the parts, unit by unit.
-    peak_to_peak
-        One value per unit, None where there is no such table.
-    curves, loops
-        Any number per unit.
-    assumptions
-        What was not measured.
-    """
-
+    # What was measured, and where
     name: str
     source: str
-    units: tuple[BuiltUnit, ...]
-    peak_to_peak: MeasuredPeakToPeak | None = None
+    units: tuple[BuiltUnit, ...]  # Errors of the parts, unit by unit
+    peak_to_peak: MeasuredPeakToPeak | None = None  # One value per unit, None where there is no such table
+    # Any number per unit
     curves: tuple[MeasuredCurve, ...] = ()
     loops: tuple[MeasuredLoop, ...] = ()
-    assumptions: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()  # What was not measured
 
     @property
     def repairs(self) -> tuple[str, ...]:

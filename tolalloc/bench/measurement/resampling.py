@@ -26,21 +26,12 @@ WRAPPED = 24
 
 @dataclass(frozen=True, kw_only=True)
 class Resampled:
-    """A curve on fewer angles.
+    """A curve on fewer angles."""
 
-    Parameters
-    ----------
-    angle
-        Angles, equally spaced but for gaps of the readings [rad].
-    values
-        Spline at the angles [rad].
-    noise_factor
-        Standard deviation of a value over that of a reading, root mean square; its square is near angles over
-        readings [-].
-    """
-
-    angle: Float[np.ndarray, " angle"]
-    values: Float[np.ndarray, " angle"]
+    angle: Float[np.ndarray, " angle"]  # Angles, equally spaced but for gaps of the readings [rad]
+    values: Float[np.ndarray, " angle"]  # Spline at the angles [rad]
+    # Standard deviation of a value over that of a reading, root mean square; its square is near angles over readings
+    # [-]
     noise_factor: float
 
 

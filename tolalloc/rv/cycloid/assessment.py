@@ -16,39 +16,17 @@ _ROUNDING = 1e-12  # difference of amounts that counts as none [m]
 
 @dataclass(frozen=True, kw_only=True)
 class Assessment:
-    """One modification under one torque.
+    """One modification under one torque."""
 
-    Parameters
-    ----------
-    reducer
-        The reducer, with the contact law in use.
-    torque
-        Torque on the carrier [N·m].
-    share
-        Share of it on the more loaded disc [-].
-    profile
-        The ground profile.
-    clearance
-        Clearance in use, linear or exact.
-    exact_clearance
-        Clearance by exact distances, to compare with.
-    linear
-        The more loaded disc by Li Lixing's linear method.
-    single
-        The more loaded disc by the contact law at every pin.
-    together
-        All discs turning by the same angle under the whole torque.
-    """
-
-    reducer: Reducer
-    torque: float
-    share: float
-    profile: ToothProfile
-    clearance: Clearance
-    exact_clearance: Clearance
-    linear: LoadedContact
-    single: LoadedContact
-    together: LoadedContact
+    reducer: Reducer  # The reducer, with the contact law in use
+    torque: float  # Torque on the carrier [N·m]
+    share: float  # Share of it on the more loaded disc [-]
+    profile: ToothProfile  # The ground profile
+    clearance: Clearance  # Clearance in use, linear or exact
+    exact_clearance: Clearance  # Clearance by exact distances, to compare with
+    linear: LoadedContact  # The more loaded disc by Li Lixing's linear method
+    single: LoadedContact  # The more loaded disc by the contact law at every pin
+    together: LoadedContact  # All discs turning by the same angle under the whole torque
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -112,34 +112,17 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
 
 @dataclass(frozen=True, kw_only=True)
 class Clearance:
-    """What a modification leaves between one flank and the pins.
+    """What a modification leaves between one flank and the pins."""
 
-    Parameters
-    ----------
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
-    before, after
-        Clearance of the centred disc, and after its rotation until the first pin touches [m].
-    formula
-        The same as ``after`` by Li Lixing's formula, which closes at φ0 [m].
-    rotation
-        Free rotation to one side, with a pin at every angle [rad].
-    first_contact
-        φ of the pin that touches first [rad].
-    radial
-        Clearance at tip and root, Δr_rp − Δr_p [m].
-    exact
-        Whether the distances are exact.
-    """
-
-    pin_angle: Float[np.ndarray, " angle"]
+    pin_angle: Float[np.ndarray, " angle"]  # Angle φ of the pins from the crank direction [rad]
+    # Clearance of the centred disc, and after its rotation until the first pin touches [m]
     before: Float[np.ndarray, " angle"]
     after: Float[np.ndarray, " angle"]
-    formula: Float[np.ndarray, " angle"]
-    rotation: float
-    first_contact: float
-    radial: float
-    exact: bool
+    formula: Float[np.ndarray, " angle"]  # The same as ``after`` by Li Lixing's formula, which closes at φ0 [m]
+    rotation: float  # Free rotation to one side, with a pin at every angle [rad]
+    first_contact: float  # φ of the pin that touches first [rad]
+    radial: float  # Clearance at tip and root, Δr_rp − Δr_p [m]
+    exact: bool  # Whether the distances are exact
 
     @property
     def backlash(self) -> float:

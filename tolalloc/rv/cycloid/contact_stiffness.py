@@ -19,18 +19,11 @@ APPROACH = 2.0 / 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class ContactStiffness:
-    """What `tolalloc.rv.cycloid.solvers.contact_law.pin_force` takes, pin by pin.
+    """What `tolalloc.rv.cycloid.solvers.contact_law.pin_force` takes, pin by pin."""
 
-    Parameters
-    ----------
-    stiffness
-        Of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m].
-    log_length
-        ln(λ/1 m) of the logarithmic law [-].
-    """
-
+    # Of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]
     stiffness: Float[np.ndarray, "*angles"]
-    log_length: Float[np.ndarray, "*angles"]
+    log_length: Float[np.ndarray, "*angles"]  # ln(λ/1 m) of the logarithmic law [-]
 
 
 def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> ContactStiffness:

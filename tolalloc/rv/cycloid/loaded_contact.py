@@ -24,41 +24,23 @@ _HALVINGS = 45  # from a quarter of a degree down to rounding
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedContact:
-    """Discs pressed against the pins, at phases that divide the pin pitch.
+    """Discs pressed against the pins, at phases that divide the pin pitch."""
 
-    Parameters
-    ----------
-    method
-        How it was found.
-    phase
-        Angle from the crank direction of disc 1 to the next pin [rad].
-    pin_angle
-        Angle φ of the pins from their disc's crank direction [rad].
-    gap
-        Clearance after the first contact, with a pin at every angle, before the load [m].
-    deflection
-        δ_max = r_d·rotation under the load, what a pin with the longest lever yields [m].
-    force, pressure, torque
-        Force and Hertz's peak pressure of every pin, torque of the pins on each disc [N, Pa, N·m].
-    zone
-        First and last angle at which a pin would carry; where two places touch first, pins between may be free [rad].
-    iterations
-        Steps of Li Lixing's iteration; 0 where a bracket was searched [-].
-    exact
-        Whether the clearances are exact distances.
-    """
-
-    method: str
-    phase: Float[np.ndarray, " phase"]
-    pin_angle: Float[np.ndarray, "phase disc pin"]
+    method: str  # How it was found
+    phase: Float[np.ndarray, " phase"]  # Angle from the crank direction of disc 1 to the next pin [rad]
+    pin_angle: Float[np.ndarray, "phase disc pin"]  # Angle φ of the pins from their disc's crank direction [rad]
+    # Clearance after the first contact, with a pin at every angle, before the load [m]
     gap: Float[np.ndarray, "phase disc pin"]
+    # δ_max = r_d·rotation under the load, what a pin with the longest lever yields [m]
     deflection: Float[np.ndarray, " phase"]
+    # Force and Hertz's peak pressure of every pin, torque of the pins on each disc [N, Pa, N·m]
     force: Float[np.ndarray, "phase disc pin"]
     pressure: Float[np.ndarray, "phase disc pin"]
     torque: Float[np.ndarray, "phase disc"]
+    # First and last angle at which a pin would carry; where two places touch first, pins between may be free [rad]
     zone: Float[np.ndarray, "phase 2"]
-    iterations: int
-    exact: bool
+    iterations: int  # Steps of Li Lixing's iteration; 0 where a bracket was searched [-]
+    exact: bool  # Whether the clearances are exact distances
 
     @property
     def pins_in_contact(self) -> Int[np.ndarray, "phase disc"]:
@@ -78,21 +60,12 @@ class LoadedContact:
 
 @dataclass(frozen=True, kw_only=True)
 class PressedDiscs:
-    """Discs of a reducer that share a torque, ready to be pressed against their pins.
+    """Discs of a reducer that share a torque, ready to be pressed against their pins."""
 
-    Parameters
-    ----------
-    reducer
-        Nominal design; its contact law, bending of the pins and modification are used.
-    torque, discs
-        Torque of the pins on all discs together; number of discs that share it [N·m, -].
-    exact
-        Whether clearances are exact distances; by default where the modification is too large for the formula.
-    """
-
-    reducer: Reducer
-    torque: float
-    discs: int = 1
+    reducer: Reducer  # Nominal design; its contact law, bending of the pins and modification are used
+    torque: float  # Torque of the pins on all discs together [N·m]
+    discs: int = 1  # Number of discs that share it [-]
+    # Whether clearances are exact distances; by default where the modification is too large for the formula
     exact: bool | None = None
 
     def __post_init__(self) -> None:

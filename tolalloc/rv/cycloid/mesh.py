@@ -16,23 +16,16 @@ Angles = Float[np.ndarray, "*angles"]
 
 @dataclass(frozen=True, kw_only=True)
 class Normals:
-    """Directions of the common normal, from the pin into the disc.
+    """Directions of the common normal, from the pin into the disc."""
 
-    Parameters
-    ----------
-    towards_crank, towards_tangent
-        cos a and sin a, components along the crank direction and across it [-].
-    along_radius, across_radius
-        cos κ and sin κ, components against the pin's own radius, inward, and across it [-].
-    lever
-        S = sin φ/√s, lever of the normal about the disc's centre over r_d; positive where the pin resists a
-        counter-clockwise rotation [-].
-    """
-
+    # cos a and sin a, components along the crank direction and across it [-]
     towards_crank: Angles
     towards_tangent: Angles
+    # cos κ and sin κ, components against the pin's own radius, inward, and across it [-]
     along_radius: Angles
     across_radius: Angles
+    # S = sin φ/√s, lever of the normal about the disc's centre over r_d; positive where the pin resists a
+    # counter-clockwise rotation [-]
     lever: Angles
 
 

@@ -18,24 +18,13 @@ _DENSE = 20_001  # angles of the dense tabulation that the points are chosen fro
 
 @dataclass(frozen=True, kw_only=True)
 class ProfilePoints:
-    """Points around a whole disc, clockwise, the first one not repeated.
+    """Points around a whole disc, clockwise, the first one not repeated."""
 
-    Parameters
-    ----------
-    per_tooth
-        Points of one tooth [-].
-    place
-        x and y [m].
-    angle
-        φ at each point, negative on the flank at the counter-clockwise side of its root [rad].
-    chord_error
-        Largest distance of the profile from the straight line between neighbouring points [m].
-    """
-
-    per_tooth: int
-    place: Float[np.ndarray, "point 2"]
+    per_tooth: int  # Points of one tooth [-]
+    place: Float[np.ndarray, "point 2"]  # x and y [m]
+    # φ at each point, negative on the flank at the counter-clockwise side of its root [rad]
     angle: Float[np.ndarray, " point"]
-    chord_error: float
+    chord_error: float  # Largest distance of the profile from the straight line between neighbouring points [m]
 
 
 def _flank_angles(profile: ToothProfile, count: int) -> Float[np.ndarray, " point"]:

@@ -21,16 +21,10 @@ class ToothProfile:
 
     The frame is the disc's: its centre, and the middle of a root at angle 0. The parameter φ is the angle of the pin
     that grinds the point: 0 at the root, π at the tip. Theory page equation (34).
-
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    modification
-        Tooth modification; none unless given.
     """
 
-    stage: CycloidStage
+    stage: CycloidStage  # Cycloid stage
+    # Tooth modification; none unless given
     modification: Modification = field(default_factory=lambda: Modification(equidistant=0.0, shift=0.0))
 
     @cached_property

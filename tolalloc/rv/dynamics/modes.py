@@ -21,24 +21,15 @@ from tolalloc.rv.equivalent.status import Status
 
 @dataclass(frozen=True, kw_only=True)
 class Modes:
-    """Undamped modes of one unit at carrier angles, by ascending frequency at every angle.
+    """Undamped modes of one unit at carrier angles, by ascending frequency at every angle."""
 
-    Parameters
-    ----------
-    carrier_angle
-        θc [rad].
-    frequency
-        Natural frequencies; the first is zero but for rounding where no pin carries [Hz].
-    shape
-        Change of every coordinate of `tolalloc.rv.equivalent.kinematics.Coordinates`, of any sign, such that every mode
-        has unit modal mass [1/√kg, rotations rad/√(kg·m²)].
-    carrier_share
-        Share of the carrier's rotation in the kinetic energy of each mode; over all modes they add up to 1 [-].
-    """
-
-    carrier_angle: Float[np.ndarray, " angle"]
+    carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
+    # Natural frequencies; the first is zero but for rounding where no pin carries [Hz]
     frequency: Float[np.ndarray, "angle mode"]
+    # Change of every coordinate of `tolalloc.rv.equivalent.kinematics.Coordinates`, of any sign, such that every mode
+    # has unit modal mass [1/√kg, rotations rad/√(kg·m²)]
     shape: Float[np.ndarray, "angle mode coordinate"]
+    # Share of the carrier's rotation in the kinetic energy of each mode; over all modes they add up to 1 [-]
     carrier_share: Float[np.ndarray, "angle mode"]
 
 

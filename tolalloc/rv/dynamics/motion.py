@@ -31,23 +31,15 @@ class _Piece(NamedTuple):
 class SpeedProfile:
     """A quantity over time: given at some times, blended in between, held before the first and after the last.
 
-    Parameters
-    ----------
-    times
-        Increasing times [s].
-    values
-        The quantity at these times [rad/s or N·m].
-    blend
-        ``linear``, or ``step`` for the cubic 3s² − 2s³ whose slope vanishes at both ends.
-
     Raises
     ------
     InputError
         Times that do not increase, or not one finite value for each.
     """
 
-    times: tuple[float, ...]
-    values: tuple[float, ...]
+    times: tuple[float, ...]  # Increasing times [s]
+    values: tuple[float, ...]  # The quantity at these times [rad/s or N·m]
+    # ``linear``, or ``step`` for the cubic 3s² − 2s³ whose slope vanishes at both ends
     blend: Literal["linear", "step"] = "linear"
 
     def __post_init__(self) -> None:
@@ -95,22 +87,14 @@ class SpeedProfile:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Nominal motion and load at equally spaced times.
+    """Nominal motion and load at equally spaced times."""
 
-    Parameters
-    ----------
-    time
-        Times, the first one 0 [s].
-    carrier_angle, carrier_speed, carrier_acceleration
-        θc and its derivatives [rad, rad/s, rad/s²].
-    torque
-        Torque on the carrier; negative resists the positive direction of rotation [N·m].
-    """
-
-    time: Float[np.ndarray, " time"]
+    time: Float[np.ndarray, " time"]  # Times, the first one 0 [s]
+    # θc and its derivatives [rad, rad/s, rad/s²]
     carrier_angle: Float[np.ndarray, " time"]
     carrier_speed: Float[np.ndarray, " time"]
     carrier_acceleration: Float[np.ndarray, " time"]
+    # Torque on the carrier; negative resists the positive direction of rotation [N·m]
     torque: Float[np.ndarray, " time"]
 
     @property

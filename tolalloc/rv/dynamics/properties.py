@@ -28,23 +28,18 @@ ASSUMPTIONS = (
 class Inertia:
     """Masses and moments of inertia of one part of each kind.
 
-    Parameters
-    ----------
-    sun, planet, disc, carrier
-        Masses; the planet's with its crankshaft [kg].
-    planet_moment, disc_moment, carrier_moment
-        Moments of inertia about their own axes; the carrier's with all that the output turns [kg·m²].
-
     Raises
     ------
     InputError
         A value that is not positive and finite.
     """
 
+    # Masses; the planet's with its crankshaft [kg]
     sun: float
     planet: float
     disc: float
     carrier: float
+    # Moments of inertia about their own axes; the carrier's with all that the output turns [kg·m²]
     planet_moment: float
     disc_moment: float
     carrier_moment: float
@@ -110,24 +105,16 @@ class Damping:
     A mode of angular frequency ω that strains one damped interface alone has the damping ratio
     mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
 
-    Parameters
-    ----------
-    mass_proportional
-        Damping per mass of every coordinate [1/s].
-    stiffness_proportional
-        Damping per stiffness of every interface without play [s].
-    interfaces
-        Further damping per stiffness of single interfaces, by their field of `tolalloc.rv.reducer.stiffness.Stiffness`
-        [s].
-
     Raises
     ------
     InputError
         A factor that is negative or not finite.
     """
 
-    mass_proportional: float = 0.0
-    stiffness_proportional: float = 0.0
+    mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
+    stiffness_proportional: float = 0.0  # Damping per stiffness of every interface without play [s]
+    # Further damping per stiffness of single interfaces, by their field of `tolalloc.rv.reducer.stiffness.Stiffness`
+    # [s]
     interfaces: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -161,20 +148,15 @@ class Integrator:
     The equations of motion hold exactly at every step:
     (1 − αm)·a' + αm·a = (1 − αf)·q̈' + αf·q̈, q' = q + h·q̇ + h²((½ − β)·a + β·a'), q̇' = q̇ + h((1 − γ)·a + γ·a').
 
-    Parameters
-    ----------
-    alpha_m, alpha_f
-        Weights of the old step's accelerations, algorithmic and true [-].
-    beta, gamma
-        Newmark's weights of the new acceleration in displacement and in velocity [-].
-
     References
     ----------
     Arnold, M. and Brüls, O. (2007), Multibody System Dynamics 18, 185–202.
     """
 
+    # Weights of the old step's accelerations, algorithmic and true [-]
     alpha_m: float
     alpha_f: float
+    # Newmark's weights of the new acceleration in displacement and in velocity [-]
     beta: float
     gamma: float
 

@@ -24,57 +24,35 @@ def _untold(share: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Observed:
-    """The whole state of every sample at chosen times.
+    """The whole state of every sample at chosen times."""
 
-    Parameters
-    ----------
-    time
-        These times [s].
-    displacement, velocity, acceleration
-        Deviations q from the nominal motion, in the order of `tolalloc.rv.equivalent.kinematics.Coordinates`, and their
-        derivatives [m, rad, and per s, per s²].
-    pin_forces
-        Normal force between every pin and every disc [N].
-    """
-
-    time: Float[np.ndarray, " observed"]
+    time: Float[np.ndarray, " observed"]  # These times [s]
+    # Deviations q from the nominal motion, in the order of `tolalloc.rv.equivalent.kinematics.Coordinates`, and their
+    # derivatives [m, rad, and per s, per s²]
     displacement: Float[np.ndarray, "sample observed coordinate"]
     velocity: Float[np.ndarray, "sample observed coordinate"]
     acceleration: Float[np.ndarray, "sample observed coordinate"]
-    pin_forces: Float[np.ndarray, "sample observed disc pin"]
+    pin_forces: Float[np.ndarray, "sample observed disc pin"]  # Normal force between every pin and every disc [N]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Simulated:
-    """Samples over time; from a step that found no equilibrium on, not a number and its status.
+    """Samples over time; from a step that found no equilibrium on, not a number and its status."""
 
-    Parameters
-    ----------
-    time, carrier_angle
-        Times and nominal carrier angles θc [s, rad].
-    transmission_error
-        Carrier rotation beyond θc, output side [rad].
-    output_speed, output_acceleration
-        Of the carrier, nominal motion included [rad/s, rad/s²].
-    input_torque
-        Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it
-        [N·m].
-    pins_in_contact, status, residual
-        Number of pins that carry load, `tolalloc.rv.equivalent.status.Status`, unbalanced over largest force [-].
-    observed
-        The whole state at the times asked for.
-    """
-
+    # Times and nominal carrier angles θc [s, rad]
     time: Float[np.ndarray, " time"]
     carrier_angle: Float[np.ndarray, " time"]
-    transmission_error: Float[np.ndarray, "sample time"]
+    transmission_error: Float[np.ndarray, "sample time"]  # Carrier rotation beyond θc, output side [rad]
+    # Of the carrier, nominal motion included [rad/s, rad/s²]
     output_speed: Float[np.ndarray, "sample time"]
     output_acceleration: Float[np.ndarray, "sample time"]
+    # Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it [N·m].
     input_torque: Float[np.ndarray, "sample time"]
+    # Number of pins that carry load, `tolalloc.rv.equivalent.status.Status`, unbalanced over largest force [-]
     pins_in_contact: UInt16[np.ndarray, "sample time disc"]
     status: UInt8[np.ndarray, "sample time"]
     residual: Float[np.ndarray, "sample time"]
-    observed: Observed
+    observed: Observed  # The whole state at the times asked for
 
 
 def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -> StepRecord:

@@ -19,42 +19,24 @@ from tolalloc.rv.equivalent.outputs import order_spectrum
 
 @dataclass(frozen=True, kw_only=True)
 class CriticalSpeed:
-    """Output speeds at which an order excites a mode.
+    """Output speeds at which an order excites a mode."""
 
-    Parameters
-    ----------
-    order
-        Waves per output turn [-].
-    mode
-        Number of the mode from the lowest frequency on, from 0 [-].
-    slowest, fastest
-        Output speeds between which the order meets the mode's frequency at some carrier angle [rad/s].
-    carrier_share
-        Share of the carrier's rotation in the mode's kinetic energy, mean over the angles [-].
-    """
-
-    order: int
-    mode: int
+    order: int  # Waves per output turn [-]
+    mode: int  # Number of the mode from the lowest frequency on, from 0 [-]
+    # Output speeds between which the order meets the mode's frequency at some carrier angle [rad/s]
     slowest: float
     fastest: float
-    carrier_share: float
+    carrier_share: float  # Share of the carrier's rotation in the mode's kinetic energy, mean over the angles [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Campbell:
-    """Natural frequencies against the orders that excite them.
+    """Natural frequencies against the orders that excite them."""
 
-    Parameters
-    ----------
-    lowest, highest
-        Frequency of every mode over the carrier angles [Hz].
-    critical
-        Critical speeds inside the range asked for, slowest first.
-    """
-
+    # Frequency of every mode over the carrier angles [Hz]
     lowest: Float[np.ndarray, " mode"]
     highest: Float[np.ndarray, " mode"]
-    critical: tuple[CriticalSpeed, ...]
+    critical: tuple[CriticalSpeed, ...]  # Critical speeds inside the range asked for, slowest first
 
 
 def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]) -> Campbell:
@@ -91,30 +73,16 @@ def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, 
 
 @dataclass(frozen=True, kw_only=True)
 class OrdersAgainstSpeed:
-    """Orders of the transmission error at constant output speeds; NaN where a step found no equilibrium.
+    """Orders of the transmission error at constant output speeds; NaN where a step found no equilibrium."""
 
-    Parameters
-    ----------
-    speed
-        Output speeds [rad/s].
-    order
-        Waves per output turn [-].
-    amplitude
-        Half the peak-to-peak of each wave over the last turn, output side [rad].
-    peak_to_peak
-        Peak-to-peak transmission error of the last turn [rad].
-    unsettled
-        Largest difference between the second halves of the last turn and of the one before it [rad].
-    status
-        Worst value of `tolalloc.rv.equivalent.status.Status` of all steps [-].
-    """
-
-    speed: Float[np.ndarray, " speed"]
-    order: Int[np.ndarray, " order"]
+    speed: Float[np.ndarray, " speed"]  # Output speeds [rad/s]
+    order: Int[np.ndarray, " order"]  # Waves per output turn [-]
+    # Half the peak-to-peak of each wave over the last turn, output side [rad]
     amplitude: Float[np.ndarray, "sample speed order"]
-    peak_to_peak: Float[np.ndarray, "sample speed"]
+    peak_to_peak: Float[np.ndarray, "sample speed"]  # Peak-to-peak transmission error of the last turn [rad]
+    # Largest difference between the second halves of the last turn and of the one before it [rad]
     unsettled: Float[np.ndarray, "sample speed"]
-    status: UInt8[np.ndarray, "sample speed"]
+    status: UInt8[np.ndarray, "sample speed"]  # Worst value of `tolalloc.rv.equivalent.status.Status` of all steps [-]
 
 
 def orders_against_speed(

@@ -27,35 +27,20 @@ _STEPS_AT_ONCE = 512
 
 
 class StepTables(NamedTuple):
-    """Tables of some successive steps, beside the condensed ones. All coordinates are lengths, as there.
+    """Tables of some successive steps, beside the condensed ones. All coordinates are lengths, as there."""
 
-    Parameters
-    ----------
-    stiffness, damping
-        Of the interfaces without play; of these and the masses [N/m, N·s/m].
-    by_retained
-        Change of all coordinates per change of the retained ones [m/m].
-    flexibility
-        Change of all coordinates per force at fixed retained ones [m/N].
-    rates
-        What a displacement beyond the predicted one adds to algorithmic acceleration, velocity and acceleration
-        [1/s², 1/s, 1/s²]; zero at the start, which is a static equilibrium.
-    acceleration
-        Nominal acceleration [m/s²].
-    torque
-        Torque on the carrier [N·m].
-    drive_by_coordinate, drive_by_velocity, drive_by_load
-        Torque of the meshes without play on the sun, against its rotation, per coordinate, velocity and value
-        [N, N·s, N].
-    """
-
-    stiffness: Float[np.ndarray, "step coordinate coordinate"]
-    damping: Float[np.ndarray, "step coordinate coordinate"]
+    stiffness: Float[np.ndarray, "step coordinate coordinate"]  # Of the interfaces without play [N/m]
+    damping: Float[np.ndarray, "step coordinate coordinate"]  # Of these and the masses [N·s/m]
+    # Change of all coordinates per change of the retained ones [m/m]
     by_retained: Float[np.ndarray, "step coordinate retained"]
+    # Change of all coordinates per force at fixed retained ones [m/N]
     flexibility: Float[np.ndarray, "step coordinate coordinate"]
+    # What a displacement beyond the predicted one adds to algorithmic acceleration, velocity and acceleration [1/s²,
+    # 1/s, 1/s²]; zero at the start, which is a static equilibrium
     rates: Float[np.ndarray, "step 3"]
-    acceleration: Float[np.ndarray, "step coordinate"]
-    torque: Float[np.ndarray, " step"]
+    acceleration: Float[np.ndarray, "step coordinate"]  # Nominal acceleration [m/s²]
+    torque: Float[np.ndarray, " step"]  # Torque on the carrier [N·m]
+    # Torque of the meshes without play on the sun, against its rotation, per coordinate, velocity and value [N, N·s, N]
     drive_by_coordinate: Float[np.ndarray, "step coordinate"]
     drive_by_velocity: Float[np.ndarray, "step coordinate"]
     drive_by_load: Float[np.ndarray, "step load"]
@@ -65,17 +50,13 @@ class StepTables(NamedTuple):
 class Steps:
     """Everything but the samples of a simulation.
 
-    Parameters
-    ----------
-    model, motion, inertia, damping, integrator
-        As in `tolalloc.rv.dynamics.simulation.simulate`; numbers in SI units [-].
-
     Raises
     ------
     InputError
         Damping of an interface that is not there or has play.
     """
 
+    # As in `tolalloc.rv.dynamics.simulation.simulate`; numbers in SI units [-]
     model: EquivalentModel
     motion: Motion
     inertia: Inertia

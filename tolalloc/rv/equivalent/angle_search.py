@@ -20,23 +20,12 @@ class AngleSearch:
 
     With the defaults the peak-to-peak of 99 % of random RV-20E units lies within 0.05″ of the finest search;
     `tests/verification/test_extremes.py` measures it.
-
-    Parameters
-    ----------
-    coarse
-        Equally spaced angles of the turn at which every sample is solved [-].
-    nodes_per_coarse
-        Tabulated angles per coarse one; between them the tables are interpolated [-].
-    levels
-        Halvings of the coarse step around a candidate [-].
-    safety
-        A candidate is followed while this many times its flank's rise could make it the extreme [-].
     """
 
-    coarse: int = 936
-    nodes_per_coarse: int = 4
-    levels: int = 10
-    safety: float = 1.5
+    coarse: int = 936  # Equally spaced angles of the turn at which every sample is solved [-]
+    nodes_per_coarse: int = 4  # Tabulated angles per coarse one; between them the tables are interpolated [-]
+    levels: int = 10  # Halvings of the coarse step around a candidate [-]
+    safety: float = 1.5  # A candidate is followed while this many times its flank's rise could make it the extreme [-]
 
     @property
     def halving(self) -> Halving:

@@ -14,61 +14,33 @@ from tolalloc.rv.reducer.design import Reducer
 
 @dataclass(frozen=True, kw_only=True)
 class Equilibria:
-    """Equilibria of samples at carrier angles: what every output is read from.
+    """Equilibria of samples at carrier angles: what every output is read from."""
 
-    Parameters
-    ----------
-    reducer, columns, tables
-        The nominal design, its error columns and the values that they move, its condensed tables at the angles.
-    errors
-        Deviations in the order of the model's columns [m, angles rad].
-    torque, carrier_angle
-        Torque on the carrier; θc [N·m, rad].
-    transmission_error
-        Carrier rotation beyond θc, output side [rad].
-    retained
-        Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m].
-    status
-        Values of `tolalloc.rv.equivalent.status.Status` [-].
-    residual
-        Largest component of the unbalanced force over the largest force [-].
-    pins_in_contact
-        Number of pins that carry load, all discs [-].
-    """
-
+    # The nominal design, its error columns and the values that they move, its condensed tables at the angles
     reducer: Reducer
     columns: Columns
     tables: CondensedAngles
-    errors: Float[np.ndarray, "sample column"]
-    torque: float
-    carrier_angle: Float[np.ndarray, " angle"]
-    transmission_error: Float[np.ndarray, "sample angle"]
+    errors: Float[np.ndarray, "sample column"]  # Deviations in the order of the model's columns [m, angles rad]
+    torque: float  # Torque on the carrier [N·m]
+    carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
+    transmission_error: Float[np.ndarray, "sample angle"]  # Carrier rotation beyond θc, output side [rad]
+    # Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m]
     retained: Float[np.ndarray, "sample angle coordinate"]
-    status: UInt8[np.ndarray, "sample angle"]
-    residual: Float[np.ndarray, "sample angle"]
-    pins_in_contact: UInt16[np.ndarray, "sample angle"]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.rv.equivalent.status.Status` [-]
+    residual: Float[np.ndarray, "sample angle"]  # Largest component of the unbalanced force over the largest force [-]
+    pins_in_contact: UInt16[np.ndarray, "sample angle"]  # Number of pins that carry load, all discs [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """Largest and smallest transmission error of each sample over one output turn.
+    """Largest and smallest transmission error of each sample over one output turn."""
 
-    Parameters
-    ----------
-    largest, smallest
-        Extremes of the transmission error, output side [rad].
-    carrier_angle
-        Where they occur [rad].
-    remaining
-        What still finer angles may add to the peak-to-peak, an estimate [rad].
-    solves, status, residual
-        Equilibria solved; worst status and largest residual over the largest force of the sample's angles [-].
-    """
-
+    # Extremes of the transmission error, output side [rad]
     largest: Float[np.ndarray, " sample"]
     smallest: Float[np.ndarray, " sample"]
-    carrier_angle: Float[np.ndarray, "sample 2"]
-    remaining: Float[np.ndarray, " sample"]
+    carrier_angle: Float[np.ndarray, "sample 2"]  # Where they occur [rad]
+    remaining: Float[np.ndarray, " sample"]  # What still finer angles may add to the peak-to-peak, an estimate [rad]
+    # Equilibria solved; worst status and largest residual over the largest force of the sample's angles [-]
     solves: Int[np.ndarray, " sample"]
     status: UInt8[np.ndarray, " sample"]
     residual: Float[np.ndarray, " sample"]
@@ -81,19 +53,11 @@ class Extremes:
 
 @dataclass(frozen=True, kw_only=True)
 class Derivatives:
-    """Exact derivatives of an output, sample by sample or angle by angle.
+    """Exact derivatives of an output, sample by sample or angle by angle."""
 
-    Parameters
-    ----------
-    by_error, by_torque
-        By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)].
-    by_stiffness
-        By the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [rad].
-    status
-        Worst status of the equilibria behind them [-].
-    """
-
+    # By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)]
     by_error: Float[np.ndarray, "item column"]
     by_torque: Float[np.ndarray, " item"]
+    # By the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [rad]
     by_stiffness: dict[str, Float[np.ndarray, " item"]]
-    status: UInt8[np.ndarray, " item"]
+    status: UInt8[np.ndarray, " item"]  # Worst status of the equilibria behind them [-]

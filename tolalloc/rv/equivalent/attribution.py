@@ -17,28 +17,16 @@ TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the 
 
 @dataclass(frozen=True, kw_only=True)
 class Attribution:
-    """A curve of transmission error as a sum over sources.
+    """A curve of transmission error as a sum over sources."""
 
-    Parameters
-    ----------
-    sources
-        Names of the sources that contribute, the torque and the nominal clearances among them.
-    contribution
-        What each adds to the transmission error at each angle; their sum is the curve [rad].
-    order
-        Waves per output turn [-].
-    share
-        What each adds to the amplitude of each order: its wave's component along the whole wave, negative where it
-        cancels; the sum is the amplitude [rad].
-    amplitude
-        Amplitude of each order of the whole curve [rad].
-    """
-
-    sources: tuple[str, ...]
+    sources: tuple[str, ...]  # Names of the sources that contribute, the torque and the nominal clearances among them
+    # What each adds to the transmission error at each angle; their sum is the curve [rad]
     contribution: Float[np.ndarray, "source angle"]
-    order: Int[np.ndarray, " order"]
+    order: Int[np.ndarray, " order"]  # Waves per output turn [-]
+    # What each adds to the amplitude of each order: its wave's component along the whole wave, negative where it
+    # cancels; the sum is the amplitude [rad]
     share: Float[np.ndarray, "source order"]
-    amplitude: Float[np.ndarray, " order"]
+    amplitude: Float[np.ndarray, " order"]  # Amplitude of each order of the whole curve [rad]
 
 
 def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> Attribution:

@@ -27,67 +27,39 @@ def source_name(column: str) -> str:
 
 
 class Layout(NamedTuple):
-    """First value of each block; the columns of the spring rows come first, one value each.
+    """First value of each block; the columns of the spring rows come first, one value each."""
 
-    Parameters
-    ----------
-    torque, clearance
-        Torque on the carrier, behind the spring rows' columns; clearance of every element with play [-].
-    pin
-        Radial, tangential and radius deviation of every pin [-].
-    wave, tooth, tilt
-        Of each disc: harmonic amplitudes of pitch, then run-out; pitch, then run-out of single teeth; tilt x, y [-].
-    end
-        Number of values [-].
-    pins, waves, teeth
-        Pins, harmonic amplitudes and teeth of one disc [-].
-    """
-
-    torque: int
-    clearance: int
-    pin: int
-    wave: int
-    tooth: int
-    tilt: int
-    end: int
+    torque: int  # Torque on the carrier, behind the spring rows' columns [-]
+    clearance: int  # Clearance of every element with play [-]
+    pin: int  # Radial, tangential and radius deviation of every pin [-]
+    wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out [-]
+    tooth: int  # Pitch, then run-out of single teeth [-]
+    tilt: int  # Tilt x, y [-]
+    end: int  # Number of values [-]
+    # Pins, harmonic amplitudes and teeth of one disc [-]
     pins: int
     waves: int
     teeth: int
 
 
 class ColumnMap(NamedTuple):
-    """Values as a sparse linear map of the columns: value = nominal + Σ factor·column.
+    """Values as a sparse linear map of the columns: value = nominal + Σ factor·column."""
 
-    Parameters
-    ----------
-    value, column, factor
-        One entry per pair of value and column that it depends on [-].
-    nominal
-        Values of the perfect unit: nominal clearances [m].
-    """
-
+    # One entry per pair of value and column that it depends on [-]
     value: Int[np.ndarray, " entry"]
     column: Int[np.ndarray, " entry"]
     factor: Float[np.ndarray, " entry"]
-    nominal: Float[np.ndarray, " value"]
+    nominal: Float[np.ndarray, " value"]  # Values of the perfect unit: nominal clearances [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """All error columns of a reducer, and where they act.
+    """All error columns of a reducer, and where they act."""
 
-    Parameters
-    ----------
-    names, layout, map
-        Columns in the order of X; blocks of the values; from columns to values.
-    rows_of_stiffness
-        Field of `tolalloc.rv.reducer.stiffness.Stiffness` → its bilateral rows, or its elements with play
-        behind them [-].
-    """
-
-    names: tuple[str, ...]
-    layout: Layout
-    map: ColumnMap
+    names: tuple[str, ...]  # Columns in the order of X
+    layout: Layout  # Blocks of the values
+    map: ColumnMap  # From columns to values
+    # Field of `tolalloc.rv.reducer.stiffness.Stiffness` → its bilateral rows, or its elements with play behind them [-]
     rows_of_stiffness: dict[str, slice]
 
     @cached_property

@@ -31,55 +31,32 @@ _ANGLES_AT_ONCE = 512
 
 
 class CondensedAngles(NamedTuple):
-    """What the contact solvers need at each angle. Retained coordinates are lengths, the discs' (x, y, r_d·θ) first.
+    """What the contact solvers need at each angle. Retained coordinates are lengths, the discs' (x, y, r_d·θ) first."""
 
-    Parameters
-    ----------
-    stiffness
-        Condensed stiffness of the retained coordinates, one zero eigenvalue [N/m].
-    load
-        Force on them per value of the spring rows and, last, per torque [N/m, last N/(N·m)].
-    carrier_by_retained
-        Carrier rotation per retained coordinate [rad/m].
-    carrier_by_load
-        Carrier rotation at fixed retained coordinates per value and, last, per torque [rad/m, last rad/(N·m)].
-    row_by_retained, row_by_load
-        Compression of every bilateral row per retained coordinate; per value and torque [m/m, last m/(N·m)].
-    row_stiffness
-        Stiffness of the bilateral rows [N/m].
-    play_by_retained, play_by_load
-        Compression x, y of every element with play, as for the rows [m/m].
-    play_stiffness
-        Stiffness of the elements with play [N/m].
-    contact_by_disc
-        Pin compression per displacement of its disc [m/m].
-    contact_by_error
-        Pin compression per deviation: pin radial and tangential, harmonic amplitudes of the disc's pitch and run-out,
-        pitch and run-out of the tooth met [m/m].
-    tooth
-        Number of the tooth that each pin meets [-].
-    contact_stiffness, contact_log_length
-        Stiffness of each pin contact [N/m] and L of the logarithmic law [m].
-    turn
-        Cosine and sine of the carrier angle [-].
-    """
-
+    # Condensed stiffness of the retained coordinates, one zero eigenvalue [N/m]
     stiffness: Float[np.ndarray, "angle retained retained"]
+    # Force on them per value of the spring rows and, last, per torque [N/m, last N/(N·m)]
     load: Float[np.ndarray, "angle load retained"]
-    carrier_by_retained: Float[np.ndarray, "angle retained"]
+    carrier_by_retained: Float[np.ndarray, "angle retained"]  # Carrier rotation per retained coordinate [rad/m]
+    # Carrier rotation at fixed retained coordinates per value and, last, per torque [rad/m, last rad/(N·m)]
     carrier_by_load: Float[np.ndarray, "angle load"]
+    # Compression of every bilateral row per retained coordinate [m/m]
     row_by_retained: Float[np.ndarray, "angle row retained"]
-    row_by_load: Float[np.ndarray, "angle row load"]
-    row_stiffness: Float[np.ndarray, "angle row"]
+    row_by_load: Float[np.ndarray, "angle row load"]  # Per value and torque [last m/(N·m)]
+    row_stiffness: Float[np.ndarray, "angle row"]  # Stiffness of the bilateral rows [N/m]
+    # Compression x, y of every element with play, as for the rows [m/m]
     play_by_retained: Float[np.ndarray, "angle element 2 retained"]
     play_by_load: Float[np.ndarray, "angle element 2 load"]
-    play_stiffness: Float[np.ndarray, "angle element"]
-    contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]
+    play_stiffness: Float[np.ndarray, "angle element"]  # Stiffness of the elements with play [N/m]
+    contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]  # Pin compression per displacement of its disc [m/m]
+    # Pin compression per deviation: pin radial and tangential, harmonic amplitudes of the disc's pitch and run-out,
+    # pitch and run-out of the tooth met [m/m]
     contact_by_error: Float[np.ndarray, "angle disc deviation pin"]
-    tooth: Int[np.ndarray, "angle disc pin"]
+    tooth: Int[np.ndarray, "angle disc pin"]  # Number of the tooth that each pin meets [-]
+    # Stiffness of each pin contact [N/m] and L of the logarithmic law [m]
     contact_stiffness: Float[np.ndarray, "angle contact"]
     contact_log_length: Float[np.ndarray, "angle contact"]
-    turn: Float[np.ndarray, "angle 2"]
+    turn: Float[np.ndarray, "angle 2"]  # Cosine and sine of the carrier angle [-]
 
 
 def bilateral_groups(at: Positions) -> list[SpringGroup]:

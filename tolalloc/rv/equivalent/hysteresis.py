@@ -24,18 +24,10 @@ LOOP_ANGLES = 2.0 * np.pi * np.arange(180) / 180
 
 @dataclass(frozen=True, kw_only=True)
 class HysteresisLoop:
-    """Twist of the carrier against torque, the sun held.
+    """Twist of the carrier against torque, the sun held."""
 
-    Parameters
-    ----------
-    torque
-        Torques on the carrier, ascending and symmetrical about 0 [N·m].
-    twist
-        Transmission error at each torque, output side [rad].
-    """
-
-    torque: Float[np.ndarray, " level"]
-    twist: Float[np.ndarray, "sample level angle"]
+    torque: Float[np.ndarray, " level"]  # Torques on the carrier, ascending and symmetrical about 0 [N·m]
+    twist: Float[np.ndarray, "sample level angle"]  # Transmission error at each torque, output side [rad]
 
     def _at(self, torque: float) -> Float[np.ndarray, "sample angle"]:
         return self.twist[:, int(np.argmin(np.abs(self.torque - torque)))]

@@ -50,19 +50,11 @@ class Positions:
     """Directions of all parts of a reducer at the given carrier angles.
 
     Theory page, equations (1)–(4). Counts start at 0 here and at 1 in names.
-
-    Parameters
-    ----------
-    reducer
-        The nominal design.
-    carrier_angle
-        θc, counter-clockwise positive; one output turn is 0 … 2π [rad].
-    orders
-        Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
     """
 
-    reducer: Reducer
-    carrier_angle: Float[np.ndarray, " angle"]
+    reducer: Reducer  # The nominal design
+    carrier_angle: Float[np.ndarray, " angle"]  # θc, counter-clockwise positive; one output turn is 0 … 2π [rad]
+    # Orders of the harmonic deviations of pitch and run-out, per turn of their part [-]
     orders: tuple[int, ...] = HARMONICS
 
     @cached_property

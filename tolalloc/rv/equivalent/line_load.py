@@ -22,21 +22,13 @@ class LineContact:
 
     What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
     stiffness and `deformation` mean nothing.
-
-    Parameters
-    ----------
-    force, stiffness
-        Normal force; stiffness of the whole width, bending of the pin included [N, N/m].
-    slope
-        By how much the tooth lies deeper in the pin per length along the width [rad].
-    face_width
-        Width b of the tooth [m].
     """
 
-    force: Float[np.ndarray, "*contacts"]
-    stiffness: Float[np.ndarray, "*contacts"]
+    force: Float[np.ndarray, "*contacts"]  # Normal force [N]
+    stiffness: Float[np.ndarray, "*contacts"]  # Stiffness of the whole width, bending of the pin included [N/m]
+    # By how much the tooth lies deeper in the pin per length along the width [rad]
     slope: Float[np.ndarray, "*contacts"]
-    face_width: float
+    face_width: float  # Width b of the tooth [m]
 
     @property
     def peak(self) -> Float[np.ndarray, "*contacts"]:
@@ -98,27 +90,15 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
 
 @dataclass(frozen=True, kw_only=True)
 class ContactPattern:
-    """Load of one disc on its pins at one carrier angle.
+    """Load of one disc on its pins at one carrier angle."""
 
-    Parameters
-    ----------
-    disc, carrier_angle
-        Number of the disc, 1 for the first; θc [-, rad].
-    position
-        Places along the width, 0 in the middle of the tooth [m].
-    force, deformation
-        Normal force of every pin; its largest compression along the width, 0 without contact [N, m].
-    line_load, pressure
-        Along the width of every pin [N/m]; Hertz's peak pressure there [Pa].
-    """
-
-    disc: int
-    carrier_angle: float
-    position: Float[np.ndarray, " position"]
-    force: Float[np.ndarray, " pin"]
-    deformation: Float[np.ndarray, " pin"]
-    line_load: Float[np.ndarray, "pin position"]
-    pressure: Float[np.ndarray, "pin position"]
+    disc: int  # Number of the disc, 1 for the first [-]
+    carrier_angle: float  # θc [rad]
+    position: Float[np.ndarray, " position"]  # Places along the width, 0 in the middle of the tooth [m]
+    force: Float[np.ndarray, " pin"]  # Normal force of every pin [N]
+    deformation: Float[np.ndarray, " pin"]  # Its largest compression along the width, 0 without contact [m]
+    line_load: Float[np.ndarray, "pin position"]  # Along the width of every pin [N/m]
+    pressure: Float[np.ndarray, "pin position"]  # Hertz's peak pressure there [Pa]
 
 
 def contact_pattern(

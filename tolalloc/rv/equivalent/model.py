@@ -37,23 +37,15 @@ class EquivalentModel:
     Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
     rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
 
-    Parameters
-    ----------
-    reducer
-        Nominal design, stiffness and load.
-    search
-        At which angles the extremes are looked for.
-    orders
-        Orders of the harmonic deviations of pitch and run-out, per turn of their part [-].
-
     Raises
     ------
     InputError
         The reducer's teeth have a rotation modification, which no column of the model can stand for.
     """
 
-    reducer: Reducer
-    search: AngleSearch = field(default_factory=AngleSearch)
+    reducer: Reducer  # Nominal design, stiffness and load
+    search: AngleSearch = field(default_factory=AngleSearch)  # At which angles the extremes are looked for
+    # Orders of the harmonic deviations of pitch and run-out, per turn of their part [-]
     orders: tuple[int, ...] = HARMONICS
 
     def __post_init__(self) -> None:

@@ -18,24 +18,13 @@ SINGLE = ("gear_mesh",)
 
 @dataclass(frozen=True, kw_only=True)
 class Forces:
-    """Forces on the downstream part, positive where the interface is compressed; NaN where nothing converged.
+    """Forces on the downstream part, positive where the interface is compressed; NaN where nothing converged."""
 
-    Parameters
-    ----------
-    pins
-        Normal force between every pin and every disc [N].
-    rows
-        Force of every bilateral spring [N].
-    elements
-        Force x, y of every element with play; a mesh has x only [N].
-    rows_of_stiffness
-        As in `tolalloc.rv.equivalent.columns.Columns` [-].
-    """
-
-    pins: Float[np.ndarray, "sample angle disc pin"]
-    rows: Float[np.ndarray, "sample angle row"]
+    pins: Float[np.ndarray, "sample angle disc pin"]  # Normal force between every pin and every disc [N]
+    rows: Float[np.ndarray, "sample angle row"]  # Force of every bilateral spring [N]
+    # Force x, y of every element with play; a mesh has x only [N]
     elements: Float[np.ndarray, "sample angle element 2"]
-    rows_of_stiffness: dict[str, slice]
+    rows_of_stiffness: dict[str, slice]  # As in `tolalloc.rv.equivalent.columns.Columns` [-]
 
     def of(self, interface: str) -> Float[np.ndarray, "sample angle element"]:
         """Return the magnitude of the force in each element of an interface, named as in `Stiffness` [N]."""
@@ -78,21 +67,11 @@ def forces(equilibria: Equilibria) -> Forces:
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
-    """Waves of the transmission error per output turn.
+    """Waves of the transmission error per output turn."""
 
-    Parameters
-    ----------
-    order
-        Waves per output turn [-].
-    amplitude
-        Half the peak-to-peak of each wave, output side [rad].
-    phase
-        Angle by which the wave, written as a cosine, leads [rad].
-    """
-
-    order: Int[np.ndarray, " order"]
-    amplitude: Float[np.ndarray, "sample order"]
-    phase: Float[np.ndarray, "sample order"]
+    order: Int[np.ndarray, " order"]  # Waves per output turn [-]
+    amplitude: Float[np.ndarray, "sample order"]  # Half the peak-to-peak of each wave, output side [rad]
+    phase: Float[np.ndarray, "sample order"]  # Angle by which the wave, written as a cosine, leads [rad]
 
     def main(self, count: int, sample: int = 0) -> list[tuple[int, float, float]]:
         """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first."""
@@ -116,18 +95,10 @@ def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row ord
 
 @dataclass(frozen=True, kw_only=True)
 class Solved:
-    """One solve over a turn, with what several outputs need.
+    """One solve over a turn, with what several outputs need."""
 
-    Parameters
-    ----------
-    equilibria
-        Equilibria of all samples over one turn.
-    forces
-        Forces in them.
-    """
-
-    equilibria: Equilibria
-    forces: Forces
+    equilibria: Equilibria  # Equilibria of all samples over one turn
+    forces: Forces  # Forces in them
 
     @classmethod
     def of(cls, equilibria: Equilibria) -> Solved:
@@ -137,19 +108,12 @@ class Solved:
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """A number per sample.
+    """A number per sample."""
 
-    Parameters
-    ----------
-    name, unit
-        What it is, and its unit of measurement.
-    value
-        From a solve, the number of each sample.
-    """
-
+    # What it is, and its unit of measurement
     name: str
     unit: str
-    value: Callable[[Solved], Float[np.ndarray, " sample"]]
+    value: Callable[[Solved], Float[np.ndarray, " sample"]]  # From a solve, the number of each sample
 
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:

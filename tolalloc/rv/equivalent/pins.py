@@ -19,32 +19,19 @@ Terms = dict[str, list[tuple[int, float]]]
 
 @dataclass(frozen=True, kw_only=True)
 class PinContact:
-    """Contact of every disc with every pin at a batch of carrier angles; compression is minus the gap.
+    """Contact of every disc with every pin at a batch of carrier angles; compression is minus the gap."""
 
-    Parameters
-    ----------
-    by_disc
-        Compression per displacement x, y and rotation of the disc [m/m, m/m, m/rad].
-    by_pin
-        Compression per radial and tangential deviation of the pin's place [m/m].
-    by_tooth
-        Compression per pitch and run-out deviation of the tooth that the pin meets [m/m].
-    tooth
-        Which tooth that is, counted from 0 at the disc's zero direction [-].
-    tooth_angle
-        θ_b, where on the disc the contact is, in the disc's own frame [rad].
-    stiffness
-        Contact stiffness of the pin at this tooth [N/m].
-    log_length
-        ln(λ/1 m) of the logarithmic law, `tolalloc.rv.cycloid.contact_stiffness.contact_stiffness` [-].
-    """
-
+    # Compression per displacement x, y and rotation of the disc [m/m, m/m, m/rad]
     by_disc: Float[np.ndarray, "angle disc 3 pin"]
+    # Compression per radial and tangential deviation of the pin's place [m/m]
     by_pin: Float[np.ndarray, "angle disc 2 pin"]
+    # Compression per pitch and run-out deviation of the tooth that the pin meets [m/m]
     by_tooth: Float[np.ndarray, "angle disc 2 pin"]
-    tooth: Int[np.ndarray, "angle disc pin"]
+    tooth: Int[np.ndarray, "angle disc pin"]  # Which tooth that is, counted from 0 at the disc's zero direction [-]
+    # θ_b, where on the disc the contact is, in the disc's own frame [rad]
     tooth_angle: Float[np.ndarray, "angle disc pin"]
-    stiffness: Float[np.ndarray, "angle disc pin"]
+    stiffness: Float[np.ndarray, "angle disc pin"]  # Contact stiffness of the pin at this tooth [N/m]
+    # ln(λ/1 m) of the logarithmic law, `tolalloc.rv.cycloid.contact_stiffness.contact_stiffness` [-]
     log_length: Float[np.ndarray, "angle disc pin"]
 
 

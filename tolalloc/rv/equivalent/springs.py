@@ -15,39 +15,20 @@ class SpringGroup:
 
     The energy is ½Σk·δ², with δ₊ for unilateral rows and (|δ| − c)₊ for elements with play, theory page equations (5)
     and (28): convex in every case, so the stiffness matrix is symmetric by construction.
-
-    Parameters
-    ----------
-    name
-        What the springs stand for.
-    stiffness_name
-        Field of `tolalloc.rv.reducer.stiffness.Stiffness` that gives their stiffness.
-    displacement
-        a, compression per coordinate [m/m or m/rad].
-    error
-        b, compression per error column [m/m].
-    columns
-        Names of the error columns, each declared in exactly one group.
-    stiffness
-        Spring stiffness [N/m].
-    contact
-        ``bilateral`` springs push and pull, ``unilateral`` ones only push, ``play`` ones push and pull beyond
-        their clearance.
-    clearance
-        Nominal clearance c of every element of a ``play`` group [m].
-    clearance_columns
-        Names of the deviations of each element's clearance; an element is as many successive rows as make the
-        group even: one row of a mesh, two of a bearing.
     """
 
-    name: str
-    stiffness_name: str
-    displacement: Float[np.ndarray, "angle row coordinate"]
-    error: Float[np.ndarray, "angle row column"]
-    columns: tuple[str, ...]
-    stiffness: Float[np.ndarray, "angle row"]
+    name: str  # What the springs stand for
+    stiffness_name: str  # Field of `tolalloc.rv.reducer.stiffness.Stiffness` that gives their stiffness
+    displacement: Float[np.ndarray, "angle row coordinate"]  # a, compression per coordinate [m/m or m/rad]
+    error: Float[np.ndarray, "angle row column"]  # b, compression per error column [m/m]
+    columns: tuple[str, ...]  # Names of the error columns, each declared in exactly one group
+    stiffness: Float[np.ndarray, "angle row"]  # Spring stiffness [N/m]
+    # ``bilateral`` springs push and pull, ``unilateral`` ones only push, ``play`` ones push and pull beyond their
+    # clearance
     contact: Literal["bilateral", "unilateral", "play"] = "bilateral"
-    clearance: float = 0.0
+    clearance: float = 0.0  # Nominal clearance c of every element of a ``play`` group [m]
+    # Names of the deviations of each element's clearance; an element is as many successive rows as make the group even:
+    # one row of a mesh, two of a bearing
     clearance_columns: tuple[str, ...] = ()
 
 

@@ -21,25 +21,13 @@ _NONE = 1e-11  # clearance that counts as none [m]
 
 @dataclass(frozen=True, kw_only=True)
 class ModificationAnswer(Answer):
-    """A finished choice.
-
-    Parameters
-    ----------
-    problem
-        What was minimised, and what had to be kept.
-    best
-        The sure optimum.
-    contact
-        What it does on the reducer.
-    cautions
-        What the method itself must warn of.
-    """
+    """A finished choice."""
 
     kind: ClassVar[str] = "modification"
-    problem: ModificationProblem
-    best: Optimum
-    contact: ContactAnswer
-    cautions: tuple[str, ...] = ()
+    problem: ModificationProblem  # What was minimised, and what had to be kept
+    best: Optimum  # The sure optimum
+    contact: ContactAnswer  # What it does on the reducer
+    cautions: tuple[str, ...] = ()  # What the method itself must warn of
 
     @property
     def title(self) -> str:

@@ -11,17 +11,10 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """Best objective of a search, batch by batch; a generation is a batch.
+    """Best objective of a search, batch by batch; a generation is a batch."""
 
-    Parameters
-    ----------
-    evaluations
-        Evaluations up to the end of each batch [-].
-    best
-        Smallest objective until then of a point that meets the constraints, infinite before the first [objective].
-    """
-
-    evaluations: Int[np.ndarray, " batch"]
+    evaluations: Int[np.ndarray, " batch"]  # Evaluations up to the end of each batch [-]
+    # Smallest objective until then of a point that meets the constraints, infinite before the first [objective]
     best: Float[np.ndarray, " batch"]
 
     def after(self, evaluations: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

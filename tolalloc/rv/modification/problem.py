@@ -20,18 +20,10 @@ _UNMET = 1.0  # merit from which on a constraint is violated; no objective comes
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluatedAmounts:
-    """Points of a problem, evaluated.
+    """Points of a problem, evaluated."""
 
-    Parameters
-    ----------
-    objective
-        What is to be minimised [m].
-    constraints
-        What must not be negative [m].
-    """
-
-    objective: Float[np.ndarray, " n"]
-    constraints: Float[np.ndarray, "n c"]
+    objective: Float[np.ndarray, " n"]  # What is to be minimised [m]
+    constraints: Float[np.ndarray, "n c"]  # What must not be negative [m]
 
     @cached_property
     def violation(self) -> Float[np.ndarray, " n"]:
@@ -49,19 +41,6 @@ class EvaluatedAmounts:
 class ModificationProblem(ABC):
     """Find the amounts (Δr_rp, Δr_p) with the smallest objective.
 
-    Parameters
-    ----------
-    name
-        What reports call it.
-    stage
-        Cycloid stage.
-    lower, upper
-        Bounds of the two amounts [m].
-    radial_clearance
-        Smallest clearance j at tip and root, Δr_rp − Δr_p ≥ j [m].
-    require_gap
-        Whether no pin may interfere once the flank at φ0 is closed.
-
     Notes
     -----
     The gap after closing at φ0 is Δr_rp(1 − S) − Δr_p(C − qS) with C = √(1 − K1²S²), so it depends on φ by
@@ -72,12 +51,13 @@ class ModificationProblem(ABC):
     clearance the one row q·Δr_rp − Δr_p ≥ 0 says gap ≥ 0 at every φ.
     """
 
-    name: str
-    stage: CycloidStage
+    name: str  # What reports call it
+    stage: CycloidStage  # Cycloid stage
+    # Bounds of the two amounts [m]
     lower: Float[np.ndarray, " 2"]
     upper: Float[np.ndarray, " 2"]
-    radial_clearance: float = 0.0
-    require_gap: bool = False
+    radial_clearance: float = 0.0  # Smallest clearance j at tip and root, Δr_rp − Δr_p ≥ j [m]
+    require_gap: bool = False  # Whether no pin may interfere once the flank at φ0 is closed
 
     @property
     @abstractmethod

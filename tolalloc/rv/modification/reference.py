@@ -20,24 +20,12 @@ Values = Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]]
 
 @dataclass(frozen=True, kw_only=True)
 class Optimum:
-    """The best of all points that were evaluated.
+    """The best of all points that were evaluated."""
 
-    Parameters
-    ----------
-    amounts
-        Δr_rp and Δr_p [m].
-    objective
-        Objective there [m].
-    violation
-        By how much the constraints are missed there [m].
-    evaluations
-        Points that were evaluated [-].
-    """
-
-    amounts: Float[np.ndarray, " 2"]
-    objective: float
-    violation: float
-    evaluations: int
+    amounts: Float[np.ndarray, " 2"]  # Δr_rp and Δr_p [m]
+    objective: float  # Objective there [m]
+    violation: float  # By how much the constraints are missed there [m]
+    evaluations: int  # Points that were evaluated [-]
 
     @property
     def modification(self) -> Modification:

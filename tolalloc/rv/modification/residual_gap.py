@@ -18,13 +18,6 @@ from tolalloc.units import DEGREE, MICROMETRE
 class ResidualGap(ModificationProblem):
     """Minimise the mean gap that is left on the working flank once it is closed at φ0.
 
-    Parameters
-    ----------
-    interval
-        First and last φ of the work interval [rad].
-    intervals
-        n: the mean is over n + 1 equally spaced φ [-].
-
     Notes
     -----
     li2018's formulas are lost, and its "difference of two curves", taken literally, is least without any shift; this
@@ -32,8 +25,8 @@ class ResidualGap(ModificationProblem):
     or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`.
     """
 
-    interval: tuple[float, float] = (25 * DEGREE, 100 * DEGREE)
-    intervals: int = 100
+    interval: tuple[float, float] = (25 * DEGREE, 100 * DEGREE)  # First and last φ of the work interval [rad]
+    intervals: int = 100  # n: the mean is over n + 1 equally spaced φ [-]
 
     @property
     def description(self) -> str:

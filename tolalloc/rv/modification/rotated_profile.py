@@ -31,15 +31,6 @@ _CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding 
 class RotatedProfileFit(ModificationProblem):
     """Fit the profile with equidistant and shift modification to the one that is rotated by δ and nothing else.
 
-    Parameters
-    ----------
-    metric
-        Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``.
-    rotation
-        δ of the profile to come close to [rad].
-    points
-        m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-].
-
     Notes
     -----
     ``same_angle`` is mostly slip along the profile, which is no error of the profile. ``nearest`` carries the modified
@@ -50,8 +41,9 @@ class RotatedProfileFit(ModificationProblem):
     song2019, equation (10).
     """
 
-    metric: Metric = "same_angle"
-    rotation: float = 0.005
+    metric: Metric = "same_angle"  # Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``
+    rotation: float = 0.005  # δ of the profile to come close to [rad]
+    # m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-]
     points: int = 180
 
     def __post_init__(self) -> None:

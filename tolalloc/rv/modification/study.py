@@ -33,32 +33,18 @@ ASSUMPTIONS = {
 class ModificationStudy:
     """What is to be chosen.
 
-    Parameters
-    ----------
-    method
-        ``song2019``: closest to a rotated profile; ``li2018``: least gap on the working flank.
-    radial_clearance
-        Smallest clearance at tip and root [m].
-    rotation
-        δ of the profile to come close to, song2019 only [rad].
-    metric
-        Distance of the profiles, song2019 only.
-    shift_sign
-        1 for a positive and −1 for a negative shift, song2019 only [-].
-    require_gap
-        Whether no pin may interfere after closing at φ0, song2019 only; li2018 always asks for it.
-
     Raises
     ------
     InputError, UnknownNameError
         An unknown method or metric, or a radial clearance out of range.
     """
 
-    method: str
-    radial_clearance: float = 15 * MICROMETRE
-    rotation: float = 0.005
-    metric: Metric = "same_angle"
-    shift_sign: int = 1
+    method: str  # ``song2019``: closest to a rotated profile; ``li2018``: least gap on the working flank
+    radial_clearance: float = 15 * MICROMETRE  # Smallest clearance at tip and root [m]
+    rotation: float = 0.005  # δ of the profile to come close to, song2019 only [rad]
+    metric: Metric = "same_angle"  # Distance of the profiles, song2019 only
+    shift_sign: int = 1  # 1 for a positive and −1 for a negative shift, song2019 only [-]
+    # Whether no pin may interfere after closing at φ0, song2019 only; li2018 always asks for it
     require_gap: bool = False
 
     def __post_init__(self) -> None:

@@ -18,21 +18,14 @@ _KNOTS = 513  # of a smooth step: its straight pieces miss the cubic by less tha
 class TimeCourse:
     """A quantity over time: straight between its knots, constant before the first and after the last.
 
-    Parameters
-    ----------
-    time
-        Knots, rising [s].
-    value
-        Speed or torque at the knots [rad/s or N·m].
-
     Raises
     ------
     InputError
         Knots that do not rise, or a number that is not finite.
     """
 
-    time: Float[np.ndarray, " knot"]
-    value: Float[np.ndarray, " knot"]
+    time: Float[np.ndarray, " knot"]  # Knots, rising [s]
+    value: Float[np.ndarray, " knot"]  # Speed or torque at the knots [rad/s or N·m]
 
     def __post_init__(self) -> None:
         finite = np.isfinite(self.time).all() and np.isfinite(self.value).all()
@@ -67,30 +60,15 @@ class TimeCourse:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """What moves the reducer.
+    """What moves the reducer."""
 
-    Parameters
-    ----------
-    speed
-        Of the input [rad/s].
-    torque
-        On the carrier, negative against the rotation [N·m].
-    """
-
-    speed: TimeCourse
-    torque: TimeCourse
+    speed: TimeCourse  # Of the input [rad/s]
+    torque: TimeCourse  # On the carrier, negative against the rotation [N·m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class PrototypeDamping:
     """What takes energy out of vibrations; contacts of pins and teeth take none.
-
-    Parameters
-    ----------
-    bearings
-        PrototypeDamping over stiffness of all bearings [s].
-    output
-        Torque on the carrier over what its speed lacks of the nominal one [N·m·s/rad].
 
     Raises
     ------
@@ -98,8 +76,8 @@ class PrototypeDamping:
         One of them is negative.
     """
 
-    bearings: float
-    output: float
+    bearings: float  # PrototypeDamping over stiffness of all bearings [s]
+    output: float  # Torque on the carrier over what its speed lacks of the nominal one [N·m·s/rad]
 
     def __post_init__(self) -> None:
         for name, value in (("bearings", self.bearings), ("output", self.output)):
@@ -117,8 +95,6 @@ class Masses:
         Of one crankshaft with its planet gear, one disc, the carrier [kg].
     crank_inertia, disc_inertia
         Of one crankshaft with its planet gear, one disc [kg·m²].
-    carrier_inertia
-        Of the carrier with all that the output drives [kg·m²].
 
     Raises
     ------
@@ -131,7 +107,7 @@ class Masses:
     disc_mass: float
     disc_inertia: float
     carrier_mass: float
-    carrier_inertia: float
+    carrier_inertia: float  # Of the carrier with all that the output drives [kg·m²]
 
     def __post_init__(self) -> None:
         for part in fields(self):

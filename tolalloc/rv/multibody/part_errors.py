@@ -20,30 +20,14 @@ from tolalloc.rv.reducer.design import Reducer
 
 @dataclass(frozen=True, kw_only=True)
 class PartErrors:
-    """Deviations of points of the parts, in the frames of the parts as they stand at the carrier angle 0.
+    """Deviations of points of the parts, in the frames of the parts as they stand at the carrier angle 0."""
 
-    Parameters
-    ----------
-    journal
-        Of crank journals, turning with the crankshaft [m].
-    disc_bore
-        Of the bores in the discs [m].
-    carrier_bore
-        Of the bores in the carrier [m].
-    carrier
-        Of the carrier's bearing in the housing [m].
-    pin
-        Of pins, radially outward and tangentially [m].
-    pin_radius
-        Of the effective radius of pins [m].
-    """
-
-    journal: Float[np.ndarray, "crank disc 2"]
-    disc_bore: Float[np.ndarray, "disc crank 2"]
-    carrier_bore: Float[np.ndarray, "crank 2"]
-    carrier: Float[np.ndarray, " 2"]
-    pin: Float[np.ndarray, "pin 2"]
-    pin_radius: Float[np.ndarray, " pin"]
+    journal: Float[np.ndarray, "crank disc 2"]  # Of crank journals, turning with the crankshaft [m]
+    disc_bore: Float[np.ndarray, "disc crank 2"]  # Of the bores in the discs [m]
+    carrier_bore: Float[np.ndarray, "crank 2"]  # Of the bores in the carrier [m]
+    carrier: Float[np.ndarray, " 2"]  # Of the carrier's bearing in the housing [m]
+    pin: Float[np.ndarray, "pin 2"]  # Of pins, radially outward and tangentially [m]
+    pin_radius: Float[np.ndarray, " pin"]  # Of the effective radius of pins [m]
 
 
 def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:

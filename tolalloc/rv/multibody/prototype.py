@@ -29,24 +29,12 @@ def with_rigid_bearings(reducer: Reducer) -> Reducer:
 
 @dataclass(frozen=True, kw_only=True)
 class Prototype:
-    """The assembled system and where its answers are read.
+    """The assembled system and where its answers are read."""
 
-    Parameters
-    ----------
-    system
-        Of the engine, assembled.
-    parts
-        Sensors of places and of speeds: carrier, cranks, discs.
-    carrier_acceleration
-        Sensor of the carrier's accelerations.
-    gears
-        Sensors of the moments that the first stage puts on the cranks.
-    """
-
-    system: Any
-    parts: list[tuple[Any, Any]]
-    carrier_acceleration: Any
-    gears: list[Any]
+    system: Any  # Of the engine, assembled
+    parts: list[tuple[Any, Any]]  # Sensors of places and of speeds: carrier, cranks, discs
+    carrier_acceleration: Any  # Sensor of the carrier's accelerations
+    gears: list[Any]  # Sensors of the moments that the first stage puts on the cranks
 
 
 def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:

@@ -20,37 +20,21 @@ from tolalloc.rv.reducer.design import Reducer
 
 @dataclass(frozen=True, kw_only=True)
 class PrototypeAnswer:
-    """What the virtual prototype does.
+    """What the virtual prototype does."""
 
-    Parameters
-    ----------
-    time
-        Times of the answers [s].
-    input_speed, input_angle
-        Of the sun, as prescribed [rad/s, rad].
-    output_speed, output_acceleration, output_angle
-        Of the carrier [rad/s, rad/s², rad].
-    transmission_error
-        Carrier angle beyond the sun's over the ratio [rad].
-    input_torque, output_torque
-        On the sun, positive where it drives; on the carrier, as prescribed [N·m].
-    pin_forces
-        Normal force of every pin [N].
-    kinetic_energy
-        Of all bodies but the sun [J].
-    """
-
-    time: Float[np.ndarray, " time"]
+    time: Float[np.ndarray, " time"]  # Times of the answers [s]
+    # Of the sun, as prescribed [rad/s, rad]
     input_speed: Float[np.ndarray, " time"]
     input_angle: Float[np.ndarray, " time"]
+    # Of the carrier [rad/s, rad/s², rad]
     output_speed: Float[np.ndarray, " time"]
     output_acceleration: Float[np.ndarray, " time"]
     output_angle: Float[np.ndarray, " time"]
-    transmission_error: Float[np.ndarray, " time"]
-    input_torque: Float[np.ndarray, " time"]
-    output_torque: Float[np.ndarray, " time"]
-    pin_forces: Float[np.ndarray, "time disc pin"]
-    kinetic_energy: Float[np.ndarray, " time"]
+    transmission_error: Float[np.ndarray, " time"]  # Carrier angle beyond the sun's over the ratio [rad]
+    input_torque: Float[np.ndarray, " time"]  # On the sun, positive where it drives [N·m]
+    output_torque: Float[np.ndarray, " time"]  # On the carrier, as prescribed [N·m]
+    pin_forces: Float[np.ndarray, "time disc pin"]  # Normal force of every pin [N]
+    kinetic_energy: Float[np.ndarray, " time"]  # Of all bodies but the sun [J]
 
     @property
     def input_power(self) -> Float[np.ndarray, " time"]:
@@ -86,23 +70,12 @@ class TimeSteps:
 
     At a spectral radius of 0.9 a start with parts that do not fit by 1 µm left strongly damped rigid bearings swinging
     from step to step for good; at 0.5 and below it did not.
-
-    Parameters
-    ----------
-    duration
-        Simulated time [s].
-    step
-        Step of the integration [s].
-    output_step
-        Time between answers [s].
-    spectral_radius
-        What the generalised-α method leaves of the fastest vibrations in one step [-].
     """
 
-    duration: float
-    step: float = 1e-4
-    output_step: float = 1e-3
-    spectral_radius: float = 0.5
+    duration: float  # Simulated time [s]
+    step: float = 1e-4  # Step of the integration [s]
+    output_step: float = 1e-3  # Time between answers [s]
+    spectral_radius: float = 0.5  # What the generalised-α method leaves of the fastest vibrations in one step [-]
 
     def __post_init__(self) -> None:
         if not 0 < self.step <= self.output_step <= self.duration < float("inf"):

@@ -15,18 +15,10 @@ from tolalloc.rv.reducer.design import Reducer
 
 @dataclass(frozen=True)
 class System:
-    """A system of the engine under construction.
+    """A system of the engine under construction."""
 
-    Parameters
-    ----------
-    engine
-        Module of the engine.
-    content
-        What the engine solves.
-    """
-
-    engine: Any
-    content: Any
+    engine: Any  # Module of the engine
+    content: Any  # What the engine solves
 
     def body(self, place: Float[np.ndarray, " 2"], mass: float, inertia: float) -> tuple[Any, Any]:
         """Add a rigid body with its centre at a place; return its node and itself."""

@@ -11,45 +11,28 @@ from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, 
 
 @dataclass(frozen=True, kw_only=True)
 class FirstStage:
-    """Sun gear and planet gears, an involute pair.
+    """Sun gear and planet gears, an involute pair."""
 
-    Parameters
-    ----------
-    sun_teeth, planet_teeth
-        Numbers of teeth Z1 and Z2 [-].
-    module, pressure_angle
-        Module m and pressure angle α [m, rad].
-    """
-
+    # Numbers of teeth Z1 and Z2 [-]
     sun_teeth: int
     planet_teeth: int
+    # Module m and pressure angle α [m, rad]
     module: float
     pressure_angle: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class CycloidStage:
-    """Cycloid discs against the ring of pins.
+    """Cycloid discs against the ring of pins."""
 
-    Parameters
-    ----------
-    pin_count, disc_teeth
-        Numbers zp and zc [-]; the pair has one tooth difference.
-    pin_circle_radius, pin_radius
-        Radius Rp of the circle of pin centres, and r_rp of a pin [m].
-    eccentricity
-        Crank eccentricity e [m].
-    face_width, disc_spacing
-        Loaded width b of a disc; distance between the middle planes of neighbouring discs [m].
-    """
-
-    pin_count: int
-    disc_teeth: int
+    pin_count: int  # Numbers zp and zc [-]
+    disc_teeth: int  # The pair has one tooth difference
+    # Radius Rp of the circle of pin centres, and r_rp of a pin [m]
     pin_circle_radius: float
     pin_radius: float
-    eccentricity: float
-    face_width: float
-    disc_spacing: float = 0.0
+    eccentricity: float  # Crank eccentricity e [m]
+    face_width: float  # Loaded width b of a disc [m]
+    disc_spacing: float = 0.0  # Distance between the middle planes of neighbouring discs [m]
 
     @property
     def shortening(self) -> float:
@@ -85,21 +68,11 @@ SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
 
 @dataclass(frozen=True, kw_only=True)
 class Modification:
-    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34).
+    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34)."""
 
-    Parameters
-    ----------
-    equidistant
-        Δr_rp: the grinding pin radius is r_rp + Δr_rp [m].
-    shift
-        Δr_p: the pin circle radius at grinding is Rp + Δr_p [m].
-    rotation
-        δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad].
-    """
-
-    equidistant: float
-    shift: float
-    rotation: float = 0.0
+    equidistant: float  # Δr_rp: the grinding pin radius is r_rp + Δr_rp [m]
+    shift: float  # Δr_p: the pin circle radius at grinding is Rp + Δr_p [m]
+    rotation: float = 0.0  # δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad]
 
     @classmethod
     def from_convention(cls, convention: str, equidistant: float, shift: float) -> Modification:
@@ -138,17 +111,10 @@ class Modification:
 
 @dataclass(frozen=True, kw_only=True)
 class Clearances:
-    """Nominal clearance of the bilateral interfaces; where it is 0 the interface has no play.
+    """Nominal clearance of the bilateral interfaces; where it is 0 the interface has no play."""
 
-    Parameters
-    ----------
-    gear_mesh
-        Half the normal backlash of a sun–planet mesh [m].
-    crank_disc_bearing, crank_carrier_bearing, carrier_bearing
-        Radial clearance of a bearing, half its diametral one [m].
-    """
-
-    gear_mesh: float = 0.0
+    gear_mesh: float = 0.0  # Half the normal backlash of a sun–planet mesh [m]
+    # Radial clearance of a bearing, half its diametral one [m]
     crank_disc_bearing: float = 0.0
     crank_carrier_bearing: float = 0.0
     carrier_bearing: float = 0.0

@@ -20,44 +20,26 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Stiffness:
-    """Stiffness of the interfaces [N/m].
+    """Stiffness of the interfaces [N/m]."""
 
-    Parameters
-    ----------
-    sun_support, gear_mesh
-        K_s, support of the sun gear shaft; K_sp, one sun–planet mesh along its line of action [N/m].
-    crank_disc_bearing, crank_carrier_bearing, carrier_bearing
-        K_pd, one crank journal in a disc bore; K_b, one crankshaft in the carrier; K_ca, the carrier in the housing
-        [N/m].
-    pin_contact
-        C, one pin against one disc tooth [N/m].
-    pin_contact_law
-        ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part;
-        ``logarithmic``: Hertzian line contact, softer under small forces, C of the flat flank as its scale.
-    pin_bending
-        One pin between its supports, in series with its contact; infinite where it rests in a half groove [N/m].
-    """
-
-    sun_support: float
-    gear_mesh: float
-    crank_disc_bearing: float
-    crank_carrier_bearing: float
-    carrier_bearing: float
-    pin_contact: float
+    sun_support: float  # K_s, support of the sun gear shaft [N/m]
+    gear_mesh: float  # K_sp, one sun–planet mesh along its line of action [N/m]
+    crank_disc_bearing: float  # K_pd, one crank journal in a disc bore [N/m]
+    crank_carrier_bearing: float  # K_b, one crankshaft in the carrier [N/m]
+    carrier_bearing: float  # K_ca, the carrier in the housing [N/m]
+    pin_contact: float  # C, one pin against one disc tooth [N/m]
+    # ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part;
+    # ``logarithmic``: Hertzian line contact, softer under small forces, C of the flat flank as its scale
     pin_contact_law: str = "constant"
+    # One pin between its supports, in series with its contact; infinite where it rests in a half groove [N/m]
     pin_bending: float = inf
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """Elastic constants.
+    """Elastic constants."""
 
-    Parameters
-    ----------
-    elastic_modulus, poisson_ratio
-        Young's modulus E and Poisson's ratio µ [Pa, -].
-    """
-
+    # Young's modulus E and Poisson's ratio µ [Pa, -]
     elastic_modulus: float
     poisson_ratio: float
 
@@ -71,28 +53,19 @@ def contact_modulus(first: Material, second: Material) -> float:
 class IdentifiedStiffness:
     """Stiffnesses found from measured units, with their standard uncertainty.
 
-    Parameters
-    ----------
-    source
-        Where the values come from.
-    values, standard_uncertainty
-        Field of `Stiffness` → value and standard uncertainty [N/m].
-    correlation
-        Correlation of the values in their order; none of them is correlated unless given [-].
-    notes
-        What a reader must know before trusting the values.
-
     Raises
     ------
     InputError
         What is given is no correlation.
     """
 
-    source: str
+    source: str  # Where the values come from
+    # Field of `Stiffness` → value and standard uncertainty [N/m]
     values: dict[str, float]
     standard_uncertainty: dict[str, float]
+    # Correlation of the values in their order; none of them is correlated unless given [-]
     correlation: Float[np.ndarray, "stiffness stiffness"] = field(default_factory=lambda: np.empty((0, 0)))
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # What a reader must know before trusting the values
 
     def __post_init__(self) -> None:
         given = self.correlation if self.correlation.size else np.eye(len(self.values))

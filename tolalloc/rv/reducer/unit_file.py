@@ -44,25 +44,14 @@ class UnitRecord(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class BuiltUnit:
-    """Errors of one reducer, by column.
+    """Errors of one reducer, by column."""
 
-    Parameters
-    ----------
-    name, source
-        Which reducer, and where its errors were read.
-    deviations
-        Column → deviation [m, angles rad].
-    neglected
-        Sources that the unit leaves out, taken as zero; ``*`` stands for anything.
-    assumptions
-        What the source does not print.
-    """
-
+    # Which reducer, and where its errors were read
     name: str
     source: str
-    deviations: dict[str, float]
-    neglected: tuple[str, ...] = ()
-    assumptions: tuple[str, ...] = ()
+    deviations: dict[str, float]  # Column → deviation [m, angles rad]
+    neglected: tuple[str, ...] = ()  # Sources that the unit leaves out, taken as zero; ``*`` stands for anything
+    assumptions: tuple[str, ...] = ()  # What the source does not print
 
     @property
     def orders(self) -> tuple[int, ...]:

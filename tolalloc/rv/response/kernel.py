@@ -22,38 +22,18 @@ PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 
 @dataclass(frozen=True, kw_only=True)
 class WithDerivatives:
-    """Answers of the kernel with the exact derivative of the peak-to-peak.
+    """Answers of the kernel with the exact derivative of the peak-to-peak."""
 
-    Parameters
-    ----------
-    evaluation
-        Peak-to-peak and status of every sample.
-    by_column, by_modification
-        Derivative by every varied column; by the equidistant and the shift amount [arcsec/m].
-    by_stiffness
-        Derivative by the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [arcsec].
-    """
-
-    evaluation: Evaluation
-    by_column: Float[np.ndarray, "sample column"]
-    by_modification: Float[np.ndarray, "sample 2"]
+    evaluation: Evaluation  # Peak-to-peak and status of every sample
+    by_column: Float[np.ndarray, "sample column"]  # Derivative by every varied column [arcsec/m]
+    by_modification: Float[np.ndarray, "sample 2"]  # By the equidistant and the shift amount [arcsec/m]
+    # Derivative by the relative change of each stiffness of `tolalloc.rv.reducer.stiffness.Stiffness` [arcsec]
     by_stiffness: dict[str, Float[np.ndarray, " sample"]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class KernelResponse:
     """Peak-to-peak transmission error on the real model.
-
-    Parameters
-    ----------
-    model, torque
-        The equivalent model; torque on the carrier, negative resists the rotation [N·m].
-    columns
-        Columns that vary, in the order of X.
-    fixed
-        Value of every other column of the model [m].
-    observe, mapper
-        Told the statuses of each chunk; what solves the chunks, `tolalloc.chunks.map_chunks`.
 
     Raises
     ------
@@ -63,12 +43,12 @@ class KernelResponse:
         A column of the model that is neither varied nor fixed.
     """
 
-    model: EquivalentModel
-    torque: float
-    columns: tuple[str, ...]
-    fixed: Mapping[str, float]
-    observe: Observer = unobserved
-    mapper: Mapper = map
+    model: EquivalentModel  # The equivalent model [N·m]
+    torque: float  # Torque on the carrier, negative resists the rotation [N·m]
+    columns: tuple[str, ...]  # Columns that vary, in the order of X
+    fixed: Mapping[str, float]  # Value of every other column of the model [m]
+    observe: Observer = unobserved  # Told the statuses of each chunk
+    mapper: Mapper = map  # What solves the chunks, `tolalloc.chunks.map_chunks`
 
     def __post_init__(self) -> None:
         known, given = set(self.model.columns), {*self.columns, *self.fixed}

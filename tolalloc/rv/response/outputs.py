@@ -28,17 +28,10 @@ _ANGLES = LOOP_ANGLES[::_EVERY]
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """One solve and the outputs that are read off it.
+    """One solve and the outputs that are read off it."""
 
-    Parameters
-    ----------
-    outputs
-        Names of the outputs with their units.
-    read
-        From model, errors in the order of its columns, and test torque, the outputs and the status of every sample.
-    """
-
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # Names of the outputs with their units
+    # From model, errors in the order of its columns, and test torque, the outputs and the status of every sample
     read: Callable[[EquivalentModel, Float[np.ndarray, "chunk column"], float], Answer]
 
 
@@ -125,21 +118,11 @@ def orders_reading(orders: tuple[int, ...]) -> Reading:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputsResponse:
-    """All outputs of several readings, one row per sample.
+    """All outputs of several readings, one row per sample."""
 
-    Parameters
-    ----------
-    kernel
-        Model, torque, columns, and who observes.
-    readings
-        What is read.
-    chosen
-        Outputs of the readings that are answered, all of them if empty.
-    """
-
-    kernel: KernelResponse
-    readings: tuple[Reading, ...] = REQUIREMENTS
-    chosen: tuple[str, ...] = ()
+    kernel: KernelResponse  # Model, torque, columns, and who observes
+    readings: tuple[Reading, ...] = REQUIREMENTS  # What is read
+    chosen: tuple[str, ...] = ()  # Outputs of the readings that are answered, all of them if empty
 
     @property
     def columns(self) -> tuple[str, ...]:

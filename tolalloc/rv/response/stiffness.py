@@ -47,17 +47,10 @@ def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> Corre
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessResponse:
-    """The kernel's peak-to-peak with stiffnesses as further columns, to first order in ln K.
+    """The kernel's peak-to-peak with stiffnesses as further columns, to first order in ln K."""
 
-    Parameters
-    ----------
-    kernel
-        The real model.
-    stiffnesses
-        Fields of `rv.reducer.stiffness.Stiffness` that vary, in the order of their columns, which are the last.
-    """
-
-    kernel: KernelResponse
+    kernel: KernelResponse  # The real model
+    # Fields of `rv.reducer.stiffness.Stiffness` that vary, in the order of their columns, which are the last
     stiffnesses: tuple[str, ...]
 
     @property
@@ -96,17 +89,6 @@ class StiffnessResponse:
 class OutputsWithStiffness:
     """Several outputs with stiffnesses as further columns, to first order in ln K.
 
-    Parameters
-    ----------
-    peak
-        The peak-to-peak with its exact derivative.
-    outputs
-        Names of the outputs with their units.
-    reading
-        From a kernel, the response of these outputs.
-    steps
-        Standard uncertainty of ln K of every stiffness: what a difference is taken over [-].
-
     Notes
     -----
     The peak-to-peak takes its exact derivative. Every other output takes the one-sided difference between the kernel at
@@ -114,10 +96,10 @@ class OutputsWithStiffness:
     standard uncertainty is that of the kernel. A unit without an answer at one of them has none.
     """
 
-    peak: StiffnessResponse
-    outputs: tuple[str, ...]
-    reading: Callable[[KernelResponse], Response]
-    steps: tuple[float, ...]
+    peak: StiffnessResponse  # The peak-to-peak with its exact derivative
+    outputs: tuple[str, ...]  # Names of the outputs with their units
+    reading: Callable[[KernelResponse], Response]  # From a kernel, the response of these outputs
+    steps: tuple[float, ...]  # Standard uncertainty of ln K of every stiffness: what a difference is taken over [-]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -150,21 +132,13 @@ class OutputsWithStiffness:
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrderError:
-    """First order minus kernel at changed stiffnesses.
+    """First order minus kernel at changed stiffnesses."""
 
-    Parameters
-    ----------
-    root_mean_square, largest
-        Of the difference [arcsec].
-    effect
-        Root-mean-square of what the same changes do to the peak-to-peak [arcsec].
-    units, changes
-        Units and changes of the stiffnesses behind it [-].
-    """
-
+    # Of the difference [arcsec]
     root_mean_square: float
     largest: float
-    effect: float
+    effect: float  # Root-mean-square of what the same changes do to the peak-to-peak [arcsec]
+    # Units and changes of the stiffnesses behind it [-]
     units: int
     changes: int
 
@@ -208,24 +182,13 @@ def first_order_error(
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessEffect:
-    """What not knowing the stiffness does to the peak-to-peak, and how well that is known.
+    """What not knowing the stiffness does to the peak-to-peak, and how well that is known."""
 
-    Parameters
-    ----------
-    source
-        The source.
-    sigma
-        Standard deviation of one unit's peak-to-peak from the stiffness alone, root-mean-square over units [arcsec].
-    sigma_of_mean
-        Standard deviation of the mean over all units, which the stiffness shifts together [arcsec].
-    first_order
-        First order against kernel.
-    """
-
-    source: CorrelatedSource
+    source: CorrelatedSource  # The source
+    # Standard deviation of one unit's peak-to-peak from the stiffness alone, root-mean-square over units [arcsec]
     sigma: float
-    sigma_of_mean: float
-    first_order: FirstOrderError
+    sigma_of_mean: float  # Standard deviation of the mean over all units, which the stiffness shifts together [arcsec]
+    first_order: FirstOrderError  # First order against kernel
 
 
 def stiffness_effect(

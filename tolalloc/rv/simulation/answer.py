@@ -22,43 +22,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationAnswer(Answer):
-    """A simulated reducer; the header's name is the unit's.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design as simulated.
-    engine
-        Who integrated.
-    speed
-        Input speed that is reached [rad/s].
-    torque
-        Torque on the carrier at the end; negative resists the rotation [N·m].
-    series
-        Over the whole time.
-    steady
-        Time steps of the last whole crank turns under constant speed and load.
-    crank_turns
-        How many these are [-].
-    at_rest
-        The static model beside it.
-    natural_frequency
-        Lowest natural frequency over the steady part; none where springs are not linear [Hz].
-    seconds
-        Computing time of the simulation [s].
-    """
+    """A simulated reducer; the header's name is the unit's."""
 
     kind: ClassVar[str] = "simulation"
-    reducer: Reducer
-    engine: str
-    speed: float
-    torque: float
-    series: TimeSeries
-    steady: slice
-    crank_turns: int
-    at_rest: AtRest
+    reducer: Reducer  # Nominal design as simulated
+    engine: str  # Who integrated
+    speed: float  # Input speed that is reached [rad/s]
+    torque: float  # Torque on the carrier at the end; negative resists the rotation [N·m]
+    series: TimeSeries  # Over the whole time
+    steady: slice  # Time steps of the last whole crank turns under constant speed and load
+    crank_turns: int  # How many these are [-]
+    at_rest: AtRest  # The static model beside it
+    # Lowest natural frequency over the steady part; none where springs are not linear [Hz]
     natural_frequency: float | None
-    seconds: float
+    seconds: float  # Computing time of the simulation [s]
 
     @property
     def title(self) -> str:

@@ -45,52 +45,27 @@ LOAD_TIME = 0.5
 class SimulationStudy:
     """What is to be simulated; as it stands, the run of xi2015.
 
-    Parameters
-    ----------
-    reducer
-        Preset or TOML file.
-    unit
-        Shipped unit or TOML file.
-    speed_rpm
-        Input speed that is reached [rpm].
-    torque_nm
-        Torque on the carrier, negative as it resists the rotation; minus the rated one unless given [N·m].
-    engine
-        One of `ENGINES`.
-    duration
-        Simulated time [s].
-    ramp
-        Time in which the speed rises; the load rises in half of it afterwards [s].
-    step
-        Time step [s].
-    output_inertia
-        Moment of inertia that the carrier turns besides its own [kg·m²].
-    damping
-        Damping over stiffness of meshes and bearings [s].
-    mass_damping
-        Damping over mass of every part, in the prototype of the carrier's rotation alone; 500 1/s are a damping ratio
-        of 2 % at 2 kHz [1/s].
-    pin_stiffness
-        Stiffness of every pin contact in place of the reducer's own law [N/m].
-
     Raises
     ------
     InputError, UnknownNameError
         A number out of range or an unknown engine.
     """
 
-    reducer: str = "rv40e"
-    unit: str = "exact"
-    speed_rpm: float = 525.0
+    reducer: str = "rv40e"  # Preset or TOML file
+    unit: str = "exact"  # Shipped unit or TOML file
+    speed_rpm: float = 525.0  # Input speed that is reached [rpm]
+    # Torque on the carrier, negative as it resists the rotation; minus the rated one unless given [N·m]
     torque_nm: float | None = None
-    engine: str = "generalised-alpha"
-    duration: float = 2.0
-    ramp: float = 1.0
-    step: float = 5e-5
-    output_inertia: float = 0.0
-    damping: float = 1e-5
+    engine: str = "generalised-alpha"  # One of `ENGINES`
+    duration: float = 2.0  # Simulated time [s]
+    ramp: float = 1.0  # Time in which the speed rises; the load rises in half of it afterwards [s]
+    step: float = 5e-5  # Time step [s]
+    output_inertia: float = 0.0  # Moment of inertia that the carrier turns besides its own [kg·m²]
+    damping: float = 1e-5  # Damping over stiffness of meshes and bearings [s]
+    # Damping over mass of every part, in the prototype of the carrier's rotation alone; 500 1/s are a damping ratio of
+    # 2 % at 2 kHz [1/s]
     mass_damping: float | None = None
-    pin_stiffness: float | None = None
+    pin_stiffness: float | None = None  # Stiffness of every pin contact in place of the reducer's own law [N/m]
 
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
@@ -118,24 +93,12 @@ class SimulationStudy:
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedSimulation:
-    """A checked simulation.
+    """A checked simulation."""
 
-    Parameters
-    ----------
-    asked
-        What was asked.
-    reducer
-        Design with the pin contacts that were asked for.
-    unit
-        Its errors.
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    """
-
-    asked: SimulationStudy
-    reducer: Reducer
-    unit: BuiltUnit
-    torque: float
+    asked: SimulationStudy  # What was asked
+    reducer: Reducer  # Design with the pin contacts that were asked for
+    unit: BuiltUnit  # Its errors
+    torque: float  # Torque on the carrier; negative resists the rotation [N·m]
 
     @property
     def speed(self) -> float:

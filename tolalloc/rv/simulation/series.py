@@ -10,38 +10,20 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True, kw_only=True)
 class TimeSeries:
-    """A reducer over time.
+    """A reducer over time."""
 
-    Parameters
-    ----------
-    time
-        Equally spaced times [s].
-    carrier_angle
-        θc of the nominal motion [rad].
-    input_speed, input_acceleration
-        Of the sun gear, as prescribed [rad/s, rad/s²].
-    output_speed, output_acceleration
-        Of the carrier [rad/s, rad/s²].
-    transmission_error
-        Carrier rotation beyond θc, output side [rad].
-    input_torque
-        On the sun gear, positive where it drives [N·m].
-    output_torque
-        On the carrier; negative resists the rotation [N·m].
-    pin_forces
-        Normal force between every pin and every disc [N].
-    """
-
-    time: Float[np.ndarray, " time"]
-    carrier_angle: Float[np.ndarray, " time"]
+    time: Float[np.ndarray, " time"]  # Equally spaced times [s]
+    carrier_angle: Float[np.ndarray, " time"]  # θc of the nominal motion [rad]
+    # Of the sun gear, as prescribed [rad/s, rad/s²]
     input_speed: Float[np.ndarray, " time"]
     input_acceleration: Float[np.ndarray, " time"]
+    # Of the carrier [rad/s, rad/s²]
     output_speed: Float[np.ndarray, " time"]
     output_acceleration: Float[np.ndarray, " time"]
-    transmission_error: Float[np.ndarray, " time"]
-    input_torque: Float[np.ndarray, " time"]
-    output_torque: Float[np.ndarray, " time"]
-    pin_forces: Float[np.ndarray, "time disc pin"]
+    transmission_error: Float[np.ndarray, " time"]  # Carrier rotation beyond θc, output side [rad]
+    input_torque: Float[np.ndarray, " time"]  # On the sun gear, positive where it drives [N·m]
+    output_torque: Float[np.ndarray, " time"]  # On the carrier; negative resists the rotation [N·m]
+    pin_forces: Float[np.ndarray, "time disc pin"]  # Normal force between every pin and every disc [N]
 
     @property
     def pins_in_contact(self) -> Int[np.ndarray, "time disc"]:
@@ -51,21 +33,9 @@ class TimeSeries:
 
 @dataclass(frozen=True, kw_only=True)
 class AtRest:
-    """The static model at carrier angles of the steady part, under its torque.
+    """The static model at carrier angles of the steady part, under its torque."""
 
-    Parameters
-    ----------
-    steps
-        Numbers of the time steps with these angles [-].
-    transmission_error
-        Carrier rotation beyond θc, output side [rad].
-    pin_forces
-        Normal force between every pin and every disc [N].
-    seconds
-        Computing time [s].
-    """
-
-    steps: Int[np.ndarray, " angle"]
-    transmission_error: Float[np.ndarray, " angle"]
-    pin_forces: Float[np.ndarray, "angle disc pin"]
-    seconds: float
+    steps: Int[np.ndarray, " angle"]  # Numbers of the time steps with these angles [-]
+    transmission_error: Float[np.ndarray, " angle"]  # Carrier rotation beyond θc, output side [rad]
+    pin_forces: Float[np.ndarray, "angle disc pin"]  # Normal force between every pin and every disc [N]
+    seconds: float  # Computing time [s]

@@ -21,19 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactAnswer(Answer):
-    """One modification under one torque.
-
-    Parameters
-    ----------
-    assessment
-        Clearance and contact; without errors they do not depend on the torque's direction.
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    """
+    """One modification under one torque."""
 
     kind: ClassVar[str] = "contact"
-    assessment: Assessment
-    torque: float
+    assessment: Assessment  # Clearance and contact; without errors they do not depend on the torque's direction
+    torque: float  # Torque on the carrier; negative resists the rotation [N·m]
 
     @property
     def title(self) -> str:
