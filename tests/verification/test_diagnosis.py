@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Prepared, Study, prepare
 
+from tests.prepared import prepared as baseline
 from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
 from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.diagnosis.half_turn import exchanged, half_turn, has_half_turn, with_twins
@@ -20,6 +20,7 @@ from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.study.prepared import Prepared
 from tolalloc.units import ARCSECOND, DEGREE
 
 NOISE = Noise()
@@ -31,11 +32,11 @@ LITTLE = DiagnosisEffort(angles=48, scouts=64, climbers=4, attempts=1, nearby=1,
 
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
-    return prepare(Study(name="diagnosis"))
+    return baseline(name="diagnosis")
 
 
 def curve_of(prepared: Prepared, deviations: np.ndarray, generator: np.random.Generator) -> MeasuredCurve:
-    kernel = prepared.kernel
+    kernel = prepared.model.kernel
     exact = kernel.model.equilibria(kernel.errors(deviations), kernel.torque, ANGLES).transmission_error[0]
     read = exact + ROOT @ generator.standard_normal(ANGLES.size)
     return MeasuredCurve(
@@ -44,14 +45,14 @@ def curve_of(prepared: Prepared, deviations: np.ndarray, generator: np.random.Ge
 
 
 def problem_of(prepared: Prepared, curve: MeasuredCurve) -> CurveProblem:
-    errors = prepared.space.errors
+    errors = prepared.errors
     return CurveProblem(
-        kernel=prepared.kernel, errors=errors, zones=errors.zones, readings=thinned(curve, NOISE, EFFORT.angles)
+        kernel=prepared.model.kernel, errors=errors, zones=errors.zones, readings=thinned(curve, NOISE, EFFORT.angles)
     )
 
 
 def drawn(prepared: Prepared, count: int, name: str) -> np.ndarray:
-    errors = prepared.space.errors
+    errors = prepared.errors
     uniform = np.concatenate(list(SeedTree(5).child(name).uniform_chunks(count, len(errors.columns))))
     return errors.deviations(errors.standard_values(uniform), errors.zones)
 
@@ -69,15 +70,15 @@ def problem(prepared: Prepared, unit: np.ndarray) -> CurveProblem:
 @pytest.fixture(scope="module")
 def diagnosis(prepared: Prepared, unit: np.ndarray) -> Diagnosis:
     curve = curve_of(prepared, unit, SeedTree(5).child("readings").generator())
-    errors = prepared.space.errors
-    return diagnose(curve, prepared.kernel, errors, errors.zones, NOISE, SeedTree(0), EFFORT)
+    errors = prepared.errors
+    return diagnose(curve, prepared.model.kernel, errors, errors.zones, NOISE, SeedTree(0), EFFORT)
 
 
 def test_a_unit_and_its_twin_have_one_curve(prepared: Prepared) -> None:
-    kernel, columns = prepared.kernel, prepared.space.errors.columns
+    kernel, columns = prepared.model.kernel, prepared.errors.columns
     units = drawn(prepared, 4, "twins")
-    turn = half_turn(columns, prepared.reducer)
-    middle = prepared.space.errors.deviations(np.zeros((1, len(columns))), prepared.space.errors.zones)
+    turn = half_turn(columns, prepared.model.reducer)
+    middle = prepared.errors.deviations(np.zeros((1, len(columns))), prepared.errors.zones)
     assert np.all(middle == 0.0)
     curves = [
         kernel.model.equilibria(kernel.errors(np.ascontiguousarray(one)), kernel.torque, ANGLES).transmission_error
@@ -88,7 +89,7 @@ def test_a_unit_and_its_twin_have_one_curve(prepared: Prepared) -> None:
 
 
 def test_two_half_turns_are_none(prepared: Prepared) -> None:
-    turn = half_turn(prepared.space.errors.columns, prepared.reducer)
+    turn = half_turn(prepared.errors.columns, prepared.model.reducer)
     assert np.allclose(turn @ turn, np.eye(len(turn)), atol=1e-13)
     assert np.allclose(turn @ turn.T, np.eye(len(turn)), atol=1e-13)
     assert exchanged("disc1.bore2.position.x") == "disc2.bore1.position.x"
@@ -264,7 +265,7 @@ def test_columns_that_replace_one_another_form_a_group() -> None:
 
 
 def test_nearly_all_gauges_show_less_than_the_zone(prepared: Prepared) -> None:
-    units, errors = drawn(prepared, 4000, "gauges"), prepared.space.errors
+    units, errors = drawn(prepared, 4000, "gauges"), prepared.errors
     owner = np.array(errors.source_of_column)
     for source in errors.active:
         limit = source.zone / 2 if source.feature == "size" else source.zone
@@ -301,11 +302,11 @@ def test_the_fit_explains_the_curve_and_its_twin_is_known(diagnosis: Diagnosis) 
 def test_a_curve_that_no_errors_make_is_not_diagnosed(prepared: Prepared, unit: np.ndarray) -> None:
     curve = curve_of(prepared, unit, SeedTree(5).child("readings").generator())
     foreign = curve.transmission_error + 10 * ARCSECOND * np.sin(17.0 * ANGLES)
-    errors = prepared.space.errors
+    errors = prepared.errors
     seen: list[int] = []
     found = diagnose(
         replace(curve, transmission_error=foreign),
-        replace(prepared.kernel, observe=lambda status: seen.append(status.size)),
+        replace(prepared.model.kernel, observe=lambda status: seen.append(status.size)),
         errors,
         errors.zones,
         NOISE,
@@ -320,9 +321,10 @@ def test_a_curve_that_no_errors_make_is_not_diagnosed(prepared: Prepared, unit: 
 
 def test_one_seed_gives_one_diagnosis(prepared: Prepared, unit: np.ndarray) -> None:
     curve = curve_of(prepared, unit, SeedTree(5).child("readings").generator())
-    errors = prepared.space.errors
+    errors = prepared.errors
     one, same, other = (
-        diagnose(curve, prepared.kernel, errors, errors.zones, NOISE, SeedTree(seed), LITTLE) for seed in (0, 0, 1)
+        diagnose(curve, prepared.model.kernel, errors, errors.zones, NOISE, SeedTree(seed), LITTLE)
+        for seed in (0, 0, 1)
     )
     assert np.array_equal(one.deviations, same.deviations)
     assert not np.array_equal(one.deviations, other.deviations)

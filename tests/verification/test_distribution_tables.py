@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, with_zones
 from tolalloc.exceptions import InputError, TolallocError
 
@@ -92,7 +92,7 @@ def test_the_same_files_in_another_folder_are_the_same_study(tmp_path, monkeypat
         frame.to_csv("t.csv", index=False)
         write_parts(Path.cwd(), rows=[f"{(2 if folder == 'other' else 1) * value:.4f}" for value in 1e6 * PARTS])
         Path("correlations.csv").write_text("sources,correlation\ndisc1.bore1.position disc1.bore2.position,0.5\n")
-        found[folder] = prepare(Study(name="same", tolerances="t.csv", correlations="correlations.csv")).hash
+        found[folder] = prepared(name="same", drawing={"table": "t.csv", "correlations": "correlations.csv"}).digest
     assert found["one"] == found["two"] != found["other"]
 
 

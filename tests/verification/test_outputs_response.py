@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.outputs import order_spectrum
@@ -20,23 +20,23 @@ ORDERS = (1, 39, 40)
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="outputs"))
+    return baseline(name="outputs")
 
 
 @pytest.fixture(scope="module")
 def x(prepared):
-    errors = prepared.space.errors
+    errors = prepared.errors
     uniform = next(SeedTree(1).uniform_chunks(24, len(errors.columns)))
     return errors.deviations(errors.standard_values(uniform), errors.zones)
 
 
 @pytest.fixture(scope="module")
 def response(prepared):
-    return OutputsResponse(kernel=prepared.kernel, readings=(*REQUIREMENTS, orders_reading(ORDERS)))
+    return OutputsResponse(kernel=prepared.model.kernel, readings=(*REQUIREMENTS, orders_reading(ORDERS)))
 
 
 def test_every_output_is_that_of_its_own_function(prepared, response, x):
-    kernel, found = prepared.kernel, response(x)
+    kernel, found = prepared.model.kernel, response(x)
     assert found.good.all()
     values = dict(zip(response.outputs, found.values.T, strict=True))
     np.testing.assert_array_equal(values["peak-to-peak transmission error [arcsec]"], kernel(x).values[:, 0])
@@ -52,7 +52,7 @@ def test_every_output_is_that_of_its_own_function(prepared, response, x):
 
 def test_a_wave_of_the_outputs_is_the_wave_of_the_curve(prepared, response, x):
     values = dict(zip(response.outputs, response(x[:1]).values[0], strict=True))
-    found = prepared.kernel.model.equilibria(prepared.kernel.errors(x[:1]), prepared.kernel.torque)
+    found = prepared.model.kernel.model.equilibria(prepared.model.kernel.errors(x[:1]), prepared.model.kernel.torque)
     curve, angle = found.transmission_error[0] / ARCSECOND, found.carrier_angle
     for order in ORDERS:
         cosine, sine = np.cos(order * angle), np.sin(order * angle)
@@ -73,7 +73,7 @@ def test_a_failed_reading_fails_its_sample_alone(prepared, x):
 
     seen = []
     response = OutputsResponse(
-        kernel=replace(prepared.kernel, observe=seen.append),
+        kernel=replace(prepared.model.kernel, observe=seen.append),
         readings=(REQUIREMENTS[0], Reading(outputs=("broken [-]",), read=broken)),
     )
     found = response(x)

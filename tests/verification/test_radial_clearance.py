@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared as baseline
 from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.equivalent.condensation import spring_groups
@@ -24,7 +24,7 @@ CLEARANCE = "radial clearance at tip and root [µm]"
 
 @pytest.fixture(scope="module")
 def prepared():
-    return prepare(Study(name="clearance"))
+    return baseline(name="clearance")
 
 
 def unit(model, **columns: float) -> np.ndarray:
@@ -89,22 +89,22 @@ def test_errors_that_are_tangential_or_move_a_disc_do_not_count(rv20e):
 
 def test_an_error_that_is_no_number_is_a_status(prepared):
     reading = REQUIREMENTS[-1]
-    errors = prepared.kernel.errors(np.zeros((2, len(prepared.kernel.columns))))
-    errors[1, prepared.kernel.model.columns.index("pin.diameter")] = np.nan
-    values, status = reading.read(prepared.kernel.model, errors, -1.0)
+    errors = prepared.model.kernel.errors(np.zeros((2, len(prepared.model.kernel.columns))))
+    errors[1, prepared.model.kernel.model.columns.index("pin.diameter")] = np.nan
+    values, status = reading.read(prepared.model.kernel.model, errors, -1.0)
     assert status.tolist() == [Status.CONVERGED, Status.NOT_FINITE]
-    assert values[0, 0] == pytest.approx(prepared.reducer.modification.radial_clearance / MICROMETRE)
+    assert values[0, 0] == pytest.approx(prepared.model.reducer.modification.radial_clearance / MICROMETRE)
 
 
 def test_line_load_and_pressure_are_those_of_the_most_loaded_pin(prepared, generator):
-    kernel, stage = prepared.kernel, prepared.reducer.cycloid_stage
+    kernel, stage = prepared.model.kernel, prepared.model.reducer.cycloid_stage
     x = generator.normal(0.0, 0.5e-6, (3, len(kernel.columns)))
     response = OutputsResponse(kernel=kernel)
     values = dict(zip(response.outputs, response(x).values.T, strict=True))
     force = values["largest pin force, rated torque [N]"]
     line_load = values["largest line load, rated torque [N/mm]"]
     np.testing.assert_allclose(line_load * stage.face_width / MILLIMETRE, force, rtol=1e-12)
-    torque = -abs(prepared.reducer.load.rated_torque)
+    torque = -abs(prepared.model.reducer.load.rated_torque)
     solved = kernel.model.equilibria(kernel.errors(x), torque, LOOP_ANGLES[::9])
     pins = forces(solved).pins
     pressure = np.zeros(3)
@@ -117,7 +117,7 @@ def test_line_load_and_pressure_are_those_of_the_most_loaded_pin(prepared, gener
         path /= stage.shortening * (1 + stage.pin_count) * cosine - (1 + stage.pin_count * stage.shortening**2)
         tooth = -(path + stage.pin_radius)
         curvature = 1 / stage.pin_radius + 1 / tooth
-        modulus = prepared.reducer.contact_modulus
+        modulus = prepared.model.reducer.contact_modulus
         own = np.sqrt(pins[:, angle, disc, pin] * modulus * curvature / (np.pi * stage.face_width))
         pressure = np.maximum(pressure, own)
     np.testing.assert_allclose(values["peak pressure, rated torque [MPa]"], pressure / MEGAPASCAL, rtol=1e-9)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
 from tolalloc.capability.rare_failure.form import design_point
@@ -252,10 +252,10 @@ def test_arguments_out_of_range():
 
 def test_kernel_agrees_with_random_units():
     """A share near 1 % by small subset simulations, within 3.5 standard errors of random units of another seed."""
-    prepared = prepare(Study(name="kernel"))
-    errors = prepared.space.errors
-    limit = ResponseLimitWithGradient(experiment=Experiment.of(prepared.kernel, errors, SeedTree(0)), limit=80.0)
-    units = monte_carlo(Experiment.of(prepared.kernel, errors, SeedTree(1, ("units",))), 3000)
+    study = prepared(name="kernel")
+    errors, kernel = study.errors, study.model.kernel
+    limit = ResponseLimitWithGradient(experiment=Experiment.of(kernel, errors, SeedTree(0)), limit=80.0)
+    units = monte_carlo(Experiment.of(kernel, errors, SeedTree(1, ("units",))), 3000)
     share = 1 - units.within(80.0).estimate
     found = subset_simulation(limit, SeedTree(0), samples=1000, runs=2)
     error = np.hypot(found.standard_error, np.sqrt(share / 3000))

@@ -7,8 +7,8 @@ from math import exp
 
 import numpy as np
 import pytest
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
@@ -150,13 +150,14 @@ def test_source_of_the_shipped_file():
 def test_the_study_knows_the_uncertainty_and_the_allocation_does_not(tmp_path):
     shipped = load_identified_stiffness("rv20e_table6")
     doubled = {name: 2 * value for name, value in shipped.standard_uncertainty.items()}
-    prepared = []
+    studies = []
     for name, identified in (("one", shipped), ("two", replace(shipped, standard_uncertainty=doubled))):
         (tmp_path / name).mkdir()
         write_identified_stiffness(identified, tmp_path / name / "bench.toml")
-        study = Study(name="same", stiffness=tmp_path / name / "bench.toml")
-        prepared.append(prepare(study))
-    one, two = (replace(item, study=Study(name="same")).hash for item in prepared)
-    assert one != two
-    assert prepared[0].space.errors.joint == ()
-    assert prepare(Study(name="none")).stiffness is None
+        studies.append(prepared(name="same", reducer={"stiffness": tmp_path / name / "bench.toml"}))
+    assert studies[0].digest != studies[1].digest
+    for study in studies:
+        assert study.space.errors.joint == ()
+        (known,) = study.model.uncertain
+        assert known.name == NAME
+    assert prepared(name="none").model.uncertain == ()

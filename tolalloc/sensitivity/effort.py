@@ -86,7 +86,7 @@ class RankingEffort:
             raise self._refusal("sobol.resamples", sobol.resamples, "2 or more")
 
     @staticmethod
-    def _refusal(field_name: str, value: float, allowed: str) -> InputError:
+    def _refusal(field_name: str, value: object, allowed: str) -> InputError:
         return InputError.at("study", f"effort.ranking.{field_name}", value, allowed)
 
 
