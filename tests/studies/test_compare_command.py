@@ -20,11 +20,14 @@ SUMMARY = {
     "cost [cost units]": 41.6,
 }
 
+NEEDED = ("study", "study hash", "quick", "yield [-]")
 
-def run_folder(place, cost=41.6, index=0.3, zone=4.0, **changes):
-    place.mkdir()
+
+def run_folder(place, cost=41.6, index=0.3, zone=4.0, asked="allocation", **changes):
+    (place / "tables").mkdir(parents=True)
     summary = SUMMARY | {"cost [cost units]": cost} | changes
-    (place / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    summary |= {"study": place.name, "study hash": place.name, "quick": False}
+    (place / "summary.json").write_text(json.dumps({asked: summary}), encoding="utf-8")
     manifest = {"study": place.name, "study hash": place.name, "quick": False, "versions": {"tolalloc": "0.1.0"}}
     (place / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     ranking = {
@@ -34,7 +37,7 @@ def run_folder(place, cost=41.6, index=0.3, zone=4.0, **changes):
         "ST low 5 % [-]": [index - 0.02, 0.05],
         "ST high 95 % [-]": [index + 0.02, 0.15],
     }
-    pd.DataFrame(ranking).to_csv(place / "sensitivity.csv", index=False)
+    pd.DataFrame(ranking).to_csv(place / "tables" / f"{'shares' if asked == 'allocation' else asked}.csv", index=False)
     zones = {
         "id": ["disc1.pitch", "pin.diameter"],
         "unit": ["µm", "µm"],
@@ -42,7 +45,9 @@ def run_folder(place, cost=41.6, index=0.3, zone=4.0, **changes):
         "minus [unit]": [0.0, -2.0],
         "cost [cost units]": [3.0, 1.0],
     }
-    pd.DataFrame(zones).to_csv(place / "allocation.csv", index=False)
+    pd.DataFrame(zones).to_csv(
+        place / ("allocation.csv" if asked == "allocation" else "tables/tolerances.csv"), index=False
+    )
     return place
 
 
@@ -76,9 +81,31 @@ def test_runs_of_other_questions_and_the_same_run_are_told(runs, tmp_path):
     assert any("one and the same study" in sentence for sentence in warnings)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [{"reducer": "RV-40E"}, {"torque [N·m]": -167.0}, {"yield target [-]": 0.99}, {"lower limit [arcsec]": 1.0}],
+)
+def test_another_reducer_torque_yield_or_side_is_another_question(tmp_path, changes):
+    runs = (run_folder(tmp_path / "one", asked="ranking"), run_folder(tmp_path / "two", asked="ranking", **changes))
+    for pair in (runs, runs[::-1]):
+        assert json.loads(tolalloc("compare", *pair, "--json").stdout)["same question"] is False
+
+
+def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
+    runs = []
+    for name, index in (("one", 0.3), ("two", 0.4)):
+        runs.append(run_folder(tmp_path / name, index=index, asked="ranking", **{"lower limit [N·m/arcmin]": 150.0}))
+        said = json.loads((runs[-1] / "summary.json").read_text(encoding="utf-8"))
+        del said["ranking"]["limit [arcsec]"], said["ranking"]["met"]
+        (runs[-1] / "summary.json").write_text(json.dumps(said), encoding="utf-8")
+    result = tolalloc("compare", *runs)
+    assert result.returncode == 0, result.stderr
+    assert "A: one: 99.87% of units keep the limit of 150 N·m/arcmin." in " ".join(result.stdout.split())
+
+
 def test_a_source_of_one_run_alone_is_shown(runs):
-    table = pd.read_csv(runs[1] / "sensitivity.csv").iloc[:1]
-    table.to_csv(runs[1] / "sensitivity.csv", index=False)
+    table = pd.read_csv(runs[1] / "tables" / "shares.csv").iloc[:1]
+    table.to_csv(runs[1] / "tables" / "shares.csv", index=False)
     answer = json.loads(tolalloc("compare", *runs, "--json").stdout)
     assert answer["rankings"][1]["90 % intervals"] == "only in one"
     assert answer["rankings"][1]["total index B [-]"] is None
@@ -90,9 +117,11 @@ def test_a_source_of_one_run_alone_is_shown(runs):
         ("summary.json", None, ["no such file", "folder of a finished run"]),
         ("summary.json", "{", ["cannot be read as JSON", "truncated"]),
         ("summary.json", "[]", ["holds a list"]),
-        ("summary.json", "{}", ["limit [arcsec] is missing"]),
-        ("sensitivity.csv", None, ["no such file"]),
-        ("sensitivity.csv", "", ["cannot be read as a table"]),
+        ("summary.json", "{}", ["neither a ranking nor an allocation"]),
+        ("summary.json", '{"allocation": {}}', ["study is missing"]),
+        ("summary.json", json.dumps({"ranking": {**dict.fromkeys(NEEDED, 0)}}), ["limit is missing"]),
+        ("tables/shares.csv", None, ["no such file"]),
+        ("tables/shares.csv", "", ["cannot be read as a table"]),
         ("allocation.csv", "id\nx\n", ["unit is missing"]),
     ],
 )

@@ -106,9 +106,8 @@ class ComparisonAnswer(Answer):
 
     @property
     def same_question(self) -> bool:
-        """Whether both were asked for the same reducer, torque, limit and yield."""
-        asked = [name for name in self.first.summary if name.startswith("limit")]
-        asked += ["model", "torque [N·m]", "yield target [-]"]
+        """Whether both were asked for the same reducer or model, torque, limits and yield."""
+        asked = ("reducer", "model", "torque [N·m]", "yield target [-]", *self.first.limits, *self.second.limits)
         return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked)
 
 
@@ -192,8 +191,9 @@ def _sentences(comparison: ComparisonAnswer) -> tuple[str, ...]:
     sentences = []
     for label, run in zip(comparison.names, comparison.runs, strict=True):
         found = run.summary
-        limit = next(name for name in found if name.startswith("limit"))
-        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {with_unit(f'{found[limit]:g}', limit)}"
+        # Ranking and allocation of one run may name the same limit differently.
+        limits = " and ".join(dict.fromkeys(with_unit(f"{limit:g}", name) for name, limit in run.limits.items()))
+        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {limits}"
         if "met" in found:  # an allocation; a ranking alone decides nothing
             kept += f", {'met' if found['met'] else 'NOT met'}, cost {found['cost [cost units]']:.2f} cost units"
         sentences.append(f"{kept}.")

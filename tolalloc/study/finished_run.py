@@ -13,6 +13,7 @@ from tolalloc.exceptions import InputError
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
+_LIMITS = ("limit", "lower limit")
 _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
 
 
@@ -38,6 +39,11 @@ class FinishedRun:
     ranking: pd.DataFrame
     zones: pd.DataFrame
 
+    @property
+    def limits(self) -> dict[str, float]:
+        """Limits of the leading output by the names that the summary gives them, the upper one first."""
+        return {name: value for name, value in self.summary.items() if name.startswith(_LIMITS)}
+
 
 def read_run(folder: Path) -> FinishedRun:
     """Return what a finished run's folder says.
@@ -55,6 +61,8 @@ def read_run(folder: Path) -> FinishedRun:
         raise InputError(f"{folder / 'summary.json'}: it holds neither a ranking nor an allocation.")
     summary = {name: value for answer in answers for name, value in answer.items()}
     summary = _with(summary, ("study", "study hash", "quick", "yield [-]"), folder / "summary.json")
+    if not any(name.startswith(_LIMITS) for name in summary):
+        raise InputError(f"{folder / 'summary.json'}: its limit is missing; the run is of another version.")
     ranked = "ranking" if "ranking" in said else "shares"
     zones = "allocation.csv" if "allocation" in said else "tables/tolerances.csv"
     return FinishedRun(

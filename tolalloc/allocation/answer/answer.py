@@ -180,7 +180,7 @@ class AllocationAnswer(Answer):
         answered = {
             "study": self.header.name,
             "study hash": self.header.digest,
-            "model": self.header.model,
+            self.model.kind: self.header.model,
             **self.header.conditions,
             limit: free.limit,
             "yield target [-]": getattr(guarantee, "target", None),
