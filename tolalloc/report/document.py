@@ -96,10 +96,11 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     warnings: list[str] = []
     assumptions: list[str] = []
     summary: dict[str, Any] = {}
-    names: set[str] = set()
+    own_tables: set[str] = set()
+    own_figures: set[str] = set()
     for part, document in parts:
-        tables = {name: _free(name, part, names) for name in document.tables}
-        figures = {name: _free(name, part, names) for name in document.figures}
+        tables = {name: _free(name, part, own_tables) for name in document.tables}
+        figures = {name: _free(name, part, own_figures) for name in document.figures}
         for section in document.sections:
             sections.append(
                 replace(
