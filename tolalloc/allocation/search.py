@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.pareto import FrontEffort
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution, Stack
-from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
@@ -125,35 +123,6 @@ class Allocation:
         """
         unused = min(1.0, self.by_hand.quantile_bound / self.limit)
         return 1 - self.chosen.cost / (self.by_hand.cost * unused)
-
-
-def require_reachable(response: QuantileResponse, limit: float, place: str) -> None:
-    """Raise unless the smallest zones of the table, with the best corner of the settings, can keep an upper limit.
-
-    Parameters
-    ----------
-    response
-        Quantile of a design on the real model.
-    limit
-        Largest value of the leading output allowed [unit of the output].
-    place
-        Where it stands, for the message.
-
-    Raises
-    ------
-    InputError
-        The limit is below what the smallest zones leave, or no zone may change.
-    """
-    space = response.space
-    require_groups(space, place)
-    scales, ends = space.lower[: len(space.groups)], zip(space.shared.lower, space.shared.upper, strict=True)
-    corners = np.array([[*scales, *corner] for corner in product(*ends)])
-    least = float(response(corners).values.min())
-    if not least <= limit:
-        raise InputError(
-            f"{place}: the limit of {response.output} is {limit:g}; allowed is {least:.3g} or more, which units keep "
-            "with every zone at its smallest (min in the tolerance table)."
-        )
 
 
 def require_groups(space: DesignSpace, place: str) -> None:
