@@ -13,11 +13,13 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Model, Setting, SettingDerivatives
+from tolalloc.models import Evaluation, Model, Observer, Setting, SettingDerivatives, unobserved
 from tolalloc.units import MILLIMETRE
 
-_STEP = 0.01
-"""Step of a difference to either side, over the zone [-]."""
+_STEP = 1e-4
+"""Step of a difference to either side, over the zone, for a function without noise [-]."""
+_STEP_OF_SIMULATION = 0.02
+"""The same for a simulation, whose solver leaves noise [-]."""
 _FAILURES = (ArithmeticError, ValueError, OverflowError, FloatingPointError)
 """What a function may raise for a sample that has no answer."""
 
@@ -40,7 +42,9 @@ class FunctionModel:
         What the designer chooses beside the zones.
     jacobian
         Takes what the function takes and returns, for every output, the derivative by every input [unit of the output
-        per mm]; central differences of a hundredth of the zone unless given.
+        per mm]; central differences unless given.
+    step
+        Step of these differences to either side, over the zone [-].
     name
         What a report calls the model.
     """
@@ -50,6 +54,7 @@ class FunctionModel:
     outputs: tuple[str, ...]
     settings: tuple[Setting, ...] = ()
     jacobian: Callable[..., Any] | None = None
+    step: float = _STEP
     name: str = "own model"
 
     def __post_init__(self) -> None:
@@ -79,7 +84,7 @@ class FunctionModel:
         return BoundFunction(
             source=self,
             varied=errors.columns,
-            steps=_STEP * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
+            steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
             offsets=np.array([nominal.get(name, 0.0) + errors.still.get(name, 0.0) for name in self.inputs]),
             values=tuple(setting.value for setting in self.settings),
         )
@@ -103,6 +108,8 @@ class BoundFunction(Model):
         Values of the settings in force [units of their names].
     asked
         Names of the outputs that a call returns; all unless given.
+    observe
+        Told the statuses of each call.
     """
 
     source: FunctionModel
@@ -111,6 +118,7 @@ class BoundFunction(Model):
     offsets: Float[np.ndarray, " input"]
     values: tuple[float, ...] = ()
     asked: tuple[str, ...] = ()
+    observe: Observer = unobserved
 
     @property
     def name(self) -> str:
@@ -144,6 +152,10 @@ class BoundFunction(Model):
         known = (code.co_code, code.co_consts) if code else repr(self.source.function)
         return (self.name, self.source.inputs, self.source.outputs, self.settings, known)
 
+    def observed(self, observe: Observer) -> BoundFunction:
+        """Return the model that tells someone the statuses of each call, those of differences among them."""
+        return replace(self, observe=observe)
+
     def at(self, values: Float[np.ndarray, " setting"]) -> BoundFunction:
         """Return the model at other values of its settings."""
         return replace(self, values=tuple(float(value) for value in values))
@@ -159,7 +171,9 @@ class BoundFunction(Model):
         """Return the outputs of every sample; one for which the function raises or returns no number fails."""
         found = self._called(self.source.function, x, len(self.source.outputs))
         values = found[:, [self.source.outputs.index(name) for name in self.outputs]]
-        return Evaluation(values=values, status=np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8))
+        status = np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8)
+        self.observe(status)
+        return Evaluation(values=values, status=status)
 
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return the first output of every sample with its derivatives."""
@@ -273,4 +287,6 @@ def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], s
     from tolalloc.fmu import simulated
 
     function = simulated(path, tuple(inputs.values()), tuple(outputs.values()), stop_time)
-    return FunctionModel(function=function, inputs=tuple(inputs), outputs=tuple(outputs), name=function.name)
+    return FunctionModel(
+        function=function, inputs=tuple(inputs), outputs=tuple(outputs), step=_STEP_OF_SIMULATION, name=function.name
+    )

@@ -199,6 +199,11 @@ class Model(ABC):
         return self
 
     @property
+    def settings_word(self) -> str:
+        """What a sentence calls all settings together."""
+        return "settings"
+
+    @property
     def exact(self) -> tuple[str, ...]:
         """Names of the outputs whose derivatives are known exactly."""
         return ()

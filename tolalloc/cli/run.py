@@ -117,11 +117,13 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
 
 def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, as_json: bool) -> None:
     """Run some questions of a study, write its folder and say the answers."""
+    from tolalloc.function_model import FunctionModel
     from tolalloc.study.questions import named
     from tolalloc.study.runner import run as run_study
 
     questions = named(kinds, tuple(study.questions), f"study {study.name}")
-    announce_compilation()
+    if not isinstance(study.model, FunctionModel):
+        announce_compilation()
     with UnitProgress() as progress:
         found = run_study(study, folder, questions, progress, checkpoint)
     messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)

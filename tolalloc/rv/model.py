@@ -137,6 +137,11 @@ class ReducerModel(Model):
         return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
 
     @property
+    def settings_word(self) -> str:
+        """Both clearances are those of the tooth modification."""
+        return "modification"
+
+    @property
     def exact(self) -> tuple[str, ...]:
         """The peak-to-peak alone."""
         return (PEAK_TO_PEAK,)

@@ -81,6 +81,11 @@ class AllocationAnswer(Answer):
     loss: QualityLoss | None
 
     @property
+    def free_label(self) -> str:
+        """What the search that frees everything may choose."""
+        return f"tolerances and {self.model.settings_word}" if self.space.settings else "tolerances"
+
+    @property
     def leading(self) -> str:
         """Name of the leading output, which the first requirement limits."""
         return self.requirements[0].output
@@ -200,7 +205,7 @@ class AllocationAnswer(Answer):
             "saving [-]": 1 - chosen.cost / free.by_hand.cost,
             "saving at least [-]": self.least_saving,
             "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
-            "cost of tolerances and modification [cost units]": free.chosen.cost,
+            f"cost of {self.free_label} [cost units]": free.chosen.cost,
             "cost on grades [cost units]": self.graded.chosen.cost if self.graded else None,
             "certified bound [cost units]": self.bound if chosen.met else None,
             "gap of the convex program [-]": free.optimum.gap,

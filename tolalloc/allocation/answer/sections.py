@@ -113,7 +113,7 @@ def _what_if(answer: AllocationAnswer) -> tuple[Section, ...]:
     if answer.trade:
         found.append(
             Section(
-                heading="Modification against tolerances",
+                heading=f"{answer.model.settings_word.capitalize()} against tolerances",
                 paragraphs=_cheapest_settings(answer),
                 figures=figures.trade_figures(answer, answer.trade),
                 tables=(("modification", what_if_tables.trade_table(answer.trade)),),

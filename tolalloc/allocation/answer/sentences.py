@@ -69,13 +69,15 @@ def _against(cost: float, other: float) -> str:
 def _cost(answer: AllocationAnswer) -> str:
     """Return what the drawing costs, and what uniform scaling does."""
     chosen, hand = answer.chosen, answer.free.by_hand
-    used = ", which missed a limit"
-    if hand.met:
+    used = "" if hand.met else ", which missed a limit"
+    as_it_is = f" with the {answer.model.settings_word} as it is" if answer.space.settings else ""
+    if hand.met and answer.requirements[0].limits.lower is None:
+        unit = unit_of(answer.leading).replace("arcsec", "arcsecond")
         least = chosen.cost / (1 - answer.least_saving)
-        used = f", and {_against(chosen.cost, least)} that had it used the limit to its last arcsecond ({least:.2f})"
+        used = f", and {_against(chosen.cost, least)} that had it used the limit to its last {unit} ({least:.2f})"
     return (
-        f"Cost {chosen.cost:.2f} cost units, {_against(chosen.cost, hand.cost)} all zones scaled alike with the "
-        f"modification as it is ({hand.cost:.2f}){used}."
+        f"Cost {chosen.cost:.2f} cost units, {_against(chosen.cost, hand.cost)} all zones scaled alike"
+        f"{as_it_is} ({hand.cost:.2f}){used}."
     )
 
 
@@ -96,8 +98,9 @@ def _free(answer: AllocationAnswer) -> tuple[str, ...]:
         else ""
     )
     design = "the verified design with free zones" if answer.graded else "the verified design"
+    chosen = f"zones, processes and {answer.model.settings_word}" if answer.space.settings else "zones and processes"
     return (
-        f"Certified: by the local models around {design}, no zones, processes and clearances that keep the limits cost "
+        f"Certified: by the local models around {design}, no {chosen} that keep the limits cost "
         f"less than {joint.bound:.2f}; it costs {max(joint.gap, 0.0):.1%} more ({joint.chosen.cost:.2f}){margin}.",
     )
 
@@ -122,15 +125,15 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what the modification buys."""
     if answer.fixed is None:
         return () if answer.free.chosen.met else (f"No design was verified: {missed(answer.free.chosen)}.",)
-    alone, joint = answer.fixed.chosen, answer.free.chosen
+    alone, joint, freed = answer.fixed.chosen, answer.free.chosen, answer.model.settings_word
     if not joint.met:
-        said = (f"With tolerances and modification free no design was verified: {missed(joint)}.",)
+        said = (f"With {answer.free_label} free no design was verified: {missed(joint)}.",)
         return said if alone.met else (*said, f"Nor with tolerances alone: {missed(alone)}.")
     if not alone.met:
-        return (f"Tolerances alone were not verified: {missed(alone)}; the modification makes the difference.",)
+        return (f"Tolerances alone were not verified: {missed(alone)}; the {freed} makes the difference.",)
     saving = 1 - joint.cost / alone.cost
     if saving < _SAME_COST:
-        return (f"Nothing cheaper was found with the modification free: as it is, the zones cost {alone.cost:.2f}.",)
+        return (f"Nothing cheaper was found with the {freed} free: as it is, the zones cost {alone.cost:.2f}.",)
     doubt = ""
     if max(answer.fixed.gap, answer.free.gap) > saving:
         doubt = (
@@ -138,7 +141,7 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
             "so up to that much of it may be the search)"
         )
     return (
-        f"The modification saves {alone.cost - joint.cost:.2f} cost units ({saving:.1%}) against tolerances alone "
+        f"The {freed} saves {alone.cost - joint.cost:.2f} cost units ({saving:.1%}) against tolerances alone "
         f"({alone.cost:.2f}){doubt}.",
     )
 

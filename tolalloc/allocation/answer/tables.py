@@ -35,7 +35,7 @@ def designs(answer: AllocationAnswer) -> dict[str, VerifiedDesign]:
 
 def searches(answer: AllocationAnswer) -> dict[str, Allocation]:
     """Return the searches by what they were free to choose."""
-    free = {"tolerances and modification" if answer.space.settings else "tolerances": answer.free}
+    free = {answer.free_label: answer.free}
     return {"tolerances alone": answer.fixed, **free} if answer.fixed else free
 
 
@@ -69,7 +69,7 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
 
 
 def designs_table(answer: AllocationAnswer) -> pd.DataFrame:
-    """Return cost, yield and clearances of the compared designs."""
+    """Return cost, yield and settings of the compared designs."""
     rows, drawn = [], answer.model.drawn_amounts
     for label, design in designs(answer).items():
         kept = short(answer.leading)
