@@ -11,7 +11,7 @@ from published.modification_comparison import compared, comparison_document
 import tolalloc as ta
 from tolalloc.cli.console import UnitProgress
 from tolalloc.report.document import Document, Section
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import reference
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
 from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.files import load_reducer

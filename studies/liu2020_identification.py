@@ -21,7 +21,7 @@ from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.study import IdentificationStudy, identify
-from tolalloc.bench.measurement.records import Measurements
+from tolalloc.bench.measurement.files import Measurements
 from tolalloc.cli.console import UnitProgress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree

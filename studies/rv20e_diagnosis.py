@@ -16,7 +16,7 @@ from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.diagnosis.sources import dominant, reductions
-from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.chunks import one_thread
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure

@@ -12,9 +12,8 @@ import tolalloc as ta
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.dynamics.modes import modes
 from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
-from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, orders_against_speed
+from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, modes, orders_against_speed
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit

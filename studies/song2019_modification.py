@@ -17,7 +17,7 @@ from tolalloc.report.document import Document, Section
 from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import reference
 from tolalloc.rv.modification.rotated_profile import METRICS, rotated_profile_fit
 from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.design import CycloidStage, Modification, Reducer

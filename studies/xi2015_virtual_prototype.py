@@ -14,8 +14,8 @@ import tolalloc as ta
 from tolalloc.cli.console import UnitProgress
 from tolalloc.exceptions import InputError
 from tolalloc.report.document import Document, Section
-from tolalloc.rv.multibody.engine import engine
 from tolalloc.rv.multibody.prototype import with_rigid_bearings
+from tolalloc.rv.multibody.system import engine
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.simulation.answer import SimulationAnswer, range_text

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from tolalloc.function_model import from_fmu as from_fmu
     from tolalloc.function_model import model as model
     from tolalloc.models import Setting as Setting
+    from tolalloc.rv import BACKLASH as BACKLASH
+    from tolalloc.rv import LOST_MOTION as LOST_MOTION
+    from tolalloc.rv import PEAK_TO_PEAK as PEAK_TO_PEAK
+    from tolalloc.rv import RADIAL_CLEARANCE as RADIAL_CLEARANCE
+    from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.rv.choice import reducer as reducer
-    from tolalloc.rv.outputs import BACKLASH as BACKLASH
-    from tolalloc.rv.outputs import LOST_MOTION as LOST_MOTION
-    from tolalloc.rv.outputs import PEAK_TO_PEAK as PEAK_TO_PEAK
-    from tolalloc.rv.outputs import RADIAL_CLEARANCE as RADIAL_CLEARANCE
-    from tolalloc.rv.outputs import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.study.effort import Effort as Effort
     from tolalloc.study.limit import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -48,24 +48,24 @@ _WHERE = {
     "Allocation": "study.questions",
     "AtCpk": "allocation.guarantee",
     "AtYield": "allocation.guarantee",
-    "BACKLASH": "rv.outputs",
+    "BACKLASH": "rv",
     "Calculation": "study.questions",
     "Drawing": "drawings.drawing",
     "Effort": "study.effort",
     "InputError": "exceptions",
-    "LOST_MOTION": "rv.outputs",
+    "LOST_MOTION": "rv",
     "Limit": "study.limit",
-    "PEAK_TO_PEAK": "rv.outputs",
+    "PEAK_TO_PEAK": "rv",
     "QualityLoss": "allocation.cost.unit_price",
     "Question": "study.questions",
-    "RADIAL_CLEARANCE": "rv.outputs",
+    "RADIAL_CLEARANCE": "rv",
     "Ranking": "study.questions",
     "RootSumSquare": "allocation.guarantee",
     "RunFolderError": "exceptions",
     "Setting": "models",
     "SolveError": "exceptions",
     "Study": "study.study",
-    "TORSIONAL_STIFFNESS": "rv.outputs",
+    "TORSIONAL_STIFFNESS": "rv",
     "TolallocError": "exceptions",
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",

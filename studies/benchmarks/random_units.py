@@ -18,8 +18,8 @@ from collections import Counter
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.rv.equivalent.answers import count_statuses
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.status import count_statuses
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCSECOND, MICROMETRE

@@ -19,16 +19,15 @@ from tolalloc.bench.identification.answer import IdentificationAnswer
 from tolalloc.bench.identification.gauss_newton import NAME as GAUSS_NEWTON
 from tolalloc.bench.identification.gauss_newton import Batch, Identified, gauss_newton, starts
 from tolalloc.bench.identification.parameters import BIAS
-from tolalloc.bench.identification.prediction import KernelPredictor
+from tolalloc.bench.identification.prediction import KernelPredictor, StandIn
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.stand_in import StandIn
 from tolalloc.bench.identification.study import STARTS
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.progress import Progress
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.modification.history import History, quartiles
+from tolalloc.rv.modification.problem import History, quartiles
 
 from .liu2020_swarm import ImprovedPSO
 

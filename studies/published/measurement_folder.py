@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.measurement.records import Measurements
+from tolalloc.bench.measurement.files import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.files import as_toml, require_new, write_new
 from tolalloc.rv.reducer.unit_table import write_table, write_units

@@ -18,9 +18,16 @@ from scipy.optimize import minimize as minimize_downhill
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.history import History, quartiles
-from tolalloc.rv.modification.problem import Amounts, EvaluatedAmounts, ModificationProblem
-from tolalloc.rv.modification.reference import BestPoint, Optimum, reference
+from tolalloc.rv.modification.problem import (
+    Amounts,
+    BestPoint,
+    EvaluatedAmounts,
+    History,
+    ModificationProblem,
+    Optimum,
+    quartiles,
+    reference,
+)
 from tolalloc.units import MILLIMETRE
 
 REACHED = 1e-6 * MILLIMETRE

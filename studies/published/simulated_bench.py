@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, data_of
 from tolalloc.bench.identification.prediction import KernelPredictor
-from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.bench.measurement.files import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.reducer.design import Reducer

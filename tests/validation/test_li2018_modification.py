@@ -11,7 +11,7 @@ from studies.published.li2018_genetic import LI2018, binary_search
 from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import reference
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE

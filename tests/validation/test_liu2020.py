@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.units import ARCMINUTE, ARCSECOND
 
 PUBLISHED = np.loadtxt(Path(__file__).parent / "rv20e_table4_curves.csv", delimiter=",", skiprows=1)

@@ -14,7 +14,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import reference
 from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
 from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE

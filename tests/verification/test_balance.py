@@ -23,10 +23,10 @@ import pytest
 from tests.random_reducers import Case, random_case, random_reducer, random_unit
 from tests.seeds import seeds
 from tests.verification.dense_twin import DenseModel, dense_model
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND
 

@@ -19,9 +19,9 @@ from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
 from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Clearances, CycloidStage, Modification, Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE

@@ -10,11 +10,19 @@ import pytest
 from tests.prepared import prepared as baseline
 from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
 from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
-from tolalloc.bench.diagnosis.half_turn import exchanged, half_turn, has_half_turn, with_twins
 from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort, climb
-from tolalloc.bench.diagnosis.sources import dominant, groups, named_set, reductions
-from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.bench.diagnosis.sources import (
+    dominant,
+    exchanged,
+    groups,
+    half_turn,
+    has_half_turn,
+    named_set,
+    reductions,
+    with_twins,
+)
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError

@@ -10,15 +10,14 @@ from scipy.linalg import eigh
 
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.dynamics.modes import Modes, modes
 from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
 from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.dynamics.simulation import simulate
-from tolalloc.rv.dynamics.speeds import campbell, orders_against_speed
+from tolalloc.rv.dynamics.speeds import Modes, campbell, modes, orders_against_speed
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.kinematics import Coordinates
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Clearances
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND

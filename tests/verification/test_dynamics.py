@@ -19,9 +19,9 @@ from tolalloc.exceptions import InputError
 from tolalloc.rv.dynamics.motion import Motion, SpeedProfile, motion_of, nominal_acceleration
 from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.dynamics.simulation import Simulated, simulate
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.reducer.design import Clearances
 from tolalloc.units import ARCSECOND
 

@@ -15,11 +15,10 @@ from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
 from tolalloc.rv.cycloid.solvers import LOGARITHMIC
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.angle_search import AngleSearch
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
 from tolalloc.units import ARCSECOND
 
 CASES = 200

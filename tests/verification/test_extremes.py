@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.random_units import random_units
-from tolalloc.rv.equivalent.angle_search import AngleSearch
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
 from tolalloc.units import ARCSECOND
 
 

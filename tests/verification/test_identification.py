@@ -19,11 +19,10 @@ from tolalloc.bench.identification.data import AllReadings, ReadingBlock, data_o
 from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
 from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import LIU2020, Parameter, parameter
-from tolalloc.bench.identification.prediction import KernelPredictor, Prediction
+from tolalloc.bench.identification.prediction import KernelPredictor, Prediction, StandIn, fit_stand_in
 from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
 from tolalloc.bench.identification.profile import as_stiffness, estimates, profile
 from tolalloc.bench.identification.resampling import bootstrap, judged, simplest
-from tolalloc.bench.identification.stand_in import StandIn, fit_stand_in
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

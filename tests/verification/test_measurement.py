@@ -9,9 +9,14 @@ import pytest
 
 from studies.published.measurement_folder import write_measurements
 from tolalloc.bench.measurement.cleaning import clean_curve, clean_loop
-from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.bench.measurement.files import (
+    MeasuredCurve,
+    MeasuredLoop,
+    MeasuredPeakToPeak,
+    Measurements,
+    load_measurements,
+)
 from tolalloc.bench.measurement.readings import RawReadings
-from tolalloc.bench.measurement.records import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.rv.reducer.unit_file import BuiltUnit

@@ -17,9 +17,7 @@ from studies.published.li2018_genetic import (
 )
 from studies.published.modification_searches import ALGORITHMS, REACHED, Recorder, Spread, polish, search, spread
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.history import History
-from tolalloc.rv.modification.problem import EvaluatedAmounts
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import EvaluatedAmounts, History, reference
 from tolalloc.rv.modification.residual_gap import residual_gap
 from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
 from tolalloc.rv.reducer.design import CycloidStage

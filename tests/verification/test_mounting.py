@@ -26,7 +26,7 @@ from tolalloc.assembly.mounting.places import (
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.steps import units_from
 from tolalloc.assembly.mounting.stock import PartStock
-from tolalloc.bench.diagnosis.half_turn import half_turn
+from tolalloc.bench.diagnosis.sources import half_turn
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

@@ -10,12 +10,11 @@ import pytest
 from tests.random_reducers import random_case
 from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium
-from tolalloc.rv.equivalent.angle_search import AngleSearch
 from tolalloc.rv.equivalent.attribution import attribute
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.hysteresis import BACKLASH, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
 from tolalloc.rv.reducer.design import Clearances
 from tolalloc.rv.reducer.files import load_reducer

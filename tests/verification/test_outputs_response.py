@@ -9,9 +9,9 @@ import pytest
 
 from tests.prepared import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.rv.equivalent.answers import Status, count_statuses
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.equivalent.status import Status, count_statuses
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 from tolalloc.units import ARCMINUTE, ARCSECOND
 

@@ -10,11 +10,10 @@ import pytest
 from tests.prepared import prepared as baseline
 from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.equivalent.radial_clearance import radial_clearance
-from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.equivalent.outputs import forces, radial_clearance
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
 from tolalloc.units import MEGAPASCAL, MICROMETRE, MILLIMETRE

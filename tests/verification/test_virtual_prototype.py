@@ -17,7 +17,7 @@ from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.multibody import engine as door
+from tolalloc.rv.multibody import system as door
 from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
 from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import RIGID, with_rigid_bearings

@@ -46,7 +46,7 @@ class TransmissionCurves:
     pins_in_contact
         Pins that carry load, all discs [-].
     status
-        Values of `tolalloc.rv.equivalent.status.Status` [-].
+        Values of `tolalloc.rv.equivalent.answers.Status` [-].
     """
 
     carrier_angle: Float[np.ndarray, " angle"]

@@ -23,7 +23,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header
-from tolalloc.rv.equivalent.status import OUTCOMES
+from tolalloc.rv.equivalent.answers import OUTCOMES
 
 SWEPT = (
     0.0,

@@ -1,1 +1,12 @@
 """The RV reducer: one model of this package, and its own tools."""
+
+PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
+"""Output side, one output turn, at the torque of the study."""
+LOST_MOTION = "lost motion [arcmin]"
+"""Between ±3 % of the rated torque."""
+BACKLASH = "backlash [arcmin]"
+"""Twist at no torque, between both directions."""
+TORSIONAL_STIFFNESS = "torsional stiffness [N·m/arcmin]"
+"""Between 3 % and 100 % of the rated torque."""
+RADIAL_CLEARANCE = "radial clearance at tip and root [µm]"
+"""Smallest one of a unit; negative where a tooth tip or root interferes."""

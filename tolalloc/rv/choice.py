@@ -1,22 +1,108 @@
-"""Which reducer a study asks, under which torque and with which stiffness: ``ta.reducer``."""
+"""Which reducer a study asks, ``ta.reducer``, and how it is bound to the sources of a drawing."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import neglected_columns
+from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
-from tolalloc.rv.bound import NEGLECTED, bind
+from tolalloc.rv.equivalent.columns import source_name
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
     from tolalloc.rv.model import ReducerModel
+
+
+NEGLECTED = (
+    "sun.pitch",
+    "planet*.pitch",
+    "mesh*",
+    "*.phase",
+    "*.rotation",
+    "*.tilt",
+    "*.clearance",
+    "each_pin.*",
+    "*.each_tooth.*",
+)
+"""Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
+
+_LARGEST_ZONE = 200.0 * MICROMETRE
+"""Largest zone of a reducer's part that is believed; a metre typed for a millimetre is far above it [m]."""
+
+
+def bind(
+    reducer: Reducer,
+    errors: ErrorModel,
+    torque: float | None,
+    place: str,
+    neglected: Sequence[str] = NEGLECTED,
+    unit: BuiltUnit | None = None,
+) -> tuple[KernelResponse, tuple[str, ...]]:
+    """Return the equivalent model at the sources of a drawing, and what the binding assumes; nothing is solved.
+
+    The model stands at the reducer's own modification and has the orders of the unit that is to be shown, if any; the
+    arguments are those of `ReducerChoice`, and the place is who asks, for messages.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A source or torque that is not allowed, or a column of the model that nobody gives.
+    """
+    require_small_zones(errors.sources, _LARGEST_ZONE, place)
+    orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
+    model = EquivalentModel(reducer, orders=orders or HARMONICS)
+    listed = {*errors.columns, *errors.still}
+    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
+    fixed: Mapping[str, float] = {
+        **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
+        **dict.fromkeys(_absent_orders(errors, model, place), 0.0),
+        **errors.still,
+        **reducer.modification.deviations,
+    }
+    kernel = KernelResponse(
+        model=model,
+        torque=reducer.torque_on_carrier(torque, place),
+        columns=errors.columns,
+        fixed=fixed,
+    )
+    if unit:
+        unit.errors(model.columns, reducer.modification.deviations)
+    exact = ", ".join(pattern for pattern, columns in left_out.items() if columns)
+    return kernel, ((f"not in the tolerance table and taken as exact: {exact}",) if exact else ())
+
+
+def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> list[str]:
+    """Return the columns of listed sources whose orders their spectra do not have.
+
+    Raises
+    ------
+    InputError
+        A source that lists only some of its pins or teeth.
+    """
+    absent = []
+    for source in errors.sources:
+        own = [column for column in model.columns if source_name(column) == source.name]
+        missing = [column for column in own if column not in source.columns]
+        if missing and not source.spectrum:
+            features = len({column.removesuffix(".x").removesuffix(".y") for column in own})
+            raise InputError.at(
+                f"{place}, tolerance table, {source.name}", "each", source.each, f"{features}, one per feature"
+            )
+        absent += missing
+    return absent
+
 
 _FARTHEST = 50.0
 """Largest clearance that a modification may be asked to leave, either way [µm]."""
@@ -30,10 +116,10 @@ class ReducerChoice:
     identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
     # Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m]
     torque: float | None = None
-    # Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root
-    # [µm]
+    # Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
+    # as they are unless given [µm]
     flank_clearance: tuple[float, float] | None = None
-    radial_clearance: tuple[float, float] | None = None  # As they are unless given [µm]
+    radial_clearance: tuple[float, float] | None = None
     # Sources that a drawing may leave out, taken as zero; ``*`` stands for anything
     neglected: tuple[str, ...] = NEGLECTED
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
@@ -53,18 +139,18 @@ class ReducerChoice:
         """
         from tolalloc.rv.model import ReducerModel
 
-        found = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
+        kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
         flank, radial = (
             (own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None
             for own in (self.flank_clearance, self.radial_clearance)
         )
         return ReducerModel(
-            kernel=found.kernel,
+            kernel=kernel,
             flank=flank,
             radial=radial,
             identified=self.identified,
             unit=self.unit,
-            bound_assumptions=found.assumptions,
+            bound_assumptions=assumptions,
         )
 
 

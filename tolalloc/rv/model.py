@@ -15,8 +15,8 @@ from tolalloc.exceptions import UnknownNameError
 from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
 from tolalloc.report.document import Section
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
+from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit

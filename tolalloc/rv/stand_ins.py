@@ -11,8 +11,7 @@ from numpy.polynomial import polynomial
 
 from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation, Response
-from tolalloc.rv.equivalent.angle_search import AngleSearch
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCSECOND
 

@@ -13,7 +13,7 @@ from tolalloc.exceptions import SolveError
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
-from tolalloc.rv.equivalent.answers import Equilibria, Extremes
+from tolalloc.rv.equivalent.answers import Equilibria, Extremes, Status, count_statuses
 from tolalloc.rv.equivalent.attribution import Attribution, attribute
 from tolalloc.rv.equivalent.hysteresis import (
     LOOP_ANGLES,
@@ -25,7 +25,6 @@ from tolalloc.rv.equivalent.hysteresis import (
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
-from tolalloc.rv.equivalent.status import Status, count_statuses
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE

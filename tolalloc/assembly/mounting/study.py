@@ -13,8 +13,8 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header
+from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.status import OUTCOMES
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.response.kernel import KernelResponse
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolalloc.bench.diagnosis.diagnosis import Diagnosis
 from tolalloc.bench.diagnosis.problem import Noise
-from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section

@@ -9,11 +9,19 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
-from tolalloc.bench.diagnosis.half_turn import exchanged, has_half_turn, with_twins
 from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort, explain, posterior
-from tolalloc.bench.diagnosis.sources import InseparableColumns, dominant, groups, named_set, reductions
-from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.bench.diagnosis.sources import (
+    InseparableColumns,
+    dominant,
+    exchanged,
+    groups,
+    has_half_turn,
+    named_set,
+    reductions,
+    with_twins,
+)
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure

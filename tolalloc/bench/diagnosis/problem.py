@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.bench.measurement.angles import TURN
-from tolalloc.bench.measurement.records import MeasuredCurve
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.chunks import map_chunks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError

@@ -10,16 +10,16 @@ from tolalloc.bench.diagnosis.diagnosis import diagnose
 from tolalloc.bench.diagnosis.problem import Noise
 from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.measurement.cleaning import clean_curve
+from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.bench.measurement.readings import ANGLE, TRANSMISSION_ERROR, load_readings
-from tolalloc.bench.measurement.records import MeasuredCurve
 from tolalloc.blas import one_blas_thread
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, Record
 from tolalloc.report.answer import Header
-from tolalloc.rv.bound import bind
-from tolalloc.rv.equivalent.status import OUTCOMES
+from tolalloc.rv.choice import bind
+from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCSECOND, DEGREE
 
@@ -67,9 +67,10 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
     SolveError
         Too many curves failed.
     """
-    bound, record = bind(asked.reducer, asked.errors, asked.torque_nm, PLACE), Record(progress, OUTCOMES)
+    record = Record(progress, OUTCOMES)
+    kernel, assumed = bind(asked.reducer, asked.errors, asked.torque_nm, PLACE)
     cleaned = clean_curve(load_readings(asked.curve, ANGLE, TRANSMISSION_ERROR), asked.angle_offset_deg * DEGREE)
-    kernel, errors = replace(bound.kernel, observe=record.observe), asked.errors
+    kernel, errors = replace(kernel, observe=record.observe), asked.errors
     curve = MeasuredCurve(
         unit=0,
         torque=kernel.torque,
@@ -88,7 +89,7 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
             name=asked.curve.stem,
             model=asked.reducer.name,
             seed=asked.seed,
-            assumptions=bound.assumptions,
+            assumptions=assumed,
             statuses=record.counts,
             stages=record.stages,
         ),

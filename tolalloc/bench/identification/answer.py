@@ -14,11 +14,10 @@ from tolalloc.bench.identification.data import PEAK_TO_PEAK, AllReadings
 from tolalloc.bench.identification.gauss_newton import Identified
 from tolalloc.bench.identification.information import Information
 from tolalloc.bench.identification.parameters import BIAS, Parameter
-from tolalloc.bench.identification.prediction import Prediction
+from tolalloc.bench.identification.prediction import LARGE_DRIFT, Prediction
 from tolalloc.bench.identification.profile import ParameterEstimate, ParameterProfile, as_stiffness
 from tolalloc.bench.identification.resampling import ParameterChoice
-from tolalloc.bench.identification.stand_in import LARGE_DRIFT
-from tolalloc.bench.measurement.records import Measurements
+from tolalloc.bench.measurement.files import Measurements
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section
 from tolalloc.rv.reducer.design import Reducer

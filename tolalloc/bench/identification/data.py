@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.bench.measurement.records import Measurements
+from tolalloc.bench.measurement.files import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.units import ARCSECOND
 

@@ -11,8 +11,8 @@ from jaxtyping import Float, Int
 from tolalloc.bench.identification.data import AllReadings
 from tolalloc.bench.identification.gauss_newton import gauss_newton
 from tolalloc.bench.identification.parameters import Parameter
+from tolalloc.bench.identification.prediction import StandIn
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.stand_in import StandIn
 from tolalloc.drawings.seeds import SeedTree
 
 RESAMPLES = 400

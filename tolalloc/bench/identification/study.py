@@ -12,12 +12,11 @@ from tolalloc.bench.identification.data import LOOP, AllReadings, data_of
 from tolalloc.bench.identification.gauss_newton import Identified, gauss_newton, starts
 from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, parameter
-from tolalloc.bench.identification.prediction import KernelPredictor
+from tolalloc.bench.identification.prediction import LARGE_DRIFT, KernelPredictor, StandIn, fit_stand_in
 from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
 from tolalloc.bench.identification.profile import estimates, profile
 from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoice, bootstrap, judged, simplest
-from tolalloc.bench.identification.stand_in import LARGE_DRIFT, StandIn, fit_stand_in
-from tolalloc.bench.measurement.records import Measurements
+from tolalloc.bench.measurement.files import Measurements
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress

@@ -48,7 +48,7 @@ class Simulated:
     output_acceleration: Float[np.ndarray, "sample time"]
     # Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it [N·m].
     input_torque: Float[np.ndarray, "sample time"]
-    # Number of pins that carry load, `tolalloc.rv.equivalent.status.Status`, unbalanced over largest force [-]
+    # Number of pins that carry load, `tolalloc.rv.equivalent.answers.Status`, unbalanced over largest force [-]
     pins_in_contact: UInt16[np.ndarray, "sample time disc"]
     status: UInt8[np.ndarray, "sample time"]
     residual: Float[np.ndarray, "sample time"]

@@ -1,15 +1,46 @@
-"""What the kernel answers: equilibria over a turn, extremes of the transmission error, derivatives."""
+"""What the kernel answers: how a solution ended, equilibria over a turn, extremes, derivatives."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8, UInt16
+from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
 from tolalloc.rv.equivalent.columns import Columns
 from tolalloc.rv.equivalent.condensation import CondensedAngles
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_FINITE, NOT_RESISTED
 from tolalloc.rv.reducer.design import Reducer
+
+
+class Status(IntEnum):
+    """Outcome of an equilibrium; the larger, the worse."""
+
+    CONVERGED = CONVERGED
+    NOT_CONVERGED = NOT_CONVERGED
+    NOT_RESISTED = NOT_RESISTED
+    NOT_FINITE = NOT_FINITE
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in words."""
+        return {
+            Status.CONVERGED: "equilibrium found",
+            Status.NOT_CONVERGED: "no equilibrium within the allowed number of Newton steps",
+            Status.NOT_RESISTED: "no pin resists the torque in its direction",
+            Status.NOT_FINITE: "an error value is not a finite number",
+        }[self]
+
+
+OUTCOMES: Mapping[int, str] = {int(item): item.sentence for item in Status}
+"""Status → outcome in words."""
+
+
+def count_statuses(status: Integer[np.ndarray, "..."]) -> Mapping[str, int]:
+    """Return how often each outcome occurred, by its sentence; every outcome is listed."""
+    return {item.sentence: int(np.count_nonzero(status == item)) for item in Status}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +57,7 @@ class Equilibria:
     transmission_error: Float[np.ndarray, "sample angle"]  # Carrier rotation beyond θc, output side [rad]
     # Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m]
     retained: Float[np.ndarray, "sample angle coordinate"]
-    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.rv.equivalent.status.Status` [-]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.rv.equivalent.answers.Status` [-]
     residual: Float[np.ndarray, "sample angle"]  # Largest component of the unbalanced force over the largest force [-]
     pins_in_contact: UInt16[np.ndarray, "sample angle"]  # Number of pins that carry load, all discs [-]
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section
-from tolalloc.rv.modification.problem import ModificationProblem
-from tolalloc.rv.modification.reference import Optimum
+from tolalloc.rv.modification.problem import ModificationProblem, Optimum
 from tolalloc.rv.teeth.answer import ContactAnswer
 from tolalloc.units import ARCMINUTE, MICROMETRE
 

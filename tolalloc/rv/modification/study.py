@@ -8,8 +8,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.report.answer import Header
 from tolalloc.rv.cycloid.clearance import LARGE
 from tolalloc.rv.modification.answer import ModificationAnswer
-from tolalloc.rv.modification.problem import ModificationProblem
-from tolalloc.rv.modification.reference import reference
+from tolalloc.rv.modification.problem import ModificationProblem, reference
 from tolalloc.rv.modification.residual_gap import residual_gap
 from tolalloc.rv.modification.rotated_profile import METRICS, Metric, rotated_profile_fit
 from tolalloc.rv.reducer.design import Reducer

@@ -76,7 +76,7 @@ class PrototypeDamping:
         One of them is negative.
     """
 
-    bearings: float  # PrototypeDamping over stiffness of all bearings [s]
+    bearings: float  # Damping over stiffness of all bearings [s]
     output: float  # Torque on the carrier over what its speed lacks of the nominal one [N·m·s/rad]
 
     def __post_init__(self) -> None:
@@ -89,24 +89,19 @@ class PrototypeDamping:
 class Masses:
     """Mass and moment of inertia about the own centre of each moving part.
 
-    Parameters
-    ----------
-    crank_mass, disc_mass, carrier_mass
-        Of one crankshaft with its planet gear, one disc, the carrier [kg].
-    crank_inertia, disc_inertia
-        Of one crankshaft with its planet gear, one disc [kg·m²].
-
     Raises
     ------
     InputError
         One of them is not above 0.
     """
 
+    # Of one crankshaft with its planet gear [kg, kg·m²]
     crank_mass: float
     crank_inertia: float
+    # Of one disc [kg, kg·m²]
     disc_mass: float
     disc_inertia: float
-    carrier_mass: float
+    carrier_mass: float  # Of the carrier [kg]
     carrier_inertia: float  # Of the carrier with all that the output drives [kg·m²]
 
     def __post_init__(self) -> None:

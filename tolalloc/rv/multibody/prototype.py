@@ -10,10 +10,9 @@ from jaxtyping import Float
 
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
-from tolalloc.rv.multibody.engine import engine
 from tolalloc.rv.multibody.part_errors import PartErrors
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh
-from tolalloc.rv.multibody.system import System
+from tolalloc.rv.multibody.system import System, engine
 from tolalloc.rv.reducer.design import Reducer
 
 RIGID = 1e13

@@ -11,10 +11,10 @@ from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
-from tolalloc.rv.multibody.engine import engine
 from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import Prototype, assemble, reference_places
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_pin_forces
+from tolalloc.rv.multibody.system import engine
 from tolalloc.rv.reducer.design import Reducer
 
 

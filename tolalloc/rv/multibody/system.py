@@ -1,16 +1,34 @@
-"""Parts and interfaces of a reducer in the words of the multibody engine."""
+"""The only door to the multibody engine, an optional extra, and parts and interfaces of a reducer in its words."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.exceptions import InputError
 from tolalloc.rv.multibody.drive import Drive, TimeCourse
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_forces
 from tolalloc.rv.reducer.design import Reducer
+
+
+def engine() -> Any:
+    """Return the module of the multibody engine.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        return import_module("exudyn")
+    except ImportError as missing:
+        raise InputError(
+            "virtual prototype: the multibody engine needs the optional extra: pip install tolalloc[multibody]."
+        ) from missing
 
 
 @dataclass(frozen=True)

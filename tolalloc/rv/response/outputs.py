@@ -10,12 +10,11 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, waves
-from tolalloc.rv.equivalent.radial_clearance import radial_clearance
-from tolalloc.rv.equivalent.status import Status
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
 from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
 from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 

@@ -14,9 +14,9 @@ from tolalloc.rv.dynamics.motion import Motion, SpeedProfile, motion_of
 from tolalloc.rv.dynamics.properties import Inertia, generalised_alpha, inertia_of, newmark
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.multibody.engine import engine as multibody_engine
 from tolalloc.rv.multibody.part_errors import part_errors
 from tolalloc.rv.multibody.prototype import RIGID
+from tolalloc.rv.multibody.system import engine as multibody_engine
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit

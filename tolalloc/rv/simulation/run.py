@@ -10,17 +10,16 @@ import numpy as np
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.progress import Progress
 from tolalloc.report.answer import Header
-from tolalloc.rv.dynamics.modes import modes
 from tolalloc.rv.dynamics.motion import Motion
 from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
+from tolalloc.rv.dynamics.speeds import modes
+from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.equivalent.status import Status
 from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.rv.simulation.answer import SimulationAnswer
+from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries
 from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
-from tolalloc.rv.simulation.series import AtRest, TimeSeries
 from tolalloc.units import RPM
 
 MOST_ANGLES = 5000

@@ -12,8 +12,7 @@ from ezdxf.filemanagement import new
 from tolalloc.exceptions import InputError
 from tolalloc.files import require_new
 from tolalloc.rv.cycloid.clearance import linear_clearance
-from tolalloc.rv.cycloid.profile_points import ProfilePoints, profile_points, require_points
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.cycloid.tooth_profile import ProfilePoints, ToothProfile, profile_points, require_points
 from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
 
 

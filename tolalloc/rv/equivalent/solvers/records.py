@@ -11,7 +11,7 @@ from tolalloc.rv.cycloid.solvers import LAWS
 from tolalloc.rv.reducer.design import Reducer
 
 CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
-"""How an equilibrium ended; `tolalloc.rv.equivalent.status.Status` has the words."""
+"""How an equilibrium ended; `tolalloc.rv.equivalent.answers.Status` has the words."""
 
 
 class SolverDesign(NamedTuple):
