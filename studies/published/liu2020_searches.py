@@ -27,9 +27,9 @@ from tolalloc.exceptions import UnknownNameError
 from tolalloc.progress import Progress
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.modification.problem import History, quartiles
 
 from .liu2020_swarm import ImprovedPSO
+from .search_history import History, quartiles
 
 GENERATIONS = 100
 """Iterations of the swarms and generations of the genetic algorithm, as liu2020 prints them [-]."""

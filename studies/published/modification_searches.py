@@ -22,13 +22,13 @@ from tolalloc.rv.modification.problem import (
     Amounts,
     BestPoint,
     EvaluatedAmounts,
-    History,
     ModificationProblem,
     Optimum,
-    quartiles,
     reference,
 )
 from tolalloc.units import MILLIMETRE
+
+from .search_history import History, quartiles
 
 REACHED = 1e-6 * MILLIMETRE
 """Largest difference from the reference's amounts at which a search has reached it [m]."""

@@ -16,8 +16,9 @@ from studies.published.li2018_genetic import (
     scaled_fitness,
 )
 from studies.published.modification_searches import ALGORITHMS, REACHED, Recorder, Spread, polish, search, spread
+from studies.published.search_history import History
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.problem import EvaluatedAmounts, History, reference
+from tolalloc.rv.modification.problem import EvaluatedAmounts, reference
 from tolalloc.rv.modification.residual_gap import residual_gap
 from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
 from tolalloc.rv.reducer.design import CycloidStage

@@ -11,11 +11,12 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import UnknownNameError
+from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.model import ReducerModel
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
 from tolalloc.rv.response.stiffness import StiffnessResponse
 

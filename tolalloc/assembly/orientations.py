@@ -12,12 +12,13 @@ from tolalloc.chunks import Mapper
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation, Observer
+from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 

@@ -242,16 +242,8 @@ def transmission_error(
 ) -> TransmissionErrorAnswer:
     """Return what a unit does over one output turn.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    unit
-        Its errors.
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
-    attributed
-        Whether to say which source makes how much of each order.
+    The torque is that on the carrier, negative resists [N·m]; attributed says which source makes how much of each
+    order.
 
     Raises
     ------

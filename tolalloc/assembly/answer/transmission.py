@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.assembly.answer.answer import TransmissionEffect
 from tolalloc.assembly.answer.tables import rounded
 from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK
+from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"

@@ -56,22 +56,9 @@ def bridge(
 ) -> Float[np.ndarray, "particle column"]:
     """Return particles of the target density from particles of the start density.
 
-    Parameters
-    ----------
-    start
-        Where the particles start.
-    target
-        Logarithm of the density, up to a constant; minus infinity where a particle may not be.
-    particles
-        Number of particles [-].
-    generator
-        Random numbers.
-    effective
-        Effective share of the particles that each step leaves, which sets its length [-].
-    most
-        Most moves per step [-].
-    settling
-        Moves at the end of the way [-].
+    The target is the logarithm of a density, up to a constant; minus infinity where a particle may not be. Each step
+    leaves the effective share of the particles, which sets its length, and makes at most so many moves; settling are
+    the moves at the end of the way.
 
     Notes
     -----

@@ -100,26 +100,9 @@ def diagnose(
 ) -> Diagnosis:
     """Return what a measured curve tells of the errors of the unit's parts.
 
-    Parameters
-    ----------
-    curve
-        Transmission error over one output turn or a piece of one.
-    kernel
-        The real model, solved at the curve's torque; its columns are those of the errors.
-    errors
-        What the drawings say of the errors.
-    zones
-        Zones of the sources that vary [m].
-    noise
-        What separates a reading from the model.
-    seeds
-        Node of the seed tree.
-    effort
-        How much may be computed.
-    level
-        Probability that the named sources must have of containing the dominant one [-].
-    largest_failed_share
-        Largest share of solved curves that may fail [-].
+    The kernel is solved at the curve's torque and has the columns of the errors; zones are those of the sources that
+    vary [m]. The named sources contain the dominant one with the probability ``level`` [-], and at most the given share
+    of the solved curves may fail [-].
 
     Raises
     ------

@@ -73,14 +73,7 @@ class ThinnedCurve:
 def thinned(curve: MeasuredCurve, noise: Noise, most: int) -> ThinnedCurve:
     """Return those readings of a measured curve that stand nearest to equally spaced angles.
 
-    Parameters
-    ----------
-    curve
-        Readings over a turn or a piece of one.
-    noise
-        What separates them from the model.
-    most
-        Equally spaced angles of a turn; closer readings share what the model leaves out and tell little more [-].
+    There are ``most`` such angles in a turn; closer readings share what the model leaves out and tell little more.
 
     Raises
     ------

@@ -77,14 +77,7 @@ def gauss_newton(
 ) -> Identified:
     """Return the least objective that any start leads to.
 
-    Parameters
-    ----------
-    problem
-        What is minimised.
-    start
-        Coordinates to begin at, one row for each start [-].
-    seed
-        Seed that the starts came from, for the record [-].
+    One row for each start; the seed that they came from is for the record.
 
     Raises
     ------

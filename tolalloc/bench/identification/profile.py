@@ -93,16 +93,8 @@ def profile(
 ) -> ParameterProfile:
     """Return the profile of one parameter, the others fitted anew at each of its values.
 
-    Parameters
-    ----------
-    problem
-        The data, their noise widened by the variance factor; a stand-in should predict.
-    best
-        Where the objective is least [-].
-    place
-        Position of the parameter [-].
-    found
-        What the readings say to first order: where to look, and the threshold.
+    The noise of the problem is widened by the variance factor, and a stand-in should predict. What was found to first
+    order says where to look, and the threshold.
 
     Notes
     -----
@@ -172,14 +164,8 @@ def estimates(
 ) -> tuple[ParameterEstimate, ...]:
     """Return all parameters.
 
-    Parameters
-    ----------
-    parameters
-        The unknowns.
-    found, profiles
-        What the readings say around the least objective.
-    written
-        The same where readings and bounds together put the parameters.
+    Found and profiles are what the readings say around the least objective; written is the same where readings and
+    bounds together put the parameters.
     """
     deviations = np.sqrt(np.diag(written.covariance))
     return tuple(
@@ -200,16 +186,7 @@ def as_stiffness(
 ) -> IdentifiedStiffness | None:
     """Return the stiffnesses for a stiffness file; none if no stiffness was asked for.
 
-    Parameters
-    ----------
-    estimated
-        All parameters.
-    written
-        Their information, whose covariance links them: what is fixed is often a combination.
-    source
-        Where the readings come from.
-    notes
-        What a reader must know.
+    The written covariance links them: what is fixed is often a combination.
     """
     places = [at for at, item in enumerate(estimated) if item.parameter.is_stiffness]
     if not places:

@@ -60,16 +60,7 @@ def identify(
 ) -> IdentificationAnswer:
     """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
 
-    Parameters
-    ----------
-    study
-        What is to be identified.
-    measurements
-        Readings of finished units.
-    reducer
-        Nominal design; its stiffness is where every search begins.
-    progress
-        Told of every stage and of the units answered for.
+    The stiffness of the reducer is where every search begins.
 
     Raises
     ------

@@ -21,14 +21,6 @@ FEWEST = 3
 """Fewest readings of a curve and levels of a loop; the mean takes one away [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """A column that a file may hold."""
-
-    name: str  # Header without its unit
-    units: dict[str, float]  # Unit as written → factor to SI [-]
-
-
 _SMALL_ANGLES = {
     "arcsec": ARCSECOND,
     "arcmin": ARCMINUTE,
@@ -37,11 +29,14 @@ _SMALL_ANGLES = {
     "µrad": MICRORADIAN,
     "urad": MICRORADIAN,
 }
-ANGLE = Quantity(name="angle", units={"deg": DEGREE, "rad": 1.0, "arcmin": ARCMINUTE})
-TRANSMISSION_ERROR = Quantity(name="transmission error", units=_SMALL_ANGLES)
-TWIST = Quantity(name="twist", units=_SMALL_ANGLES)
-PEAK_TO_PEAK = Quantity(name="peak_to_peak", units=_SMALL_ANGLES)
-TORQUE = Quantity(name="torque", units={"N·m": 1.0, "Nm": 1.0})
+ANGLE, TORQUE = "angle", "torque"
+TRANSMISSION_ERROR, TWIST, PEAK_TO_PEAK = "transmission error", "twist", "peak_to_peak"
+UNITS = {
+    ANGLE: {"deg": DEGREE, "rad": 1.0, "arcmin": ARCMINUTE},
+    TORQUE: {"N·m": 1.0, "Nm": 1.0},
+    **dict.fromkeys((TRANSMISSION_ERROR, TWIST, PEAK_TO_PEAK), _SMALL_ANGLES),
+}
+"""Column that a file may hold, by its header without unit → unit as written → factor to SI [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +64,7 @@ class RawReadings:
         )
 
 
-def read_column(table: TextTable, quantity: Quantity) -> tuple[str, float, Float[np.ndarray, " row"]]:
+def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarray, " row"]]:
     """Return header, factor to SI, and values in SI units of one column; not a number where a cell holds none.
 
     Raises
@@ -77,21 +72,20 @@ def read_column(table: TextTable, quantity: Quantity) -> tuple[str, float, Float
     InputError
         The column is missing or there twice, its unit is missing or unknown, or a cell holds text.
     """
-    headers = [header for header in table.headers if _same_name(header, quantity.name)]
-    units = " or ".join(quantity.units)
+    headers = [header for header in table.headers if _same_name(header, name)]
+    known = UNITS[name]
+    units = " or ".join(known)
     if not headers:
         raise InputError(
-            f"{table.path}: the column {quantity.name!r} with its unit in square brackets ({units}) is missing; the "
+            f"{table.path}: the column {name!r} with its unit in square brackets ({units}) is missing; the "
             f"columns are {', '.join(map(repr, table.headers))}."
         )
     if len(headers) > 1:
-        raise InputError(
-            f"{table.path}: the column {quantity.name!r} stands there {len(headers)} times; allowed is once."
-        )
+        raise InputError(f"{table.path}: the column {name!r} stands there {len(headers)} times; allowed is once.")
     unit = split_header(headers[0])[1]
-    if unit not in quantity.units:
+    if unit not in known:
         raise InputError.at(table.path, f"the unit of column {headers[0]!r}", unit, f"{units} in square brackets")
-    position, factor = table.headers.index(headers[0]), quantity.units[unit]
+    position, factor = table.headers.index(headers[0]), known[unit]
     values = np.full(len(table.rows), np.nan)
     for number, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
         if cells[position].lower() in MISSING:
@@ -115,17 +109,10 @@ def _same_name(header: str, name: str) -> bool:
     return split_header(header)[0].lower().replace("_", " ") == name.replace("_", " ")
 
 
-def load_readings(path: Path, along: Quantity, values: Quantity) -> RawReadings:
+def load_readings(path: Path, along: str, values: str) -> RawReadings:
     """Return the two columns of a file in SI units; columns of other names are not read.
 
-    Parameters
-    ----------
-    path
-        CSV file; lines that start with # are comments.
-    along
-        `ANGLE` or `TORQUE`.
-    values
-        `TRANSMISSION_ERROR` or `TWIST`.
+    Taken along `ANGLE` or `TORQUE` are `TRANSMISSION_ERROR` or `TWIST`; lines that start with # are comments.
 
     Raises
     ------

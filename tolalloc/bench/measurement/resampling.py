@@ -44,14 +44,7 @@ def resampled(
     readings did. Angles in gaps are left out: where no reading stands before the next angle, and where the value would
     be less certain than a reading.
 
-    Parameters
-    ----------
-    angle
-        Strictly ascending [rad].
-    values
-        Readings [rad].
-    whole_turn
-        Whether the curve closes after 2π.
+    Angles ascend strictly, angles and values are in rad; over a whole turn the curve closes after 2π.
     """
     length = 2.0 * pi if whole_turn else float(angle[-1] - angle[0])
     spacing, wrap = length / READINGS, WRAPPED if whole_turn else 0

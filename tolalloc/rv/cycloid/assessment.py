@@ -70,18 +70,9 @@ def assess(
 ) -> Assessment:
     """Return what the reducer's modification does under a torque.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design; its pins bend if it says so.
-    torque
-        Torque on the carrier, either sign [N·m].
-    law
-        Contact law of the pins, one of `tolalloc.rv.cycloid.solvers.LAWS`.
-    exact
-        Whether to take exact distances; by default where the modification is too large for the linear formula.
-    phases
-        Phases of the crank within one pin pitch [-].
+    Pins bend if the reducer says so; the torque has either sign [N·m], the law is one of
+    `tolalloc.rv.cycloid.solvers.LAWS`, the phases lie within one pin pitch. Distances are exact by default where the
+    modification is too large for the linear formula.
 
     Raises
     ------

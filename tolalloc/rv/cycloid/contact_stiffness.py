@@ -71,16 +71,7 @@ def peak_pressure(
 ) -> Float[np.ndarray, "*angles"]:
     """Return Hertz's peak pressure √(F·E*/(πb·R)), R from the pin and the tooth's own curvature where it touches [Pa].
 
-    Parameters
-    ----------
-    stage
-        Cycloid stage.
-    contact_modulus
-        E* of pin and disc [Pa].
-    pin_angle
-        Angle φ of the pins from the crank direction [rad].
-    force
-        Their forces [N].
+    E* is that of pin and disc, the angle φ that of the pins from the crank direction [rad], the force theirs [N].
     """
     path, pin = path_curvature(stage, pin_angle), stage.pin_radius
     # 1/R = 1/r + 1/ρ with ρ = −1/κ − r of the tooth, convex positive.

@@ -121,18 +121,8 @@ def loaded(
 ) -> LoadedContact:
     """Return the contact whose deflection and forces a method has found.
 
-    Parameters
-    ----------
-    discs
-        What is pressed.
-    method
-        Name of the method.
-    phase
-        Angles from the crank direction of disc 1 to the next pin [rad].
-    deflection
-        δ_max [m].
-    force
-        Pin forces [N].
+    Phases are angles from the crank direction of disc 1 to the next pin [rad], deflections δ_max [m], forces those of
+    the pins [N].
     """
     reducer, stage, closed, angles = (
         discs.reducer,

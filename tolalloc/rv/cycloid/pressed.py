@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.cycloid.clearance import Gap, gap_of
-from tolalloc.rv.cycloid.contact_stiffness import ContactStiffness, contact_stiffness
+from tolalloc.rv.cycloid.contact_stiffness import contact_stiffness
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, loaded
 from tolalloc.rv.cycloid.mesh import flank_angle, normals
 from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
@@ -103,50 +102,36 @@ def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.
     return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))
 
 
-@dataclass(frozen=True)
-class _Press:
-    """All pins of one phase: from a deflection to compressions and forces."""
+def _balanced(
+    discs: PressedDiscs, gap: Gap, pin_angle: Float[np.ndarray, " pin"]
+) -> tuple[float, Float[np.ndarray, " pin"]]:
+    """Return the deflection at which the torques of one phase balance [m], and the forces of all pins there [N]."""
+    from scipy.optimize import brentq
 
-    discs: PressedDiscs
-    gap: Gap
-    closing: float
-    pin_angle: Float[np.ndarray, " pin"]
+    stage, stiffness = discs.reducer.cycloid_stage, discs.reducer.stiffness
+    lever = np.asarray(stage.disc_pitch_radius * normals(stage.shortening, pin_angle).lever)
+    contact, closing = contact_stiffness(stage, stiffness, pin_angle), discs.clearance.rotation
 
-    @cached_property
-    def lever(self) -> Float[np.ndarray, " pin"]:
-        stage = self.discs.reducer.cycloid_stage
-        return np.asarray(stage.disc_pitch_radius * normals(stage.shortening, self.pin_angle).lever)
-
-    @cached_property
-    def contact(self) -> ContactStiffness:
-        return contact_stiffness(self.discs.reducer.cycloid_stage, self.discs.reducer.stiffness, self.pin_angle)
-
-    def rotation(self, deflection: float) -> float:
-        return self.closing + deflection / self.discs.reducer.cycloid_stage.disc_pitch_radius
-
-    def forces(self, deflection: float) -> Float[np.ndarray, " pin"]:
-        compression, force = -self.gap(self.pin_angle, self.rotation(deflection)), np.empty(self.pin_angle.size)
-        law = LAWS[self.discs.reducer.stiffness.pin_contact_law]
-        pin_forces(law, self.contact.stiffness, self.contact.log_length, compression, force)
+    def forces(deflection: float) -> Float[np.ndarray, " pin"]:
+        rotation = closing + deflection / stage.disc_pitch_radius
+        compression, force = -gap(pin_angle, rotation), np.empty(pin_angle.size)
+        pin_forces(LAWS[stiffness.pin_contact_law], contact.stiffness, contact.log_length, compression, force)
         return force
 
-    def surplus(self, deflection: float) -> float:
-        return float(self.lever @ self.forces(deflection)) - self.discs.torque
+    def surplus(deflection: float) -> float:
+        return float(lever @ forces(deflection)) - discs.torque
 
-    def balanced(self) -> float:
-        """Return the deflection at which the torques balance [m]."""
-        from scipy.optimize import brentq
-
-        deepest, deflection = self.discs.reducer.cycloid_stage.pin_radius, MICROMETRE
-        while self.surplus(deflection) < 0:
-            if deflection >= deepest:
-                largest = self.surplus(deepest) + self.discs.torque
-                raise InputError(
-                    f"{self.discs.reducer.name}: torque {self.discs.torque:.6g} N·m on the discs is beyond any "
-                    f"contact: pins would be pressed in by more than their radius; allowed is below {largest:.3g} N·m."
-                )
-            deflection = min(2 * deflection, deepest)
-        return float(brentq(self.surplus, 0.0, deflection, xtol=1e-18, rtol=1e-13))
+    deepest, deflection = stage.pin_radius, MICROMETRE
+    while surplus(deflection) < 0:
+        if deflection >= deepest:
+            largest = surplus(deepest) + discs.torque
+            raise InputError(
+                f"{discs.reducer.name}: torque {discs.torque:.6g} N·m on the discs is beyond any "
+                f"contact: pins would be pressed in by more than their radius; allowed is below {largest:.3g} N·m."
+            )
+        deflection = min(2 * deflection, deepest)
+    found = float(brentq(surplus, 0.0, deflection, xtol=1e-18, rtol=1e-13))
+    return found, forces(found)
 
 
 def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
@@ -159,10 +144,8 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
     InputError
         The torque would press a pin in by more than its radius.
     """
-    closed, angles = discs.clearance, discs.pin_angles(phase)
-    gap = gap_of(discs.profile, closed.exact)
-    presses = [_Press(discs, gap, closed.rotation, own) for own in angles.reshape(phase.size, -1)]
-    deflection = np.array([press.balanced() for press in presses])
-    force = np.stack([press.forces(depth) for press, depth in zip(presses, deflection, strict=True)])
+    angles, gap = discs.pin_angles(phase), gap_of(discs.profile, discs.clearance.exact)
+    found = [_balanced(discs, gap, own) for own in angles.reshape(phase.size, -1)]
+    deflection, force = np.array([depth for depth, _ in found]), np.stack([force for _, force in found])
     law = discs.reducer.stiffness.pin_contact_law
     return loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))

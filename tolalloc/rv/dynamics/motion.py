@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,14 +17,9 @@ BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
 """From 0 to 1 between two given times: along a straight line, or by the cubic that starts and ends level."""
 
 
-class _Piece(NamedTuple):
-    """The piece of a profile that each time lies in: number, first value, rise to the last, length, share gone."""
-
-    number: Int[np.ndarray, " time"]
-    first: Float[np.ndarray, " time"]
-    rise: Float[np.ndarray, " time"]
-    length: Float[np.ndarray, " time"]
-    share: Float[np.ndarray, " time"]
+_OverTime = Float[np.ndarray, " time"]
+_Piece = tuple[Int[np.ndarray, " time"], _OverTime, _OverTime, _OverTime, _OverTime]
+"""The piece of a profile that each time lies in: number, first value, rise to the last, length, share gone."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +50,13 @@ class SpeedProfile:
 
     def at(self, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         """Return the quantity at the times [rad/s or N·m]."""
-        piece = self._piece(time)
-        return np.asarray(piece.first + piece.rise * BLENDS[self.blend](piece.share))
+        _, first, rise, _, share = self._piece(time)
+        return np.asarray(first + rise * BLENDS[self.blend](share))
 
     def slope(self, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         """Return the derivative by time, at a corner the one that follows [rad/s² or N·m/s]."""
-        piece = self._piece(time)
-        slope = piece.rise * BLENDS[self.blend].deriv()(piece.share) / piece.length
+        _, _, rise, length, share = self._piece(time)
+        slope = rise * BLENDS[self.blend].deriv()(share) / length
         return np.asarray(np.where(time < self.times[0], 0.0, slope))
 
     def integral(self, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
@@ -71,9 +66,9 @@ class SpeedProfile:
     def _from_first(self, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         times, values = np.array(self.times), np.array(self.values)
         whole = np.diff(times) * (values[:-1] + values[1:]) / 2  # both blends are even about the middle
-        piece, blend = self._piece(time), BLENDS[self.blend]
-        inside = piece.length * (piece.first * piece.share + piece.rise * blend.integ()(piece.share))
-        before = np.concatenate([[0.0], np.cumsum(whole)])[piece.number]
+        (number, first, rise, length, share), blend = self._piece(time), BLENDS[self.blend]
+        inside = length * (first * share + rise * blend.integ()(share))
+        before = np.concatenate([[0.0], np.cumsum(whole)])[number]
         return np.asarray(before + inside + values[0] * np.minimum(time - times[0], 0.0))
 
     def _piece(self, time: Float[np.ndarray, " time"]) -> _Piece:
@@ -82,7 +77,7 @@ class SpeedProfile:
         number = np.maximum(np.searchsorted(times, time, side="right") - 1, 0)
         length = np.append(np.diff(times), 1.0)[number]
         share = np.maximum(time - times[number], 0.0) / length
-        return _Piece(number, values[number], np.append(np.diff(values), 0.0)[number], length, share)
+        return number, values[number], np.append(np.diff(values), 0.0)[number], length, share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,20 +108,8 @@ def motion_of(
 ) -> Motion:
     """Return the nominal motion under an input speed and an output torque.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design; its ratio makes the carrier's speed.
-    input_speed
-        Speed of the sun gear [rad/s].
-    output_torque
-        Torque on the carrier; negative resists the positive direction of rotation [N·m].
-    duration
-        Time from the first to the last step [s].
-    steps
-        Number of time steps [-].
-    angle
-        θc at time 0 [rad].
+    The reducer's ratio makes the carrier's speed; input speed [rad/s], torque on the carrier [N·m], duration of all
+    steps [s], θc at time 0 [rad].
 
     Raises
     ------

@@ -60,14 +60,7 @@ class Inertia:
 def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float = 0.0) -> Inertia:
     """Return the inertia of a reducer's parts under `ASSUMPTIONS`.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    density
-        Density of all parts [kg/m³].
-    output_inertia
-        Moment of inertia that the carrier turns besides its own [kg·m²].
+    The density is that of all parts [kg/m³]; the carrier turns the output inertia besides its own [kg·m²].
 
     Raises
     ------

@@ -92,18 +92,8 @@ def simulate(
     acceleration of the nominal motion; the sun's rotation is prescribed. At time 0 every sample is in the equilibrium
     of the static model, its deviations have no velocity and the acceleration −a that follows.
 
-    Parameters
-    ----------
-    model, errors
-        The equivalent model; deviations in the order of its columns [m, angles rad].
-    motion, inertia, damping
-        Nominal motion and load; of the parts and interfaces.
-    integrator
-        `tolalloc.rv.dynamics.properties.newmark` or `tolalloc.rv.dynamics.properties.generalised_alpha`.
-    observe
-        Numbers of the steps at which the whole state is given, each once; none unless given [-].
-    progress
-        Told the share of the time that is simulated [-].
+    Errors are deviations in the order of the model's columns [m, angles rad]. The whole state is given at the steps
+    with the numbers to observe, each once.
 
     Raises
     ------

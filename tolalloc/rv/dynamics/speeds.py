@@ -200,16 +200,9 @@ def orders_against_speed(
     Newmark's method may feed modes too fast for the step while pins come and go; the generalised-α method with a
     spectral radius below 1 damps them.
 
-    Parameters
-    ----------
-    model, errors, torque, inertia, damping, integrator
-        As in `tolalloc.rv.dynamics.simulation.simulate`; a constant torque on the carrier [N·m].
-    speeds, orders
-        Output speeds; waves per output turn whose amplitudes are wanted [rad/s, -].
-    steps_per_turn
-        Time steps per output turn; a wave at resonance needs some twenty of them [-].
-    turns
-        Output turns of each run, of which the last is looked at [-].
+    Output speeds [rad/s], waves per output turn, torque on the carrier [N·m], the others as in
+    `tolalloc.rv.dynamics.simulation.simulate`. A wave at resonance needs some twenty time steps; of the turns of each
+    run the last is looked at.
 
     Raises
     ------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from tolalloc.rv.reducer.design import CycloidStage, Modification
 from tolalloc.units import MICROMETRE
@@ -81,42 +81,6 @@ class ModificationProblem(ABC):
     def evaluate(self, amounts: Amounts) -> EvaluatedAmounts:
         """Return objective and constraints."""
         return EvaluatedAmounts(objective=self.objective(amounts), constraints=self.constraints(amounts))
-
-
-@dataclass(frozen=True, kw_only=True)
-class History:
-    """Best objective of a search, batch by batch; a generation is a batch."""
-
-    evaluations: Int[np.ndarray, " batch"]  # Evaluations up to the end of each batch [-]
-    # Smallest objective until then of a point that meets the constraints, infinite before the first [objective]
-    best: Float[np.ndarray, " batch"]
-
-    def after(self, evaluations: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return the best objective after so many evaluations [objective]."""
-        batch = np.searchsorted(self.evaluations, evaluations, side="right")
-        return np.asarray(np.append(np.inf, self.best)[batch])
-
-    def then(self, following: History) -> History:
-        """Return the history of a search and of what followed it."""
-        return History(
-            evaluations=np.concatenate([self.evaluations, self.evaluations[-1] + following.evaluations]),
-            best=np.concatenate([self.best, following.best]),
-        )
-
-
-def quartiles(histories: Sequence[History], evaluations: Int[np.ndarray, " n"]) -> Float[np.ndarray, "3 n"]:
-    """Return lower quartile, median and upper quartile of the best objective after so many evaluations [objective].
-
-    Parameters
-    ----------
-    histories
-        One for each seed.
-    evaluations
-        Numbers of evaluations [-].
-    """
-    best = np.stack([history.after(evaluations) for history in histories])
-    # No interpolation: it would take infinity from infinity where some seeds have met nothing yet.
-    return np.asarray(np.quantile(best, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf"))
 
 
 _FIRST, _POINTS, _LEVELS = 33, 9, 24  # the last points are 32·4²³ times closer than the bounds, which is rounding

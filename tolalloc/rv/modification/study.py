@@ -73,14 +73,8 @@ class ModificationStudy:
 def choose(study: ModificationStudy, reducer: Reducer, torque: float) -> ModificationAnswer:
     """Return the best amounts, and what they do on the reducer.
 
-    Parameters
-    ----------
-    study
-        What is to be chosen.
-    reducer
-        Nominal design; its own modification is replaced.
-    torque
-        Torque on the carrier for the contact; negative resists the rotation [N·m].
+    The reducer's own modification is replaced; the torque on the carrier is that of the contact, negative resists
+    [N·m].
 
     Raises
     ------

@@ -49,23 +49,7 @@ def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
 def assemble(
     reducer: Reducer, masses: Masses, errors: PartErrors, mesh: Mesh, drive: Drive, damping: PrototypeDamping
 ) -> Prototype:
-    """Return a reducer in the engine, at rest at the carrier angle 0.
-
-    Parameters
-    ----------
-    reducer
-        Nominal design with the stiffness of its bearings.
-    masses
-        Of its parts.
-    errors
-        Deviations of its journals, bores and bearings.
-    mesh
-        Its teeth and pins.
-    drive
-        Input speed and output torque.
-    damping
-        Of its bearings and its output.
-    """
+    """Return a reducer in the engine, at rest at the carrier angle 0."""
     exudyn = engine()
     new = System(exudyn, exudyn.SystemContainer().AddSystem())
     stiffness, places = reducer.stiffness, reference_places(reducer)

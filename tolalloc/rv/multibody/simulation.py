@@ -165,23 +165,9 @@ def simulate_prototype(
 ) -> PrototypeAnswer:
     """Return what the virtual prototype of a reducer does, from rest at the carrier angle 0.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design; the stiffness of its bearings and pin contacts and its modification are used, its first stage
-        as ideal gears.
-    masses
-        Of its parts.
-    drive
-        Input speed and output torque.
-    steps
-        Times.
-    damping
-        Of its bearings and its output.
-    errors
-        Columns of `tolalloc.rv.multibody.part_errors.part_errors`; none unless given [m].
-    progress
-        Told which share is done.
+    Of the nominal design count the stiffness of bearings and pin contacts and the modification; its first stage is
+    ideal gears. Errors are columns of `tolalloc.rv.multibody.part_errors.part_errors` [m]; progress is told which share
+    is done.
 
     Raises
     ------

@@ -64,13 +64,8 @@ class BuiltUnit:
     ) -> Float[np.ndarray, "1 column"]:
         """Return the unit as one row of errors in the order of the model's columns [m].
 
-        Parameters
-        ----------
-        columns
-            Names of the model's error columns.
-        nominal
-            Column → value that the reducer's design gives, such as its modification, for a unit that does not state
-            its own [m].
+        Nominal are the values that the reducer's design gives, such as its modification, for a unit that does not state
+        its own.
 
         Raises
         ------

@@ -69,13 +69,8 @@ def _column(path: Path, header: str) -> tuple[str, float, float]:
 def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[BuiltUnit, ...]:
     """Return the units of a CSV file: a column ``unit``, the others are model columns such as ``disc1.tilt.x [µrad]``.
 
-    Parameters
-    ----------
-    path
-        The file.
-    neglected
-        Sources that no unit states, taken as zero; ``*`` stands for anything. A model's column that is neither in the
-        table nor here is refused when the units meet the model.
+    Sources under neglected are stated by no unit and taken as zero; ``*`` stands for anything. A model's column that is
+    neither in the table nor there is refused when the units meet the model.
 
     Raises
     ------
@@ -112,14 +107,7 @@ def write_table(
 ) -> None:
     """Write a CSV file with all digits of its numbers.
 
-    Parameters
-    ----------
-    path
-        New file.
-    headers, rows
-        Names with units, and cells.
-    comments
-        Lines above the headers.
+    Comments are lines above the headers, which are names with units.
 
     Raises
     ------

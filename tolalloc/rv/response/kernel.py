@@ -12,12 +12,11 @@ from jaxtyping import Float
 from tolalloc.chunks import Mapper, map_chunks
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Evaluation, Observer, unobserved
+from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.equivalent.answers import Derivatives, Extremes
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.units import ARCSECOND
-
-PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,12 +10,13 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation
+from tolalloc.rv import BACKLASH, LOST_MOTION, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse
+from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
@@ -80,7 +81,7 @@ _FORCES = ("largest pin force", "largest crank–disc bearing force", "share of 
 
 REQUIREMENTS = (
     Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
-    Reading(outputs=("lost motion [arcmin]", "backlash [arcmin]", "torsional stiffness [N·m/arcmin]"), read=_loop),
+    Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop),
     Reading(
         outputs=(
             *(f"{output.name}, rated torque [{output.unit}]" for output in OUTPUTS if output.name in _FORCES),
@@ -89,7 +90,7 @@ REQUIREMENTS = (
         ),
         read=_rated_load,
     ),
-    Reading(outputs=("radial clearance at tip and root [µm]",), read=_radial_clearance),
+    Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
 )
 """What a requirement may limit: transmission error, torque against twist, load at rated torque, gap at tip and root."""
 

@@ -12,11 +12,12 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.correlation import CorrelatedSource
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation, Response, unobserved
+from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.response.kernel import PEAK_TO_PEAK, KernelResponse, WithDerivatives
+from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
 
 NAME = "stiffness (identified)"
 PREFIX = "stiffness."
@@ -128,98 +129,3 @@ class OutputsWithStiffness:
             values[:, self.outputs.index(PEAK_TO_PEAK)] = exact.values[:, 0]
             status = np.maximum(status, exact.status)
         return Evaluation(values=values, status=status)
-
-
-@dataclass(frozen=True, kw_only=True)
-class FirstOrderError:
-    """First order minus kernel at changed stiffnesses."""
-
-    # Of the difference [arcsec]
-    root_mean_square: float
-    largest: float
-    effect: float  # Root-mean-square of what the same changes do to the peak-to-peak [arcsec]
-    # Units and changes of the stiffnesses behind it [-]
-    units: int
-    changes: int
-
-    @property
-    def fails(self) -> bool:
-        """Whether the error is half of the effect or more, and more than the angles of the search leave."""
-        return self.root_mean_square > max(0.5 * self.effect, SEEN)
-
-
-def first_order_error(
-    response: StiffnessResponse,
-    x: Float[np.ndarray, "unit kernel_column"],
-    changes: Float[np.ndarray, "change stiffness"],
-) -> FirstOrderError:
-    """Return how far the first order is from the kernel whose reducer has the changed stiffnesses.
-
-    Raises
-    ------
-    SolveError
-        No unit has an answer at any of the changes.
-    """
-    answers = response.kernel.with_derivatives(x)
-    predicted = response.gradient(answers) @ changes.T
-    exact = [response.changed(change)(x).values[:, 0] - answers.evaluation.values[:, 0] for change in changes]
-    effect = np.stack(exact, axis=1)
-    error = predicted - effect
-    good = np.isfinite(error)
-    if not good.any():
-        raise SolveError(
-            f"{NAME}: no unit has an answer at stiffnesses changed by up to a factor of "
-            f"{exp(float(np.abs(changes).max())):.3g}; allowed are standard uncertainties that leave a reducer."
-        )
-    return FirstOrderError(
-        root_mean_square=float(np.sqrt((error[good] ** 2).mean())),
-        largest=float(np.abs(error[good]).max()),
-        effect=float(np.sqrt((effect[good] ** 2).mean())),
-        units=x.shape[0],
-        changes=changes.shape[0],
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class StiffnessEffect:
-    """What not knowing the stiffness does to the peak-to-peak, and how well that is known."""
-
-    source: CorrelatedSource  # The source
-    # Standard deviation of one unit's peak-to-peak from the stiffness alone, root-mean-square over units [arcsec]
-    sigma: float
-    sigma_of_mean: float  # Standard deviation of the mean over all units, which the stiffness shifts together [arcsec]
-    first_order: FirstOrderError  # First order against kernel
-
-
-def stiffness_effect(
-    response: StiffnessResponse,
-    source: CorrelatedSource,
-    x: Float[np.ndarray, "unit kernel_column"],
-    directions: Float[np.ndarray, "direction stiffness"],
-    units_on_kernel: int,
-) -> StiffnessEffect:
-    """Return what the source alone does to units, with the first order checked at ±2σ.
-
-    Parameters
-    ----------
-    response
-        The first order.
-    source
-        The uncertainty.
-    x
-        Units, in the kernel's columns [m, angles rad].
-    directions
-        Any directions of independent standard values; both ends at a distance of 2 are checked [-].
-    units_on_kernel
-        How many of the units the kernel solves again at changed stiffnesses [-].
-    """
-    answers = response.kernel.with_derivatives(x)
-    gradient = response.gradient(answers)[answers.evaluation.good]
-    mean = gradient.mean(axis=0)
-    ends = 2.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True) @ source.factor.T
-    return StiffnessEffect(
-        source=source,
-        sigma=float(np.sqrt(((gradient @ source.factor) ** 2).sum(axis=1).mean())),
-        sigma_of_mean=float(np.linalg.norm(mean @ source.factor)),
-        first_order=first_order_error(response, x[:units_on_kernel], np.concatenate([ends, -ends])),
-    )
