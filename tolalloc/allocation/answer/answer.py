@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -18,6 +18,7 @@ from tolalloc.allocation.robustness import Robustness
 from tolalloc.allocation.search import Allocation
 from tolalloc.allocation.trade import SettingTrade
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
 from tolalloc.models import Model
 from tolalloc.report.answer import Answer
@@ -121,6 +122,14 @@ class AllocationAnswer(Answer):
         from tolalloc.allocation.answer.drawing import drawn_sources
 
         return drawn_sources(self)
+
+    @cached_property
+    def drawing(self) -> Drawing:
+        """The drawing as the next study takes it, with the cost of every zone as it is made."""
+        from tolalloc.allocation.answer.drawing import sources_to_go_on_from
+
+        errors = replace(self.space.errors, sources=sources_to_go_on_from(self))
+        return Drawing(name=f"{self.header.name}, allocated", errors=errors)
 
     @cached_property
     def drawing_table(self) -> pd.DataFrame:

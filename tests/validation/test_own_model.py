@@ -1,0 +1,114 @@
+"""A function of one's own, ranked and allocated: the one-way clutch of Choi, Park & Salisbury 2000."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tolalloc as ta
+from tolalloc.allocation.effort import QUICK_ALLOCATION
+
+ROOT = Path(__file__).parents[2]
+CASES = json.loads((ROOT / "tests" / "validation" / "allocation.json").read_text(encoding="utf-8"))["problems"]
+
+
+@pytest.fixture(scope="module")
+def study():
+    sys.path.insert(0, str(ROOT / "studies"))
+    try:
+        return importlib.import_module("choi2000_clutch").study
+    finally:
+        sys.path.remove(str(ROOT / "studies"))
+
+
+@pytest.fixture(scope="module")
+def found(study):
+    own = ta.Study(
+        study.model,
+        study.drawing,
+        limits=study.limits,
+        questions=[ta.Allocation(what_if=False)],
+        largest_failed_share=study.largest_failed_share,
+        effort=ta.Effort(allocation=QUICK_ALLOCATION),
+    )
+    return own.allocate()
+
+
+def published():
+    return next(case for case in CASES if case["id"] == "clutch_choi2000")["results"]["0"]["true_optimum"]
+
+
+def test_the_cost_is_the_published_optimum(found):
+    assert found.met
+    assert found.cost == pytest.approx(published()["total"], rel=1e-8)
+
+
+def test_the_bound_certifies_it(found):
+    assert found.bound <= found.cost * (1 + 1e-9)
+    assert found.cost / found.bound - 1 < 1e-8
+
+
+def test_zones_and_processes_are_the_published_ones(found):
+    zones = np.array([source.zone for source in found.drawing.sources])
+    assert zones / 2 * 1e3 == pytest.approx(published()["t"], rel=1e-4)
+    assert found.chosen.processes == ("rough", "grind", "lap", "press")
+
+
+def test_the_yield_of_fresh_units_stands_beside_the_guarantee(found):
+    """√Σ(Dt)² = 0.035 with σ = t/3 keeps 99.73 % of a linear normal output; the angle bends, so some fewer are kept."""
+    assert 0.97 < found.chosen.achieved.estimate < 0.9973
+
+
+def test_a_function_of_single_numbers_gives_what_one_of_arrays_gives(study):
+    from math import acos
+
+    def one(hub, roller, other, cage):
+        rollers = (roller + other) / 2
+        return acos((hub + rollers) / (cage - rollers))
+
+    errors = study.drawing.errors
+    alone = ta.model(one, inputs=study.model.inputs, outputs=study.model.outputs).bound(errors, "test")
+    together = study.model.bound(errors, "test")
+    x = np.random.default_rng(1).uniform(-1e-4, 1e-4, (20, 4))
+    assert alone(x).values == pytest.approx(together(x).values, rel=1e-14)
+
+
+def test_a_jacobian_is_used_where_there_is_one(study):
+    errors = study.drawing.errors
+
+    def jacobian(hub, roller, other, cage):
+        rollers = (roller + other) / 2
+        cosine = (hub + rollers) / (cage - rollers)
+        outer = -1 / np.sqrt(1 - cosine**2)
+        by_rollers = (1 / (cage - rollers) + (hub + rollers) / (cage - rollers) ** 2) / 2
+        return [
+            outer / (cage - rollers),
+            outer * by_rollers,
+            outer * by_rollers,
+            -outer * (hub + rollers) / (cage - rollers) ** 2,
+        ]
+
+    exact = ta.model(
+        study.model.function, inputs=study.model.inputs, outputs=study.model.outputs, jacobian=jacobian
+    ).bound(errors, "test")
+    x = np.zeros((1, 4))
+    printed = [-0.10393848030651141, -0.10354907401123048, -0.10354907401123048, 0.10315966771594956]
+    assert exact.derivatives("contact angle [rad]", x).by_column[0] / 1e3 == pytest.approx(printed, rel=1e-9)
+    differences = study.model.bound(errors, "test").derivatives("contact angle [rad]", x)
+    assert differences.by_column[0] / 1e3 == pytest.approx(printed, rel=1e-7)
+
+
+def test_samples_without_an_answer_are_counted(study):
+    far = study.model.bound(study.drawing.errors, "test")(np.array([[0.0, 0.0, 0.0, 0.0], [2e-3, 2e-3, 2e-3, -2e-3]]))
+    assert far.status.tolist() == [0, 1]
+
+
+def test_a_source_that_is_no_input_is_refused(study):
+    model = ta.model(lambda hub: hub, inputs=("hub",), outputs=("y [mm]",))
+    with pytest.raises(ta.UnknownNameError, match="source 'roller' is not known; the nearest known are hub"):
+        model.bound(study.drawing.errors, "study x")
