@@ -47,6 +47,13 @@ class Limit:
 
         if self.show is not None and not isinstance(self.show, Guarantee):
             raise InputError.at("limit", "show", self.show, "AtYield(...), AtCpk(...), WorstCase() or RootSumSquare()")
+        for name in ("upper", "lower"):
+            side = getattr(self, name)
+            if side is None:
+                continue
+            if not (isinstance(side, int | float) and abs(side) < float("inf")):
+                raise InputError.at("limit", name, side, "a finite number; an open side is None")
+            object.__setattr__(self, name, float(side))  # a study asks the same with 60 and with 60.0
         _ = self.limits
 
     @property
@@ -61,7 +68,4 @@ class Limit:
         """The limits alone."""
         from tolalloc.capability.indices import Limits
 
-        for side in (self.upper, self.lower):
-            if side is not None and not (isinstance(side, int | float) and abs(side) < float("inf")):
-                raise InputError.at("limit", "upper and lower", side, "finite numbers; an open side is None")
         return Limits(upper=self.upper, lower=self.lower)

@@ -1,0 +1,145 @@
+"""What a study refuses, what its script may lean on, and what the package offers by name."""
+
+from __future__ import annotations
+
+import doctest
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+import tolalloc as ta
+from tests.studies.command import ROOT, command, refused, tolalloc
+from tests.studies.scripts import study_script
+from tolalloc.drawings.drawing import Drawing
+from tolalloc.exceptions import InputError, UnknownNameError
+
+LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
+LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
+DOCUMENTED = (
+    "tolalloc",
+    *(f"tolalloc.study.{path.stem}" for path in sorted((ROOT / "tolalloc" / "study").glob("*.py"))),
+    *("tolalloc.function_model", "tolalloc.drawings.drawing", "tolalloc.rv.choice", "tolalloc.report.wording"),
+)
+
+
+def nothing(quick: bool):
+    raise AssertionError(f"a refused study was built, quick {quick}")
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("model", ta.reducer("rv20e")),
+        ("drawing", ta.drawing("rv20e_baseline")),
+        ("limits", LIMITS),
+        ("seed", 2),
+        ("largest_failed_share", 0.02),
+    ],
+)
+def test_a_field_that_no_question_reads_is_refused_by_name(field, value):
+    with pytest.raises(InputError, match=f"no question of it reads {field} .it asks: calculation"):
+        ta.Study(questions=[ta.Calculation(nothing)], **{field: value})
+    asked = ta.Study(questions=[ta.Calculation(nothing), ta.Ranking()], **{field: value})
+    assert getattr(asked, field) == value
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "nearest"),
+    [
+        (ta.Study, {"limit": LIMITS}, "limits"),
+        (ta.Study, {"name": "mine", "drawin": None}, "drawing"),
+        (ta.Ranking, {"grades": True}, "none"),
+        (ta.Allocation, {"grade": True}, "grades"),
+        (ta.Allocation, {"fixedfirst": True}, "fixed_first"),
+        (ta.Calculation, {"built": nothing}, "build"),
+    ],
+)
+def test_an_unknown_field_is_refused_with_the_nearest_name(kind, given, nearest):
+    with pytest.raises(
+        UnknownNameError, match=rf"field '{[*given][-1]}' is not known; the nearest known are {nearest}"
+    ):
+        kind(**given)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"toleranzen": "mine.csv"}, ["written_study.py", "study written", "'toleranzen'", "not known"]),
+        ({"written": "questions=[ta.Allocation(grade=True)]"}, ["question allocation", "'grade'", "grades"]),
+        ({"written": "questions=[ta.Calculation(print)]"}, ["no question of it reads model"]),
+    ],
+)
+def test_the_command_line_says_what_a_study_does_not_know_in_one_sentence(tmp_path, fields, words):
+    result = tolalloc("check", study_script(tmp_path, **fields))
+    refused(result, *words)
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_whole_number_is_a_limit_like_any_other():
+    assert ta.Limit(upper=60, lower=-1) == ta.Limit(upper=60.0, lower=-1.0)
+    assert repr(ta.Limit(upper=60)) == repr(ta.Limit(upper=60.0))
+    with pytest.raises(InputError, match="lower is inf; allowed is a finite number"):
+        ta.Limit(lower=float("inf"))
+
+
+@pytest.mark.parametrize("kind", ["ranked", "alocation"])
+def test_a_question_that_is_none_is_refused_with_the_nearest_name(tmp_path, kind):
+    out = tmp_path / "run"
+    result = tolalloc("run", study_script(tmp_path), "--only", kind, "--out", out)
+    refused(result, f"question {kind!r}", "ranking" if kind == "ranked" else "allocation")
+    assert not out.exists()
+
+
+def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path):
+    script, elsewhere = tmp_path / "mine" / "own_study.py", tmp_path / "elsewhere"
+    (tmp_path / "mine" / "tables").mkdir(parents=True)
+    elsewhere.mkdir()
+    table = ta.drawing("rv20e_baseline").to_csv(script.parent / "tables" / "own.csv")
+    (script.parent / "own_helper_of_a_study.py").write_text("TABLE = 'tables/own.csv'\nUPPER = 55.0\n")
+    script.write_text(
+        "import tolalloc as ta\nfrom own_helper_of_a_study import TABLE, UPPER\n"
+        "study = ta.Study(ta.reducer('rv20e'), ta.drawing(TABLE), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)})\n"
+    )
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "200"}
+    words = command("check", script)
+    found = subprocess.run(words, capture_output=True, text=True, cwd=elsewhere, check=False, env=environment)
+    assert found.returncode == 0, found.stderr
+    assert "is in order" in found.stdout and "at most 55" in found.stdout
+    table.unlink()
+    refused(tolalloc("check", script), str(table), "no such file")
+
+
+def test_the_package_is_imported_without_what_is_needed_later():
+    said = f"import sys, tolalloc; tolalloc.Study; print(*(name for name in {LATE!r} if name in sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", said], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert loaded.stdout.split() == []
+
+
+@pytest.mark.parametrize("name", ta.__all__)
+def test_every_public_name_is_there_and_says_what_it_is(name):
+    found = getattr(ta, name)
+    assert name in dir(ta)
+    if isinstance(found, str):
+        assert found.endswith("]")  # an output carries its unit
+    else:
+        assert (found.__doc__ or "").strip().splitlines()[0].endswith((".", ":"))
+
+
+def test_an_unknown_public_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="Studdy"):
+        _ = ta.Studdy
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_examples_in_docstrings_say_what_happens(name):
+    found = doctest.testmod(import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert found.failed == 0
+
+
+def test_public_records_have_examples():
+    """Doctests run on what there is; here is what must be there."""
+    finder = doctest.DocTestFinder()
+    for own in (ta.Study, ta.Ranking, ta.Allocation, ta.Limit, ta.reducer, ta.drawing, ta.model, Drawing.of_rows):
+        assert any(test.examples for test in finder.find(own)), own
