@@ -12,26 +12,44 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
+from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
+PEAK = "peak-to-peak transmission error [arcsec]"
+
+
+EFFORT = """effort=ta.Effort(
+    ranking=RankingEffort(
+        units=2048, sobol=SobolEffort(start=64, limit=64), trajectories=4, moment_units=256, derivative_units=64,
+        inverse_units=1852, surrogate_units=128, level_units=100, level_runs=2, widened_units=200, permutations=10),
+    allocation=AllocationEffort(
+        verification_units=1152, shared_units=48, exact_points=8, share_blocks=8,
+        search=SearchEffort(steps=2, front=FrontEffort(
+            population=8, generations=4, population_on_kernel=8, generations_on_kernel=2, designs=10, rounds=1,
+            points=3))),
+    is_quick=True), questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)]"""
+EFFORTS = """from tolalloc.allocation.effort import AllocationEffort
+from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.search import SearchEffort
+from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.sobol import SobolEffort
+"""
+
+
+def small_study(folder: Path) -> Path:
+    """Write the shipped study with less effort: every source, both questions."""
+    reducer = {"stiffness": "rv20e_table6", "unit": "table4"}
+    return study_script(folder, reducer=reducer, written=EFFORT, imports=EFFORTS, name="rv20e_allocation")
 
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("run") / "quick"
-    result = tolalloc("run", STUDY, "--quick", "--out", folder)
+    path = tmp_path_factory.mktemp("run")
+    result = tolalloc("run", small_study(path), "--out", path / "quick")
     assert result.returncode == 0, result.stderr
-    return folder
-
-
-def study_with(tmp_path: Path, **fields: object) -> Path:
-    values = {"name": "bad", **fields}
-    text = ", ".join(f"{name}={value!r}" for name, value in values.items())
-    script = tmp_path / "bad_study.py"
-    script.write_text(f"from tolalloc.study.definition import Study\nstudy = Study({text})\n", encoding="utf-8")
-    return script
+    return path / "quick"
 
 
 def table_with(tmp_path: Path, change) -> str:
@@ -78,9 +96,11 @@ def test_check_is_in_order():
 
 def test_run_folder_is_complete(run_folder):
     names = {str(path.relative_to(run_folder)) for path in run_folder.rglob("*") if path.is_file()}
-    tables = {"manifest.json", "summary.json", "sensitivity.csv", "allocation.csv", "pareto.csv", "results.xlsx"}
-    figures = {"ranking", "zones", "peak_to_peak", "pareto", "transmission_error", "orders"}
-    assert names == tables | {"report.html"} | {f"figures/{name}.png" for name in figures}
+    files = {"manifest.json", "summary.json", "report.html", "results.xlsx", "allocation.csv", "drawing.xlsx"}
+    assert {name for name in names if "/" not in name} == files
+    tables = {"ranking", "requirements", "allocation requirements", "tolerances", "front", "drawing", "shares"}
+    figures = {"ranking", "zones", "peak_to_peak", "front", "transmission_error", "orders", "orders_of_units"}
+    assert names >= {f"tables/{name}.csv" for name in tables} | {f"figures/{name}.png" for name in figures}
 
 
 def test_report_works_offline(run_folder):
@@ -96,30 +116,34 @@ def test_manifest_and_summary_say_what_was_done(run_folder):
     summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
     assert manifest["seed"] == 1
     assert manifest["versions"]["numpy"]
-    assert manifest["statuses"]["equilibrium found"] > 5000
-    assert sum(manifest["statuses"].values()) == manifest["statuses"]["equilibrium found"]
-    assert summary["met"] is True
-    assert summary["saving [-]"] > 0
-    assert summary["yield lower bound, one-sided 95 % [-]"] >= 0.9973
-    assert summary["optimality gap [-]"] >= -1e-9
+    assert manifest["questions"] == list(summary) == ["ranking", "allocation"]
+    statuses = [manifest["statuses"][question] for question in summary]
+    assert sum(own["equilibrium found"] for own in statuses) > 5000
+    assert all(sum(own.values()) == own["equilibrium found"] for own in statuses)
+    allocated = summary["allocation"]
+    assert allocated["met"] is True
+    assert allocated["saving [-]"] > 0
+    assert allocated["yield lower bound, one-sided 95 % [-]"] >= 0.9973
+    assert allocated["certified bound [cost units]"] <= allocated["cost [cost units]"] * (1 + 1e-9)
+    assert {own["study hash"] for own in summary.values()} == {manifest["study hash"]}
 
 
 def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
     name = "stiffness (identified)"
-    ranked = pd.read_csv(run_folder / "sensitivity.csv")
+    ranked = pd.read_csv(run_folder / "tables" / "ranking.csv")
     row = ranked[ranked["source"] == name].iloc[0]
     summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
-    found = summary["identified stiffness"]
+    found = summary["ranking"]["identified stiffness"]
     assert found["source"] == name
     assert found["total index ST [-]"] == pytest.approx(row["total index ST [-]"])
     assert 0 < found["total index ST [-]"] < 1e-4
     assert 0 < found["sigma of the mean [arcsec]"] <= found["sigma of a unit [arcsec]"] < 0.1
     assert found["first-order error at 2 sigma, rms [arcsec]"] < 0.02
-    assert pd.isna(row["zone [µm]"])
-    assert name not in (run_folder / "allocation.csv").read_text(encoding="utf-8")
+    for table in ("allocation.csv", "tables/tolerances.csv", "tables/shares.csv"):
+        assert name not in (run_folder / table).read_text(encoding="utf-8")
     page = (run_folder / "report.html").read_text(encoding="utf-8")
-    assert f"The row “{name}”" in page
-    assert "common to all units of the reducer" in page
+    assert "Not knowing stiffness (identified) gives" in page
+    assert "common to all units" in page
 
 
 def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
@@ -134,16 +158,16 @@ def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
 
 def test_every_header_states_a_unit_where_there_is_one(run_folder):
     words = {"source", "S1 reading"}
-    frame = pd.read_csv(run_folder / "sensitivity.csv")
+    frame = pd.read_csv(run_folder / "tables" / "ranking.csv")
     assert all("[" in header or header in words for header in frame.columns)
-    assert all("[" in header for header in pd.read_csv(run_folder / "pareto.csv").columns)
+    assert all("[" in header for header in pd.read_csv(run_folder / "tables" / "front.csv").columns)
 
 
 @pytest.mark.slow
 def test_same_seed_gives_the_same_bits(run_folder, tmp_path):
-    result = tolalloc("run", STUDY, "--quick", "--out", tmp_path / "again")
+    result = tolalloc("run", small_study(tmp_path), "--out", tmp_path / "again")
     assert result.returncode == 0, result.stderr
-    for name in ("sensitivity.csv", "allocation.csv", "pareto.csv", "summary.json"):
+    for name in ("tables/ranking.csv", "allocation.csv", "tables/front.csv", "summary.json"):
         assert (run_folder / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
 
 
@@ -170,7 +194,7 @@ def test_a_run_folder_with_something_in_it_is_refused(tmp_path):
     ],
 )
 def test_bad_tables_are_refused_in_one_sentence(tmp_path, change, words):
-    script = study_with(tmp_path, tolerances=table_with(tmp_path, change))
+    script = study_script(tmp_path, drawing={"table": table_with(tmp_path, change)})
     refused(tolalloc("check", script), *words)
     out = tmp_path / "run"
     refused(tolalloc("run", script, "--quick", "--out", out), *words)
@@ -202,7 +226,7 @@ ADDED = {"plus [unit]": "2", "min [unit]": "1", "max [unit]": "4"}
     ],
 )
 def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
-    script = study_with(tmp_path, tolerances=table_with(tmp_path, row(**ADDED, **cells)))
+    script = study_script(tmp_path, drawing={"table": table_with(tmp_path, row(**ADDED, **cells))})
     if words:
         refused(tolalloc("check", script), *words)
     else:
@@ -217,7 +241,7 @@ def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
     path = tmp_path / "loose.toml"
     path.write_text(text + "\n[clearances]\ncrank_disc_bearing_um = 2\ncarrier_bearing_um = 1\n", encoding="utf-8")
-    assert tolalloc("check", study_with(tmp_path, reducer=str(path), unit="table4")).returncode == 0
+    assert tolalloc("check", study_script(tmp_path, reducer={"name": str(path), "unit": "table4"})).returncode == 0
     answer = json.loads(tolalloc("te", "--reducer", path, "--unit", "table4", "--torque", "-10", "--json").stdout)
     tight = json.loads(tolalloc("te", "--unit", "table4", "--torque", "-10", "--json").stdout)
     assert answer["statuses"]["equilibrium found"] == 936
@@ -237,15 +261,19 @@ def test_every_preset_turns(reducer):
 def test_a_truncated_workbook_is_refused(tmp_path):
     path = tmp_path / "table.xlsx"
     pd.read_csv(DATA / "rv20e_baseline.tolerances.csv").to_excel(path, index=False)
-    assert tolalloc("check", study_with(tmp_path, tolerances=str(path))).returncode == 0
+    assert tolalloc("check", study_script(tmp_path, drawing={"table": str(path)})).returncode == 0
     path.write_bytes(path.read_bytes()[:2000])
-    refused(tolalloc("check", study_with(tmp_path, tolerances=str(path))), "table.xlsx", "truncated")
+    refused(tolalloc("check", study_script(tmp_path, drawing={"table": str(path)})), "table.xlsx", "truncated")
 
 
 def test_a_truncated_table_is_refused(tmp_path):
     text = (DATA / "rv20e_baseline.tolerances.csv").read_text(encoding="utf-8")
     (tmp_path / "table.csv").write_text(text[: int(len(text) * 0.7)].rsplit(",", 9)[0], encoding="utf-8")
-    refused(tolalloc("check", study_with(tmp_path, tolerances=str(tmp_path / "table.csv"))), "table.csv", "missing")
+    refused(
+        tolalloc("check", study_script(tmp_path, drawing={"table": str(tmp_path / "table.csv")})),
+        "table.csv",
+        "missing",
+    )
 
 
 @pytest.mark.parametrize(
@@ -295,27 +323,29 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path):
     assert (tmp_path / "file").read_text() == "keep"
 
 
-def test_an_infeasible_limit_names_what_can_be_reached(tmp_path):
-    out = tmp_path / "run"
-    result = tolalloc("run", study_with(tmp_path, limit_arcsec=10.0), "--quick", "--out", out)
-    refused(result, "limit_arcsec", "10", "or more")
-    assert not out.exists()
-
-
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"limit_arcsec": -60.0}, ["limit_arcsec", "-60", "above 0"]),
-        ({"yield_target": 99.73}, ["yield_target", "99.73", "0.5"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=float('nan'))}"}, ["upper is nan", "a finite number"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit()}"}, ["lower limit, an upper limit or both"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(lower=60.0, upper=50.0)}"}, ["upper limit", "50", "above the lower"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=99.73))}"}, ["99.73", "0.5"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: 60.0}"}, [f"limits['{PEAK}']", "60.0", "ta.Limit"]),
+        ({"limits": "{'peak-to-peak [arcsec]': ta.Limit(upper=60.0)}"}, ["peak-to-peak [arcsec]", "not known", PEAK]),
+        ({"limits": "{}"}, ["limits is empty"]),
         ({"seed": -1}, ["seed", "-1"]),
         ({"name": "../elsewhere"}, ["name", "../elsewhere", "letters"]),
-        ({"torque_nm": 1e9}, ["torque", "1670 N·m"]),
-        ({"flank_clearance_um": (5.0, 1.0)}, ["flank_clearance_um", "smaller one first"]),
-        ({"tolerances": "nothing.csv"}, ["nothing.csv", "no such file"]),
+        ({"largest_failed_share": 0.7}, ["largest_failed_share", "0.7", "0 to 0.5"]),
+        ({"questions": []}, ["questions", "ta.Ranking"]),
+        ({"reducer": {"torque": 1e9}}, ["torque", "1670 N·m"]),
+        ({"reducer": {"flank_clearance": (5.0, 1.0)}}, ["flank_clearance", "smaller one first"]),
+        ({"drawing": {"table": "nothing.csv"}}, ["nothing.csv", "no such file"]),
+        ({"drawing": {"correlations": "nowhere.csv"}}, ["nowhere.csv", "no such file"]),
+        ({"drawing": {"processes": "nowhere"}}, ["nowhere", "generic"]),
     ],
 )
 def test_bad_studies_are_refused_in_one_sentence(tmp_path, fields, words):
-    refused(tolalloc("check", study_with(tmp_path, **fields)), *words)
+    refused(tolalloc("check", study_script(tmp_path, **fields)), *words)
 
 
 def test_a_script_without_a_study_is_refused(tmp_path):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tolalloc.study.definition import Study, prepare
 
+from tests.prepared import prepared
 from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.units import ARCSECOND
@@ -36,8 +36,8 @@ def bench(tmp_path_factory) -> Bench:
         table.loc[still, column] = "0"
     table.loc[still, "locked"] = "yes"
     table.to_csv(path / "few.csv", index=False)
-    prepared = prepare(Study(name="bench", tolerances=path / "few.csv"))
-    errors, kernel = prepared.space.errors, prepared.kernel
+    study = prepared(name="bench", drawing={"table": path / "few.csv"})
+    errors, kernel = study.errors, study.model.kernel
     x = 0.2 * errors.deviations(
         errors.standard_values(next(SeedTree(3).uniform_chunks(1, len(errors.columns)))), errors.zones
     )
