@@ -61,6 +61,9 @@ class KnownTrial:
     def worst(self, sense):
         return sense * 7.0, sense * np.array([2.0, 1.5, 0.5, -0.25])
 
+    def linear(self):
+        return 0.0, 0.0, np.array([2.0, 1.5]), np.array([0.5, -0.25])
+
 
 def test_clearances_and_amounts_map_one_to_one(prepared):
     space, modification = prepared.space, prepared.model.reducer.modification

@@ -105,7 +105,7 @@ def kernel_front(prepared, quantile, **options):
     space = prepared.space
     unit = np.random.default_rng(1).random((14, space.lower.size))
     designs = space.lower * (space.upper / space.lower) ** unit
-    return pareto_front(quantile, rough, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
+    return pareto_front(quantile, rough, 1.0, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
 
 
 def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(prepared, quantile, tmp_path):

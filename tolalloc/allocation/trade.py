@@ -41,7 +41,7 @@ class SettingTrade:
     """
 
     names: tuple[str, ...]
-    values: tuple[Float[np.ndarray, " step"], ...]
+    values: tuple[Float[np.ndarray, " _step"], ...]
     cost: Float[np.ndarray, "..."]
     error: float
 
@@ -62,7 +62,7 @@ class SettingTrade:
 
 
 def setting_trade(
-    response: QuantileResponse, allocation: Allocation, values: tuple[Float[np.ndarray, " step"], ...]
+    response: QuantileResponse, allocation: Allocation, values: tuple[Float[np.ndarray, " _step"], ...]
 ) -> SettingTrade:
     """Return the cost of the cheapest zones for every choice of settings.
 
