@@ -112,3 +112,33 @@ def test_a_source_that_is_no_input_is_refused(study):
     model = ta.model(lambda hub: hub, inputs=("hub",), outputs=("y [mm]",))
     with pytest.raises(ta.UnknownNameError, match="source 'roller' is not known; the nearest known are hub"):
         model.bound(study.drawing.errors, "study x")
+
+
+class Engine:
+    """Stands for the library that runs Functional Mock-up Units; the gap at the end of each simulation."""
+
+    @staticmethod
+    def simulate_fmu(path, start_values, output, stop_time):
+        if start_values["shaft_mm"] > 10.0:
+            raise RuntimeError("no solution")
+        return {"gap_mm": [0.0, start_values["housing_mm"] - start_values["shaft_mm"]]}
+
+
+def test_a_mock_up_unit_is_a_function_of_its_parameters(monkeypatch, tmp_path):
+    unit = tmp_path / "gap.fmu"
+    unit.write_bytes(b"")
+    monkeypatch.setitem(sys.modules, "fmpy", Engine())
+    names = {"housing": "housing_mm", "shaft": "shaft_mm"}
+    model = ta.from_fmu(str(unit), inputs=names, outputs={"gap [mm]": "gap_mm"})
+    row = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 1.0}
+    drawing = ta.Drawing.of_rows([{"id": "housing", "nominal": 10.0, **row}, {"id": "shaft", "nominal": 9.9, **row}])
+    found = model.bound(drawing.errors, "test")(np.array([[0.0, 0.0], [0.0, 0.05e-3], [0.0, 0.2e-3]]))
+    assert model.name == "gap"
+    assert found.values[:2, 0] == pytest.approx([0.1, 0.05])
+    assert found.status.tolist() == [0, 0, 1]
+
+
+def test_without_the_extra_a_mock_up_unit_is_refused_in_one_sentence(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "fmpy", None)
+    with pytest.raises(ta.InputError, match=r"need the optional extra: pip install tolalloc\[fmu\]"):
+        ta.from_fmu(str(tmp_path / "gap.fmu"), inputs={"a": "a"}, outputs={"b [mm]": "b"})
