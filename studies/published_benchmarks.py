@@ -115,9 +115,8 @@ def bearing_rows() -> list[tuple[str, str, float, float]]:
 
 
 def build(_: bool) -> Document:
-    """Print the table and return the report; nothing takes long enough to be left out where it should be quick."""
+    """Return the report; nothing takes long enough to be left out where it should be quick."""
     allocations, analysed = pd.DataFrame([*clutch_rows(), *chain_rows()]), analyses()
-    print(allocations.to_string(index=False))
     largest = float(allocations["gap [-]"].astype(float).max())
     return Document(
         title="Published allocation problems",

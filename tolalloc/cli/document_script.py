@@ -1,14 +1,11 @@
-"""Writing a report into a new folder: for commands with ``--out`` and for scripts that are a study of their own."""
+"""Writing a report into a new folder, for commands with ``--out``."""
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tolalloc.cli.console import announce_compilation, messages, say
-from tolalloc.exceptions import TolallocError
+from tolalloc.cli.console import messages
 from tolalloc.report.document import Document
 from tolalloc.report.folder import claimed
 from tolalloc.report.writer import write_document
@@ -41,26 +38,3 @@ def written(folder: Path, build: Callable[[], Document], add: Callable[[Path], N
         add(folder)
     messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
     return document
-
-
-def run_document(name: str, build: Callable[[bool], Document]) -> None:
-    """Run a script that makes one report, with the options ``--out`` and ``--quick``.
-
-    Parameters
-    ----------
-    name
-        Name of the study and of its folder below ``runs``.
-    build
-        Makes the report from whether it should be quick.
-    """
-    parser = argparse.ArgumentParser(description=sys.modules["__main__"].__doc__)
-    parser.add_argument("--out", type=Path, default=Path("runs") / name, help="folder, new or empty")
-    parser.add_argument("--quick", action="store_true", help="fewer seeds, wider bands")
-    options = parser.parse_args()
-    announce_compilation("cycloid")
-    try:
-        document = written(options.out, lambda: build(options.quick))
-    except TolallocError as error:
-        messages.print(f"Error: {error}", soft_wrap=True, markup=False, highlight=False)
-        raise SystemExit(2) from None
-    say(document)
