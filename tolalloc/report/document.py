@@ -26,12 +26,15 @@ class Section:
         Figures.
     tables
         Sheet name → table, units in the headers.
+    part
+        Title of the report that it comes from; empty where there is one report alone.
     """
 
     heading: str
     paragraphs: tuple[str, ...] = ()
     figures: tuple[Figure | HeatMap, ...] = ()
     tables: tuple[tuple[str, pd.DataFrame], ...] = ()
+    part: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +90,8 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     title, subtitle
         Of the whole.
     parts
-        Name and report of each; a table or figure whose name an earlier one has gets the part's name before its own.
+        Name and report of each; a table or figure whose name an earlier one has gets the part's name before its own,
+        and a table that says the same as the earlier one is left out.
     manifest
         What is needed to repeat the run and to trust it.
     """
@@ -96,16 +100,21 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     warnings: list[str] = []
     assumptions: list[str] = []
     summary: dict[str, Any] = {}
-    own_tables: set[str] = set()
-    own_figures: set[str] = set()
-    for part, document in parts:
-        tables = {name: _free(name, part, own_tables) for name in document.tables}
-        figures = {name: _free(name, part, own_figures) for name in document.figures}
+    drawn: set[str] = set()
+    known: dict[str, pd.DataFrame] = {}
+    reports = tuple(parts)
+    for part, document in reports:
+        own = {name: frame for name, frame in document.tables.items() if not _same(known.get(name), frame)}
+        tables = {name: f"{part} {name}" if name in known else name for name in own}
+        figures = {name: f"{part} {name}" if name in drawn else name for name in document.figures}
+        known |= {tables[name]: frame for name, frame in own.items()}
+        drawn |= set(figures.values())
         for section in document.sections:
             sections.append(
                 replace(
                     section,
-                    tables=tuple((tables[name], frame) for name, frame in section.tables),
+                    part=document.title if len(reports) > 1 else "",
+                    tables=tuple((tables[name], frame) for name, frame in section.tables if name in tables),
                     figures=tuple(replace(figure, name=figures[figure.name]) for figure in section.figures),
                 )
             )
@@ -126,8 +135,6 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     )
 
 
-def _free(name: str, part: str, taken: set[str]) -> str:
-    """Return a name that is not taken, and take it."""
-    free = f"{part} {name}" if name in taken else name
-    taken.add(free)
-    return free
+def _same(earlier: pd.DataFrame | None, frame: pd.DataFrame) -> bool:
+    """Return whether an earlier table says the same."""
+    return earlier is not None and earlier.equals(frame)

@@ -23,6 +23,8 @@ from tolalloc.report.plots import as_html, drawn, save_png
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
+_LISTED = 6
+"""Sections beyond which a page begins with a list of them [-]."""
 _LIBRARIES = (
     *("numpy", "scipy", "numba", "cvxpy", "clarabel", "highspy"),
     *("pymoo", "SALib", "pandas", "scikit-learn"),
@@ -91,6 +93,7 @@ def _write_page(document: Document, path: Path) -> None:
     """Write the page, plotly.js embedded once."""
     sections = [
         {
+            "part": section.part,
             "heading": section.heading,
             "paragraphs": section.paragraphs,
             "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
@@ -101,7 +104,8 @@ def _write_page(document: Document, path: Path) -> None:
     loader = PackageLoader("tolalloc.report")
     page = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     template = page.get_template("document.html.j2")
-    content = template.render(document=document, sections=sections, plotly=Markup(get_plotlyjs()))
+    is_long = len(sections) > _LISTED
+    content = template.render(document=document, sections=sections, is_long=is_long, plotly=Markup(get_plotlyjs()))
     path.write_text(content, encoding="utf-8")
 
 

@@ -154,7 +154,7 @@ class AllocationAnswer(Answer):
     def subtitle(self) -> str:
         """Under which conditions it holds."""
         count = len(self.requirements)
-        conditions = [f"{name} {value}" for name, value in self.header.conditions.items()]
+        conditions = [super().subtitle] if self.header.conditions else []
         return ", ".join([f"{count} requirement{'s' if count > 1 else ''}", *conditions, f"seed {self.header.seed}"])
 
     @cached_property
