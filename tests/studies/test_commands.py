@@ -94,6 +94,7 @@ def test_check_is_in_order():
     assert "σ =" in result.stdout
 
 
+@pytest.mark.slow
 def test_run_folder_is_complete(run_folder):
     names = {str(path.relative_to(run_folder)) for path in run_folder.rglob("*") if path.is_file()}
     files = {"manifest.json", "summary.json", "report.html", "results.xlsx", "allocation.csv", "drawing.xlsx"}
@@ -103,6 +104,7 @@ def test_run_folder_is_complete(run_folder):
     assert names >= {f"tables/{name}.csv" for name in tables} | {f"figures/{name}.png" for name in figures}
 
 
+@pytest.mark.slow
 def test_report_works_offline(run_folder):
     page = (run_folder / "report.html").read_text(encoding="utf-8")
     assert page.count("plotly.js v") == 1
@@ -111,6 +113,7 @@ def test_report_works_offline(run_folder):
     assert "nan" not in page.split("</script>", 1)[1].lower().split("plotly.newplot", 1)[0]
 
 
+@pytest.mark.slow
 def test_manifest_and_summary_say_what_was_done(run_folder):
     manifest = json.loads((run_folder / "manifest.json").read_text(encoding="utf-8"))
     summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
@@ -128,6 +131,7 @@ def test_manifest_and_summary_say_what_was_done(run_folder):
     assert {own["study hash"] for own in summary.values()} == {manifest["study hash"]}
 
 
+@pytest.mark.slow
 def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
     name = "stiffness (identified)"
     ranked = pd.read_csv(run_folder / "tables" / "ranking.csv")
@@ -146,6 +150,7 @@ def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
     assert "common to all units" in page
 
 
+@pytest.mark.slow
 def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
     before, after = load_tolerance_table("rv20e_baseline"), load_tolerance_table(run_folder / "allocation.csv")
     assert [source.name for source in after] == [source.name for source in before]
@@ -156,6 +161,7 @@ def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
             assert old.minimum * 0.999 <= new.zone <= old.maximum * 1.001
 
 
+@pytest.mark.slow
 def test_every_header_states_a_unit_where_there_is_one(run_folder):
     words = {"source", "S1 reading"}
     frame = pd.read_csv(run_folder / "tables" / "ranking.csv")
