@@ -14,7 +14,7 @@ from tolalloc.drawings.fields import ToleranceRow
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import require_columns
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
-from tolalloc.files import write_new
+from tolalloc.files import found_from_here, write_new
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,7 +82,7 @@ class Drawing:
         sources = sources_of_rows(numbered, processes, place, Path.cwd())
         if not isinstance(correlations, Correlation):
             correlations = load_correlations(correlations, sources) if correlations else Correlation()
-        return cls(name=place, errors=ErrorModel(sources, correlation=correlations), costs=costs)
+        return cls(name=place, errors=ErrorModel(sources, correlation=correlations), costs=_placed(costs))
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -161,7 +161,7 @@ def load_drawing(
     return Drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation),
-        costs=costs if isinstance(costs, Mapping) else beside(folder, costs),
+        costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
     )
 
 
@@ -169,3 +169,10 @@ def beside(folder: Path | None, name: str | Path) -> str | Path:
     """Return where a file is that a study names; a shipped name stays as it is."""
     path = Path(name)
     return folder / path if folder and name and (path.suffix or (folder / path).is_file()) else name
+
+
+def _placed(costs: Costs) -> Costs:
+    """Return costs with their path as it is meant now; they are read later, when no script is being read any more."""
+    if isinstance(costs, Mapping) or not costs:
+        return costs
+    return found_from_here(costs) if Path(costs).suffix or found_from_here(costs).is_file() else costs
