@@ -71,10 +71,10 @@ class FunctionModel:
             A source that is no input, or an input without a row.
         """
         nominal = {source.name: source.nominal for source in errors.sources}
-        for column in (*errors.columns, *errors.still):
+        for column in (*errors.columns, *errors.fixed):
             if column not in self.inputs:
                 raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
-        given = {*errors.columns, *errors.still}
+        given = {*errors.columns, *errors.fixed}
         missing = [name for name in self.inputs if name not in given]
         if missing:
             raise InputError(
@@ -85,7 +85,7 @@ class FunctionModel:
             source=self,
             varied=errors.columns,
             steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
-            offsets=np.array([nominal.get(name, 0.0) + errors.still.get(name, 0.0) for name in self.inputs]),
+            offsets=np.array([nominal.get(name, 0.0) + errors.fixed.get(name, 0.0) for name in self.inputs]),
             values=tuple(setting.value for setting in self.settings),
         )
 

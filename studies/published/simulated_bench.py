@@ -62,7 +62,7 @@ def random_units(errors: ErrorModel, count: int, seeds: SeedTree, scale: float =
         BuiltUnit(
             name=str(number + 1),
             source="simulated",
-            deviations={**errors.still, **dict(zip(errors.columns, map(float, row), strict=True))},
+            deviations={**errors.fixed, **dict(zip(errors.columns, map(float, row), strict=True))},
             neglected=_ANY,
         )
         for number, row in enumerate(rows)

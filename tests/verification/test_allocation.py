@@ -11,13 +11,13 @@ from scipy.stats import kurtosis, norm
 from tests.prepared import prepared as baseline
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
-from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.fronts import exact_front
 from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
 from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.programs import Programs
+from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.search import SearchEffort, allocate
 from tolalloc.allocation.trust_region import aimed
@@ -131,7 +131,7 @@ def test_the_error_of_an_order_statistic_is_that_of_many_samples():
     sides = [requirement.check(KnownTrial(values)).sides[0] for values in samples[:300]]
     rank = int(np.sum(samples[0] <= sides[0].value))
     true = np.sort(samples, axis=1)[:, rank - 1].std()
-    assert np.mean([side.doubt for side in sides]) == pytest.approx(true, rel=0.1)
+    assert np.mean([side.standard_error for side in sides]) == pytest.approx(true, rel=0.1)
 
 
 @pytest.mark.slow
@@ -327,7 +327,7 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
 
 def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
     verifier = verifier_of(prepared, limit=8.0)
-    by_hand = scale_by_hand(verifier, 2)
+    by_hand = scale_in_proportion(verifier, 2)
     found = allocate(verifier, by_hand, SearchEffort(steps=2))
     assert not found.chosen.met
     assert found.chosen.blocking.requirement.output == PEAK_TO_PEAK
@@ -338,7 +338,7 @@ def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
 
 def test_the_bound_and_the_price_are_those_of_the_chosen_models(prepared):
     verifier = verifier_of(prepared)
-    found = allocate(verifier, scale_by_hand(verifier, 2), SearchEffort(steps=2))
+    found = allocate(verifier, scale_in_proportion(verifier, 2), SearchEffort(steps=2))
     assert found.chosen.met
     assert -1e-9 < found.gap < 0.2
     name, price = next(iter(found.prices.items()))

@@ -145,7 +145,7 @@ def test_a_search_that_missed_says_what(results):
 
 def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
     joint, chosen = results.free, results.chosen
-    hand = joint.by_hand
+    hand = joint.proportional
     least = hand.cost * min(1.0, hand.quantile_bound / joint.limit)
     assert results.least_saving == pytest.approx(1 - chosen.cost / least)
     sentence = said(results, "Cost ")
@@ -270,4 +270,4 @@ def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched
     assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
-    assert front.series[0].label == f"exact by the local models (±{results.chosen.sides[0].doubt:.2g}″)"
+    assert front.series[0].label == f"exact by the local models (±{results.chosen.sides[0].standard_error:.2g}″)"

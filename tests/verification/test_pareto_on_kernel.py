@@ -82,7 +82,7 @@ def test_other_requirements_are_violated_by_what_their_models_say(prepared, quan
         budget=2.0,
         slopes=np.array([0.0, 0.1]),
     )
-    side = Side(sign=1, limit=0.5, value=0.4, doubt=0.01, scale=0.5, stack=stack)
+    side = Side(sign=1, limit=0.5, value=0.4, standard_error=0.01, scale=0.5, stack=stack)
     problem = DesignProblem(space=space, quantile=quantile, further=(WIDE,), sides=(side,))
     answers = problem(problem.genes_of(design[np.newaxis]))
     assert problem.constraints == ("lost motion",)

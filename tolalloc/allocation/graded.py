@@ -226,7 +226,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
 def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> tuple[Stack, ...]:
     """Return the models of a design with a budget that is smaller by so many standard errors."""
     return tuple(
-        replace(stack, budget=stack.budget - margin * side.doubt)
+        replace(stack, budget=stack.budget - margin * side.standard_error)
         for stack, side in zip(aimed(last, tried), last.sides, strict=True)
     )
 

@@ -132,7 +132,7 @@ class AtYield:
             sign=sign,
             limit=limit,
             value=sign * (value if enough else np.inf),
-            doubt=_order_statistic_error(turned, turned.size - left_out),
+            standard_error=_order_statistic_error(turned, turned.size - left_out),
             scale=_scale(trial, limit),
             stack=_root_sum_square(trial, sign, limit, value),
         )
@@ -194,7 +194,7 @@ class AtCpk:
             sign=sign,
             limit=limit,
             value=sign * value,
-            doubt=3 * error * deviation,
+            standard_error=3 * error * deviation,
             scale=_scale(trial, limit),
             stack=_root_sum_square(trial, sign, limit, value),
         )
@@ -231,7 +231,12 @@ class WorstCase:
             _name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
         )
         return Side(
-            sign=sign, limit=limit, value=value, doubt=_MISSED * abs(value), scale=_scale(trial, limit), stack=stack
+            sign=sign,
+            limit=limit,
+            value=value,
+            standard_error=_MISSED * abs(value),
+            scale=_scale(trial, limit),
+            stack=stack,
         )
 
 
@@ -270,7 +275,7 @@ class RootSumSquare:
                 sign=sign,
                 limit=limit,
                 value=value + sign * spread,
-                doubt=0.0,
+                standard_error=0.0,
                 scale=_scale(trial, limit),
                 stack=Stack(
                     name=_name(trial, sign),

@@ -22,7 +22,7 @@ class Side:
         The limit [unit of the output].
     value
         What the guarantee compares with the limit [unit of the output].
-    doubt
+    standard_error
         Standard error of the value, the margin that the next step keeps [unit of the output].
     scale
         What makes requirements comparable: the limit, or the deviation of the units where that is larger
@@ -34,7 +34,7 @@ class Side:
     sign: int
     limit: float
     value: float
-    doubt: float
+    standard_error: float
     scale: float
     stack: Stack
 

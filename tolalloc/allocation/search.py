@@ -50,7 +50,7 @@ class Allocation:
         The cheapest design that fresh units on the real kernel show to be met, or the least violating one.
     tried
         All designs verified on the way, in order.
-    hand_tried
+    proportional_tried
         Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself.
     optimum
         Cheapest design of all that the chosen one's convex models let keep the limits; without locked zones.
@@ -63,20 +63,20 @@ class Allocation:
     limit: float
     chosen: VerifiedDesign
     tried: tuple[VerifiedDesign, ...]
-    hand_tried: tuple[VerifiedDesign, ...]
+    proportional_tried: tuple[VerifiedDesign, ...]
     optimum: Solution
     inside: Solution
     locked_cost: float
 
     @property
-    def by_hand(self) -> VerifiedDesign:
+    def proportional(self) -> VerifiedDesign:
         """The cheapest met design with all zones scaled alike, or the least violating one."""
-        return answer(self.hand_tried)
+        return answer(self.proportional_tried)
 
     @property
     def baseline(self) -> VerifiedDesign:
         """The tolerance table as it is, modification as it was."""
-        return self.hand_tried[0]
+        return self.proportional_tried[0]
 
     @cached_property
     def stacks(self) -> tuple[Stack, ...]:
@@ -113,7 +113,7 @@ class Allocation:
     @property
     def saving(self) -> float:
         """Cost saved against uniform scaling, as a share of its cost [-]."""
-        return 1 - self.chosen.cost / self.by_hand.cost
+        return 1 - self.chosen.cost / self.proportional.cost
 
     @property
     def saving_at_least(self) -> float:
@@ -121,8 +121,8 @@ class Allocation:
 
         The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
         """
-        unused = min(1.0, self.by_hand.quantile_bound / self.limit)
-        return 1 - self.chosen.cost / (self.by_hand.cost * unused)
+        unused = min(1.0, self.proportional.quantile_bound / self.limit)
+        return 1 - self.chosen.cost / (self.proportional.cost * unused)
 
 
 def require_groups(space: DesignSpace, place: str) -> None:
@@ -169,7 +169,7 @@ def cheapest_by_models(
 
 def allocate(
     verifier: Verifier,
-    hand_tried: tuple[VerifiedDesign, ...],
+    proportional_tried: tuple[VerifiedDesign, ...],
     effort: SearchEffort,
     start: VerifiedDesign | None = None,
 ) -> Allocation:
@@ -179,15 +179,15 @@ def allocate(
     ----------
     verifier
         Judges designs on fresh units.
-    hand_tried
-        Designs with all zones scaled alike, `tolalloc.allocation.by_hand.scale_by_hand`.
+    proportional_tried
+        Designs with all zones scaled alike, `tolalloc.allocation.proportional.scale_in_proportion`.
     effort
         How much may be spent.
     start
         A verified design to start from, the best one by hand if there is none; with the reducer's own modification it
         tells tolerances alone from tolerances and modification together.
     """
-    first, space = start or answer(hand_tried), verifier.space
+    first, space = start or answer(proportional_tried), verifier.space
     # By hand no bounds are asked for; a start that keeps them is an answer like any other.
     is_allowed = np.all(
         (first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING))
@@ -198,7 +198,7 @@ def allocate(
         limit=verifier.limit,
         chosen=chosen,
         tried=tried,
-        hand_tried=hand_tried,
+        proportional_tried=proportional_tried,
         optimum=cheapest_by_models(space, chosen, tried, margin=0.0),
         inside=cheapest_by_models(space, chosen, tried, margin=1.0),
         locked_cost=space.locked_cost,

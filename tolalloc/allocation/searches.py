@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.by_hand import scale_by_hand
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
@@ -17,6 +16,7 @@ from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
 from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import large
+from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness, robustness
@@ -147,16 +147,16 @@ class DrawingQuestion:
     def direct(self) -> Allocation:
         """Return the allocation of tolerances and settings at once, from proportional scaling."""
         verifier = self.verifier("direct", self.space)
-        return allocate(verifier, scale_by_hand(verifier, self.effort.search.steps), self.effort.search)
+        return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
 
     def fixed(self) -> Allocation:
         """Return the allocation of tolerances with the settings as they are."""
         verifier = self.verifier("alone", self.space.fixed)
-        return allocate(verifier, scale_by_hand(verifier, self.effort.search.steps), self.effort.search)
+        return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
 
     def free(self, fixed: Allocation) -> Allocation:
         """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
-        return allocate(self.verifier("joint", self.space), fixed.hand_tried, self.effort.search, fixed.chosen)
+        return allocate(self.verifier("joint", self.space), fixed.proportional_tried, self.effort.search, fixed.chosen)
 
     def graded(self, free: Allocation) -> GradedAllocation:
         """Return the allocation on ladders of zones."""

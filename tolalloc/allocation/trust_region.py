@@ -38,7 +38,9 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.doubt - float(np.mean(found))))
+        stacks.append(
+            replace(side.stack, budget=side.stack.budget - margin * side.standard_error - float(np.mean(found)))
+        )
     return tuple(stacks)
 
 
@@ -103,6 +105,7 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
 def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
     """Return whether the models of a design predicted what fresh units said of the next one."""
     return all(
-        abs(now.excess - before.predicted(new.design)) <= _EXPLAINED * np.hypot(before.doubt, now.doubt)
+        abs(now.excess - before.predicted(new.design))
+        <= _EXPLAINED * np.hypot(before.standard_error, now.standard_error)
         for before, now in zip(last.sides, new.sides, strict=True)
     )

@@ -56,7 +56,7 @@ class ErrorModel:
         return tuple(column for source in self._varying for column in source.columns)
 
     @cached_property
-    def still(self) -> dict[str, float]:
+    def fixed(self) -> dict[str, float]:
         """Columns of the sources with zone zero, which stay in the middle of it [m]."""
         return {
             column: source.middle / source.lever

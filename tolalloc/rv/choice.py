@@ -63,12 +63,12 @@ def bind(
     require_small_zones(errors.sources, _LARGEST_ZONE, place)
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
     model = EquivalentModel(reducer, orders=orders or HARMONICS)
-    listed = {*errors.columns, *errors.still}
+    listed = {*errors.columns, *errors.fixed}
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
     fixed: Mapping[str, float] = {
         **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
         **dict.fromkeys(_absent_orders(errors, model, place), 0.0),
-        **errors.still,
+        **errors.fixed,
         **reducer.modification.deviations,
     }
     kernel = KernelResponse(

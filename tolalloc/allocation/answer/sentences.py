@@ -68,7 +68,7 @@ def _against(cost: float, other: float) -> str:
 
 def _cost(answer: AllocationAnswer) -> str:
     """Return what the drawing costs, and what uniform scaling does."""
-    chosen, hand = answer.chosen, answer.free.by_hand
+    chosen, hand = answer.chosen, answer.free.proportional
     used = "" if hand.met else ", which missed a limit"
     as_it_is = f" with the {answer.model.settings_word} as it is" if answer.space.settings else ""
     if hand.met and answer.requirements[0].limits.lower is None:
@@ -207,7 +207,7 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
             "No design was verified to meet all limits. This is the least violating one; what blocks is "
             f"{missed(chosen)}."
         )
-    if not answer.free.by_hand.met:
+    if not answer.free.proportional.met:
         found.append("Uniform scaling was not verified to meet the limits, so the saving is against a miss.")
     uncertain = answer.robustness.uncertain if answer.robustness else ()
     lost = sum(not variant.kept for variant in uncertain)

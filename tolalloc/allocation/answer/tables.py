@@ -27,7 +27,7 @@ def designs(answer: AllocationAnswer) -> dict[str, VerifiedDesign]:
     """Return the designs that the report compares."""
     found = {
         "tolerance table as it is": answer.free.baseline,
-        "all zones scaled alike": answer.free.by_hand,
+        "all zones scaled alike": answer.free.proportional,
     }
     found |= {label: search.chosen for label, search in searches(answer).items()}
     return {**found, "grades": answer.graded.chosen} if answer.graded else found
@@ -120,7 +120,7 @@ def requirements_table(answer: AllocationAnswer) -> pd.DataFrame:
             {
                 **row,
                 "slack [unit of the output]": -side.excess,
-                "standard error of it [unit of the output]": side.doubt,
+                "standard error of it [unit of the output]": side.standard_error,
                 "marginal price of the limit [cost units]": price,
                 "for each": per,
                 "OK": "yes" if side.excess <= 0 else "no",

@@ -165,7 +165,7 @@ def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTre
     rows = errors.deviations(errors.standard_values(uniform), errors.zones)
     parts = []
     for unit, row in enumerate(rows, start=1):
-        deviations = {**errors.still, **dict(zip(errors.columns, map(float, row), strict=True))}
+        deviations = {**errors.fixed, **dict(zip(errors.columns, map(float, row), strict=True))}
         nonzero = {column: value for column, value in deviations.items() if value != 0.0}
         for place in places_of(reducer):
             if owned_columns(errors.columns, (place,)):

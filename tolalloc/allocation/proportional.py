@@ -8,7 +8,7 @@ from tolalloc.allocation.programs import SETTLED
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 
 
-def scale_by_hand(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
+def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
     """Return designs with all zones scaled alike, the first the tolerance table as it is.
 
     Notes
@@ -19,6 +19,7 @@ def scale_by_hand(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
     space, scale = verifier.space, 1.0
     tried: list[VerifiedDesign] = []
     for step in range(steps):
+        # The stream of random units keeps the name that it had.
         tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}"))
         factor = _factor(tried[-1])
         if tried[-1].met and factor < 1 + SETTLED:
@@ -32,6 +33,6 @@ def _factor(tried: VerifiedDesign) -> float:
     factors = []
     for side in tried.sides:
         rise = side.load_of_zones(tried.design)
-        budget = -float(side.predicted(tried.design)) - side.doubt
+        budget = -float(side.predicted(tried.design)) - side.standard_error
         factors.append(1 + budget / max(rise, 0.1 * side.scale))
     return float(np.clip(min(factors), 0.4, 2.5))
