@@ -44,9 +44,9 @@ class ReducerModel(Model):
     """The equivalent model of a reducer at the sources of a drawing."""
 
     kernel: KernelResponse  # Its peak-to-peak at the modification in force
-    # Smallest and largest clearance that the modification may leave on the flank and at tip and root [m]
+    # Smallest and largest clearance that the modification may leave on the flank and at tip and root; none locks it [m]
     flank: tuple[float, float] | None = None
-    radial: tuple[float, float] | None = None  # None locks it [m]
+    radial: tuple[float, float] | None = None
     identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
     clearances: tuple[float, float] | None = None

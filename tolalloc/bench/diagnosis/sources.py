@@ -157,8 +157,9 @@ class InseparableColumns:
     alone: Float[np.ndarray, " column"]  # Standard deviation of each over its standard deviation by the drawing [-]
     # The unit sum of columns, each over its standard deviation by the drawing, that is known best [-]
     combination: Float[np.ndarray, " column"]
-    value: float  # Mean and standard deviation of that sum [-]
-    together: float  # By the drawings it has mean 0 and standard deviation 1 [-]
+    # Mean and standard deviation of that sum; by the drawings it has mean 0 and standard deviation 1 [-]
+    value: float
+    together: float
 
 
 def groups(

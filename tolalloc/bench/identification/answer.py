@@ -46,12 +46,11 @@ class IdentificationAnswer(Answer):
     written: Information
     # How far the least objective of the polynomials is from that of the model, over the standard deviation [-]
     drift: float
-    profiles: tuple[ParameterProfile, ...]  # The same without a parabola, and coordinates for units drawn anew [-]
+    profiles: tuple[ParameterProfile, ...]  # The same without a parabola
     estimates: tuple[ParameterEstimate, ...]  # Every parameter with its uncertainty
-    bootstrap: Float[np.ndarray, "resample parameter"] | None  # No bootstrap for a few units [-]
-    # Simpler and richer choices of parameters, and the simplest that is as good as the best
-    choices: tuple[ParameterChoice, ...]
-    chosen: ParameterChoice | None  # None for a few units
+    bootstrap: Float[np.ndarray, "resample parameter"] | None  # Coordinates for units drawn anew; none for a few [-]
+    choices: tuple[ParameterChoice, ...]  # Simpler and richer choices of parameters; none for a few units
+    chosen: ParameterChoice | None  # The simplest that is as good as the best
     polynomial: BoxPolynomial  # What profiles, bootstrap and choices asked instead of the model
     kind: ClassVar[str] = "identification"
 

@@ -25,8 +25,8 @@ class FirstStage:
 class CycloidStage:
     """Cycloid discs against the ring of pins."""
 
-    pin_count: int  # Numbers zp and zc [-]
-    disc_teeth: int  # The pair has one tooth difference
+    pin_count: int  # Number zp [-]
+    disc_teeth: int  # Number zc = zp − 1 [-]
     # Radius Rp of the circle of pin centres, and r_rp of a pin [m]
     pin_circle_radius: float
     pin_radius: float

@@ -42,7 +42,7 @@ class KernelResponse:
         A column of the model that is neither varied nor fixed.
     """
 
-    model: EquivalentModel  # The equivalent model [N·m]
+    model: EquivalentModel  # The equivalent model
     torque: float  # Torque on the carrier, negative resists the rotation [N·m]
     columns: tuple[str, ...]  # Columns that vary, in the order of X
     fixed: Mapping[str, float]  # Value of every other column of the model [m]
