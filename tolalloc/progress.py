@@ -37,7 +37,7 @@ class Silent:
 
 
 @dataclass
-class Record:
+class RunRecord:
     """What the manifest says of the run itself: statuses and times per stage.
 
     Parameters

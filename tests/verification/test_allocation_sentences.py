@@ -13,7 +13,7 @@ from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.effort import QUICK_ALLOCATION
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.report.document import Section
 from tolalloc.rv.reducer.files import load_identified_stiffness
@@ -72,11 +72,11 @@ def section(results, start: str) -> Section:
     return found
 
 
-def costing(allocation: Allocation, cost: float) -> Allocation:
+def costing(allocation: ZoneAllocation, cost: float) -> ZoneAllocation:
     return replace(allocation, chosen=replace(allocation.chosen, cost=cost))
 
 
-def missing(allocation: Allocation, beyond: float = 3.0) -> Allocation:
+def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
     """Return an allocation whose design keeps so much more than its limit."""
     first, *others = allocation.chosen.checks
     side = replace(first.sides[0], value=first.sides[0].limit + beyond)

@@ -14,7 +14,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.models import Evaluation, Model, Response
-from tolalloc.progress import Record
+from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.answer import RankingAnswer, rank
 from tolalloc.sensitivity.effort import RankingEffort
@@ -92,7 +92,7 @@ class Silent:
 
 
 def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
-    record, header = Record(Silent(), model.outcomes), Header(name="links", model="", seed=1)
+    record, header = RunRecord(Silent(), model.outcomes), Header(name="links", model="", seed=1)
     return rank(model, ERRORS, limits, 0.95, EFFORT, SeedTree(1), 0.01, record, header)
 
 

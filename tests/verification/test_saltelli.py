@@ -11,7 +11,7 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation
 from tolalloc.sensitivity.growth import grow_until_stable
 from tolalloc.sensitivity.ranking import (
-    Ranking,
+    SourceRanking,
     among_first,
     before,
     indistinguishable_from_zero,
@@ -223,8 +223,8 @@ def test_the_blocks_asked_for_tell_neighbours_apart():
     assert (equal[0].more_blocks, equal[0].separated) == (None, False)
 
 
-def ranking(total: list[float], resamples: np.ndarray, sources: str = "abc") -> Ranking:
-    return Ranking(sources=tuple(sources), total=np.array(total), total_resamples=resamples, blocks=64)
+def ranking(total: list[float], resamples: np.ndarray, sources: str = "abc") -> SourceRanking:
+    return SourceRanking(sources=tuple(sources), total=np.array(total), total_resamples=resamples, blocks=64)
 
 
 def test_promised_orders_are_counted_that_another_ranking_reproduces():

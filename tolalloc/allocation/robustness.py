@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from tolalloc.allocation.cost.model import Weighted
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model
@@ -89,7 +89,7 @@ class Robustness:
 
 
 def robustness(
-    verifier: Verifier, allocation: Allocation, models: Sequence[Model], seeds: SeedTree, draws: int
+    verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model], seeds: SeedTree, draws: int
 ) -> Robustness:
     """Return the answers under changed costs, models and processes.
 
@@ -147,7 +147,7 @@ def _priced(feature: PricedFeature, factor: float) -> PricedFeature:
     return replace(feature, processes=processes)
 
 
-def _with_models(verifier: Verifier, allocation: Allocation, models: Sequence[Model]) -> tuple[Variant, ...]:
+def _with_models(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model]) -> tuple[Variant, ...]:
     """Return the answers of changed models."""
     if not models:
         return ()
@@ -159,7 +159,7 @@ def _with_models(verifier: Verifier, allocation: Allocation, models: Sequence[Mo
     )
 
 
-def _with_model(verifier: Verifier, allocation: Allocation, undisturbed: VerifiedDesign, name: str) -> Variant:
+def _with_model(verifier: Verifier, allocation: ZoneAllocation, undisturbed: VerifiedDesign, name: str) -> Variant:
     """Return the answer of a changed model."""
     chosen, optimum, stacks = allocation.chosen, allocation.inside, []
     judged = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units

@@ -39,7 +39,7 @@ class SearchEffort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Allocation:
+class ZoneAllocation:
     """What the search found.
 
     Parameters
@@ -172,7 +172,7 @@ def allocate(
     proportional_tried: tuple[VerifiedDesign, ...],
     effort: SearchEffort,
     start: VerifiedDesign | None = None,
-) -> Allocation:
+) -> ZoneAllocation:
     """Return the cheapest verified allocation, or the least violating one with what blocks it.
 
     Parameters
@@ -194,7 +194,7 @@ def allocate(
     )
     tried = ((first,) if is_allowed else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
     chosen = answer(tried)
-    return Allocation(
+    return ZoneAllocation(
         limit=verifier.limit,
         chosen=chosen,
         tried=tried,

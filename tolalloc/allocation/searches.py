@@ -20,7 +20,7 @@ from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness, robustness
-from tolalloc.allocation.search import Allocation, allocate, require_groups
+from tolalloc.allocation.search import ZoneAllocation, allocate, require_groups
 from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier
@@ -30,7 +30,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models import Model
-from tolalloc.progress import Record
+from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
@@ -144,25 +144,25 @@ class DrawingQuestion:
             spread=spread,
         )
 
-    def direct(self) -> Allocation:
+    def direct(self) -> ZoneAllocation:
         """Return the allocation of tolerances and settings at once, from proportional scaling."""
         verifier = self.verifier("direct", self.space)
         return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
 
-    def fixed(self) -> Allocation:
+    def fixed(self) -> ZoneAllocation:
         """Return the allocation of tolerances with the settings as they are."""
         verifier = self.verifier("alone", self.space.fixed)
         return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
 
-    def free(self, fixed: Allocation) -> Allocation:
+    def free(self, fixed: ZoneAllocation) -> ZoneAllocation:
         """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
         return allocate(self.verifier("joint", self.space), fixed.proportional_tried, self.effort.search, fixed.chosen)
 
-    def graded(self, free: Allocation) -> GradedAllocation:
+    def graded(self, free: ZoneAllocation) -> GradedAllocation:
         """Return the allocation on ladders of zones."""
         return allocate_grades(self.verifier("graded", self.space), free.chosen, self.effort.graded_steps)
 
-    def trade(self, free: Allocation) -> SettingTrade | None:
+    def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
         if not 1 <= len(self.space.settings) <= len(self.effort.setting_steps):
             return None
@@ -172,7 +172,7 @@ class DrawingQuestion:
         )
         return setting_trade(self.quantile(free.chosen.spread), free, values)
 
-    def fronts(self, found: Allocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
+    def fronts(self, found: ZoneAllocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
         """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
         drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
         space, ladders = (graded.space, graded.scales) if graded else (self.space, {})
@@ -190,7 +190,7 @@ class DrawingQuestion:
         third = searched[1][0] if len(searched) > 1 else None
         return Fronts(exact=exact, searched=searched[0][0], with_setting=third, surrogate=searched[0][1])
 
-    def robustness(self, free: Allocation) -> Robustness:
+    def robustness(self, free: ZoneAllocation) -> Robustness:
         """Return the answers under changed assumptions."""
         verifier = replace(self.verifier("robustness", self.space), units=self.effort.stiffness_units)
         seeds = self.seeds("robustness")
@@ -205,7 +205,7 @@ class DrawingQuestion:
         draws = source.standard_values(seeds.child("stiffness").generator().random(shape))
         return tuple(self.model.changed(change) for change in draws)
 
-    def prices(self, free: Allocation) -> YieldLadder | None:
+    def prices(self, free: ZoneAllocation) -> YieldLadder | None:
         """Return the price of a good unit over yield targets, if the question prices the others."""
         price = self.unit_price
         if price is None:
@@ -229,7 +229,7 @@ def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " st
 
 
 def allocate_drawing(
-    question: DrawingQuestion, record: Record, header: Header, checkpoint: Path | None = None
+    question: DrawingQuestion, record: RunRecord, header: Header, checkpoint: Path | None = None
 ) -> AllocationAnswer:
     """Return the cheapest drawing that keeps the requirements.
 

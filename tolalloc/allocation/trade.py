@@ -12,7 +12,7 @@ from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 
 _CORRECTIONS = 6
 """Largest number of corrections of the model of the leading output, on the real one, for every choice [-]."""
@@ -62,7 +62,7 @@ class SettingTrade:
 
 
 def setting_trade(
-    response: QuantileResponse, allocation: Allocation, values: tuple[Float[np.ndarray, " _step"], ...]
+    response: QuantileResponse, allocation: ZoneAllocation, values: tuple[Float[np.ndarray, " _step"], ...]
 ) -> SettingTrade:
     """Return the cost of the cheapest zones for every choice of settings.
 
@@ -96,7 +96,7 @@ def setting_trade(
 class _CheapestAt:
     """The cheapest zones at given settings, by the models of an allocation, corrected on the real model."""
 
-    def __init__(self, response: QuantileResponse, allocation: Allocation) -> None:
+    def __init__(self, response: QuantileResponse, allocation: ZoneAllocation) -> None:
         self.response, self.space, self.chosen = response, response.space, allocation.chosen
         self.stacks = allocation.asked_stacks
         self.programs = Programs(self.space, len(self.stacks))

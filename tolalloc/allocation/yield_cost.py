@@ -9,10 +9,10 @@ import numpy as np
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 
 
-def cost_at_yield(space: DesignSpace, allocation: Allocation, target: float) -> float:
+def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float) -> float:
     """Return the cost of the cheapest design that keeps another yield [cost units].
 
     Parameters

@@ -112,7 +112,7 @@ class PartRecord(Record):
         )
 
 
-class StepRecord(Record):
+class AssemblyStepRecord(Record):
     """One table ``[[step]]``."""
 
     mount: Name
@@ -121,7 +121,7 @@ class StepRecord(Record):
     measure: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _efforts_are_of_what_is_turned(self) -> StepRecord:
+    def _efforts_are_of_what_is_turned(self) -> AssemblyStepRecord:
         for name in self.effort:
             if name not in self.adjust:
                 raise ValueError(f"effort names {name}; allowed are parts that the step adjusts")

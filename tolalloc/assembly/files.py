@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.chain import DatumFlowChain
-from tolalloc.assembly.chain_records import LARGEST, ChainRecord, CostRecord, PartRecord, StepRecord
+from tolalloc.assembly.chain_records import LARGEST, AssemblyStepRecord, ChainRecord, CostRecord, PartRecord
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Efforts, check_steps, steps_in_order
 from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
@@ -70,7 +70,8 @@ def _steps(record: ChainRecord, chain: DatumFlowChain, path: Path) -> tuple[Asse
         efforts = record.effort or Efforts()
         return steps_in_order(chain, record.adjust or "mounted", record.measure or "current", efforts)
     steps = tuple(
-        validated(StepRecord, data, f"{path}, step {number}").step() for number, data in enumerate(record.step, start=1)
+        validated(AssemblyStepRecord, data, f"{path}, step {number}").step()
+        for number, data in enumerate(record.step, start=1)
     )
     check_steps(chain, steps, str(path))
     return steps

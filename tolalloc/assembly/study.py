@@ -21,7 +21,7 @@ from tolalloc.assembly.trajectory import foreseen
 from tolalloc.assembly.transmission import transmission_effect
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, Record
+from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.rv.equivalent.answers import OUTCOMES
 
@@ -126,7 +126,7 @@ def assemble(study: AssemblyStudy, progress: Progress) -> AssemblyAnswer:
     SolveError
         A unit without equilibrium.
     """
-    plan, record, seeds = study.plan, Record(progress, OUTCOMES), SeedTree(study.seed).child("assembly")
+    plan, record, seeds = study.plan, RunRecord(progress, OUTCOMES), SeedTree(study.seed).child("assembly")
     with record.stage("adjustment"):
         gains = tuned_gains(plan, plan.precision, plan.tolerances)
         swept = np.array(sorted({*SWEPT, plan.precision}))

@@ -15,7 +15,7 @@ from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign, SeedTree
 from tolalloc.models import Model
-from tolalloc.progress import Record
+from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
 from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
@@ -249,7 +249,7 @@ def rank(
     effort: RankingEffort,
     seeds: SeedTree,
     largest_failed_share: float,
-    record: Record,
+    record: RunRecord,
     header: Header,
 ) -> RankingAnswer:
     """Return what drives the outputs of a model at the zones of its drawing.

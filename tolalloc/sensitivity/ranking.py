@@ -67,7 +67,7 @@ class Reproduction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ranking:
+class SourceRanking:
     """Sources by their total index.
 
     Parameters
@@ -109,7 +109,7 @@ class Ranking:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
         return among_first(self.total_resamples, count)
 
-    def reproduced_by(self, other: Ranking, confidence: float = 0.9) -> Reproduction:
+    def reproduced_by(self, other: SourceRanking, confidence: float = 0.9) -> Reproduction:
         """Return how many of the orders promised here another ranking of the same sources has, made of other samples.
 
         Parameters

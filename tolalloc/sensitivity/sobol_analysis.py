@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.sensitivity.growth import Growth
-from tolalloc.sensitivity.ranking import Ranking, indistinguishable_from_zero, percentile_interval
+from tolalloc.sensitivity.ranking import SourceRanking, indistinguishable_from_zero, percentile_interval
 from tolalloc.sensitivity.saltelli import SaltelliIndices
 
 
 @dataclass(frozen=True, kw_only=True)
-class SobolIndices(Ranking):
+class SobolIndices(SourceRanking):
     """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b".
 
     Parameters
@@ -56,7 +56,7 @@ class SobolIndices(Ranking):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OverallRanking(Ranking):
+class OverallRanking(SourceRanking):
     """One ranking over all outputs: the total index of a source is its largest one over the outputs that vary.
 
     Parameters

@@ -12,7 +12,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
-    from tolalloc.progress import Record
+    from tolalloc.progress import RunRecord
     from tolalloc.report.answer import Answer
     from tolalloc.report.document import Document
     from tolalloc.study.prepared import Prepared
@@ -40,7 +40,7 @@ class Question(ABC):
         return super().__new__(cls)
 
     @abstractmethod
-    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
         """Return the answer.
 
         Parameters
@@ -64,7 +64,7 @@ class Ranking(Question):
 
     kind: ClassVar[str] = "ranking"
 
-    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
         from tolalloc.drawings.seeds import SeedTree
         from tolalloc.sensitivity.answer import rank
@@ -129,7 +129,7 @@ class Allocation(Question):
         if not isinstance(self.quality_loss, QualityLoss | None):
             raise InputError.at("question allocation", "quality_loss", self.quality_loss, "QualityLoss(...) or None")
 
-    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
         """Return the cheapest drawing."""
         from tolalloc.allocation.searches import DrawingQuestion, allocate_drawing
 
@@ -167,7 +167,7 @@ class Calculation(Question):
 
     build: Callable[[bool], Document]
 
-    def answer(self, prepared: Prepared, record: Record, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return what the function made."""
         from tolalloc.study.calculated import CalculatedAnswer
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tolalloc.progress import Progress, Record, Silent
+from tolalloc.progress import Progress, RunRecord, Silent
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Document, joined
 from tolalloc.report.folder import claimed
@@ -49,9 +49,9 @@ def answered(
     return question.answer(prepared, _record(prepared, question, progress), checkpoint)
 
 
-def _record(prepared: Prepared, question: Question, progress: Progress | None) -> Record:
+def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:
     outcomes = prepared.model.outcomes if "model" in question.reads else {}
-    return Record(progress or Silent(), outcomes)
+    return RunRecord(progress or Silent(), outcomes)
 
 
 def run(

@@ -15,7 +15,7 @@ from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.trade import SettingTrade
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
@@ -71,8 +71,8 @@ class AllocationAnswer(Answer):
     model: Model
     requirements: tuple[Requirement, ...]
     space: DesignSpace
-    fixed: Allocation | None
-    free: Allocation
+    fixed: ZoneAllocation | None
+    free: ZoneAllocation
     graded: GradedAllocation | None
     shares: SobolIndices
     trade: SettingTrade | None

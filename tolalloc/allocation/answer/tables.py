@@ -10,7 +10,7 @@ from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.program.problem import Solution
 from tolalloc.allocation.requirement import Check
-from tolalloc.allocation.search import Allocation
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.wording import short, unit_of
 
@@ -33,7 +33,7 @@ def designs(answer: AllocationAnswer) -> dict[str, VerifiedDesign]:
     return {**found, "grades": answer.graded.chosen} if answer.graded else found
 
 
-def searches(answer: AllocationAnswer) -> dict[str, Allocation]:
+def searches(answer: AllocationAnswer) -> dict[str, ZoneAllocation]:
     """Return the searches by what they were free to choose."""
     free = {answer.free_label: answer.free}
     return {"tolerances alone": answer.fixed, **free} if answer.fixed else free

@@ -11,7 +11,7 @@ from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.stock import PartStock
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, Record
+from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -92,7 +92,7 @@ def mount(study: MountingStudy, progress: Progress) -> MountingAnswer:
     SolveError
         Too many units have no answer.
     """
-    record, seeds = Record(progress, OUTCOMES), SeedTree(study.seed).child("mounting")
+    record, seeds = RunRecord(progress, OUTCOMES), SeedTree(study.seed).child("mounting")
     kernel, stock = replace(study.kernel, observe=record.observe), study.stock
     with record.stage("search"):
         found = best_mounting(stock, kernel, seeds.child("search"), study.starts)

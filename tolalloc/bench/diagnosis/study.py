@@ -16,7 +16,7 @@ from tolalloc.blas import one_blas_thread
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, Record
+from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.rv.choice import bind
 from tolalloc.rv.equivalent.answers import OUTCOMES
@@ -67,7 +67,7 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
     SolveError
         Too many curves failed.
     """
-    record = Record(progress, OUTCOMES)
+    record = RunRecord(progress, OUTCOMES)
     kernel, assumed = bind(asked.reducer, asked.errors, asked.torque_nm, PLACE)
     cleaned = clean_curve(load_readings(asked.curve, ANGLE, TRANSMISSION_ERROR), asked.angle_offset_deg * DEGREE)
     kernel, errors = replace(kernel, observe=record.observe), asked.errors
