@@ -12,7 +12,7 @@ from tolalloc.assembly.files import DATA, load_errors, load_plan
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, check_steps
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.rv.equivalent.bearings import crank_disc
+from tolalloc.rv.equivalent.interfaces import crank_disc
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import PRESETS, load_reducer

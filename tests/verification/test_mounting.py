@@ -32,7 +32,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
 from tolalloc.models import Evaluation
-from tolalloc.rv.equivalent.bearings import crank_disc
+from tolalloc.rv.equivalent.interfaces import crank_disc
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.pins import dense_rows

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.rv.equivalent.bearings import carrier_support, crank_carrier, crank_disc
 from tolalloc.rv.equivalent.columns import Columns, columns_of
-from tolalloc.rv.equivalent.gears import gear_mesh, sun_support
+from tolalloc.rv.equivalent.interfaces import carrier_support, crank_carrier, crank_disc, gear_mesh, sun_support
 from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates, Positions
 from tolalloc.rv.equivalent.pins import PinContact, dense_rows, pin_contact
 from tolalloc.rv.equivalent.springs import SpringGroup, harmonic_waves
