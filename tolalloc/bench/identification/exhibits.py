@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -151,10 +152,9 @@ def reading_figures(answer: IdentificationAnswer) -> tuple[Figure, ...]:
     drawn, kinds = [], answer.data.kinds
     if PEAK_TO_PEAK in kinds:
         drawn.append(_peak_to_peak_figure(answer))
-    if CURVE in kinds:
-        drawn += [*_curve_figures(answer), _unit_residual_figure(answer, CURVE)]
-    if LOOP in kinds:
-        drawn += [*_loop_figures(answer), _unit_residual_figure(answer, LOOP)]
+    for kind in (CURVE, LOOP):
+        if kind in kinds:
+            drawn += [*_shape_figures(answer, kind), _unit_residual_figure(answer, kind)]
     return tuple(drawn)
 
 
@@ -177,62 +177,46 @@ def _peak_to_peak_figure(answer: IdentificationAnswer) -> Figure:
     )
 
 
-def _curve_figures(answer: IdentificationAnswer) -> tuple[Figure, Figure]:
-    block = _first(answer, CURVE)
-    curve = answer.measurements.curves[block.number]
-    name = f"Unit {answer.measurements.units[curve.unit].name} at {curve.torque:g} N·m"
-    angle, axis = list(curve.carrier_angle / DEGREE), "carrier angle [°]"
-    measured, model = _shapes(answer, block)
+def _shape_figures(answer: IdentificationAnswer, kind: str) -> tuple[Figure, Figure]:
+    """Draw the first curve or loop, and what the model leaves of it before and after the fit."""
+    block, measurements = _first(answer, kind), answer.measurements
+    drawn: Literal["line", "points"]
+    if kind == CURVE:
+        curve = measurements.curves[block.number]
+        unit, place, x = curve.unit, f"{curve.torque:g} N·m", list(curve.carrier_angle / DEGREE)
+        title, axis, y_label, drawn = (
+            "measured and modelled",
+            "carrier angle [°]",
+            "transmission error [arcsec]",
+            "line",
+        )
+    else:
+        loop = measurements.loops[block.number]
+        unit, place, x = loop.unit, f"{loop.carrier_angle / DEGREE:.0f}°", list(loop.torque)
+        title, axis, y_label = "torque and twist", "torque on the carrier [N·m]", "twist less its mean [arcsec]"
+        drawn = "points"
+    name = f"Unit {measurements.units[unit].name} at {place}"
+    both = (answer.data.measured, answer.at_found.values)
+    measured, model = (list(values[block.rows] / ARCSECOND) for values in both)
+    left = tuple(Series(label=label, kind="line", x=x, y=list(own)) for label, own in _left(answer, block.rows))
     return (
         Figure(
-            name="measured_curve",
-            title=f"{name}: measured and modelled",
+            name=f"measured_{kind}",
+            title=f"{name}: {title}",
             x_label=axis,
-            y_label="transmission error [arcsec]",
+            y_label=y_label,
             series=(
-                Series(label="measured", kind="line", x=angle, y=measured),
-                Series(label="model", kind="line", x=angle, y=model),
+                Series(label="measured", kind=drawn, x=x, y=measured),
+                Series(label="model", kind="line", x=x, y=model),
             ),
         ),
-        _left_figure(answer, block, "curve_left", f"{name}: model less measured", axis, angle),
-    )
-
-
-def _loop_figures(answer: IdentificationAnswer) -> tuple[Figure, Figure]:
-    block = _first(answer, LOOP)
-    loop = answer.measurements.loops[block.number]
-    name = f"Unit {answer.measurements.units[loop.unit].name} at {loop.carrier_angle / DEGREE:.0f}°"
-    torque, axis = list(loop.torque), "torque on the carrier [N·m]"
-    measured, model = _shapes(answer, block)
-    return (
         Figure(
-            name="measured_loop",
-            title=f"{name}: torque and twist",
+            name=f"{kind}_left",
+            title=f"{name}: model less measured",
             x_label=axis,
-            y_label="twist less its mean [arcsec]",
-            series=(
-                Series(label="measured", kind="points", x=torque, y=measured),
-                Series(label="model", kind="line", x=torque, y=model),
-            ),
+            y_label="model less measured [arcsec]",
+            series=left,
         ),
-        _left_figure(answer, block, "loop_left", f"{name}: model less measured", axis, torque),
-    )
-
-
-def _shapes(answer: IdentificationAnswer, block: ReadingBlock) -> tuple[list[float], list[float]]:
-    """Return the readings of one block, and the model's after the fit [arcsec]."""
-    return list(answer.data.measured[block.rows] / ARCSECOND), list(answer.at_found.values[block.rows] / ARCSECOND)
-
-
-def _left_figure(
-    answer: IdentificationAnswer, block: ReadingBlock, name: str, title: str, x_label: str, x: list[float]
-) -> Figure:
-    return Figure(
-        name=name,
-        title=title,
-        x_label=x_label,
-        y_label="model less measured [arcsec]",
-        series=tuple(Series(label=label, kind="line", x=x, y=list(left)) for label, left in _left(answer, block.rows)),
     )
 
 
