@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    UnitProgress,
+    announce_compilation,
+    print_json,
+    print_table,
+    say,
+    write_report,
+)
 
 
 def assemble(
@@ -26,7 +35,6 @@ def assemble(
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.assembly.study import assemble as assembled
     from tolalloc.assembly.study import prepare_assembly
-    from tolalloc.cli.document_script import written
     from tolalloc.report.folder import require_usable
 
     study = prepare_assembly(chain, measured, precision, seed)
@@ -36,8 +44,7 @@ def assemble(
         announce_compilation()
     with UnitProgress("assemblies") as progress:
         answer = assembled(study, progress)
-    if out:
-        written(out, lambda: answer.document)
+    write_report(answer, out)
     if as_json:
         print_json(answer.summary)
         return

@@ -1,4 +1,7 @@
-"""Talking to a person: progress on standard error, answers on standard output, errors in one sentence."""
+"""Talking to a person: progress on standard error, answers on standard output, errors in one sentence.
+
+Sentences are printed plainly; rich draws tables and progress, and is imported there.
+"""
 
 from __future__ import annotations
 
@@ -10,31 +13,31 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any
 
-import pandas as pd
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
-from rich.table import Table
-
-from tolalloc.compiled import is_kept
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from rich.progress import TaskID
+
     from tolalloc.report.answer import Answer
     from tolalloc.report.document import Document
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
-screen = Console()
-messages = Console(stderr=True)
+
+def note(sentence: str, *, dim: bool = False) -> None:
+    """Tell something beside the answer, on standard error."""
+    typer.secho(sentence, dim=dim or None, err=True)
 
 
 def announce_compilation(room: str = "equivalent") -> None:
     """Say what the next minute is spent on where a room of this version has not run on this machine before."""
+    from tolalloc.compiled import is_kept
+
     module, lasts = {"equivalent": ("turn", "about a minute"), "cycloid": ("distance", "some seconds")}[room]
     if not is_kept(module):
-        messages.print(f"Compiling the kernel for this machine: {lasts}, once.", style="dim")
+        note(f"Compiling the kernel for this machine: {lasts}, once.", dim=True)
 
 
 def print_json(answer: dict[str, Any]) -> None:
@@ -44,12 +47,16 @@ def print_json(answer: dict[str, Any]) -> None:
 
 def print_table(frame: pd.DataFrame, title: str) -> None:
     """Print a table for a person."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
     table = Table(title=title)
     for number, name in enumerate(frame.columns):
         table.add_column(escape(str(name)), justify="left" if number == 0 else "right", no_wrap=number == 0)
     for row in frame.itertuples(index=False):
         table.add_row(*(escape(_cell(value)) for value in row))
-    screen.print(table)
+    Console().print(table)
 
 
 def _cell(value: object) -> str:
@@ -71,22 +78,24 @@ def tell(answer: Answer) -> None:
 
 def _say(sentences: tuple[str, ...], warnings: tuple[str, ...]) -> None:
     for sentence in sentences:
-        screen.print(sentence, markup=False, highlight=False, soft_wrap=True)
+        typer.echo(sentence)
     for warning in warnings:
-        screen.print(warning, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        typer.secho(warning, fg="yellow")
 
 
 def write_report(answer: Answer, out: Path | None) -> None:
     """Write the report on an answer into a folder, if one was asked for."""
     if out:
-        folder = answer.save(out)
-        messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
+        note(f"Report: {answer.save(out) / 'report.html'}")
 
 
 class UnitProgress:
     """A line per stage with the number of solved units, or of other things, and their rate."""
 
     def __init__(self, counted: str = "units") -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description:<24}"),
@@ -94,7 +103,7 @@ class UnitProgress:
             TextColumn(f"{{task.fields[counted]:>8.0f}} {counted}"),
             TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),
             TimeElapsedColumn(),
-            console=messages,
+            console=Console(stderr=True),
         )
         self._task: TaskID | None = None
         self._began, self._units = 0.0, 0

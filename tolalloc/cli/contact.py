@@ -11,7 +11,7 @@ from tolalloc.cli.console import (
     AsJson,
     ReportFolder,
     announce_compilation,
-    messages,
+    note,
     print_json,
     print_table,
     tell,
@@ -112,9 +112,7 @@ def write_asked(answer: Answer, out: Path | None, teeth: ToothProfile, file: Pat
         from tolalloc.units import MICROMETRE
 
         made = write_profile(teeth, points, file)
-        messages.print(
+        note(
             f"Profile: {file}, {made.per_tooth} points per tooth, chord error at most "
-            f"{made.chord_error / MICROMETRE:.2g} µm.",
-            markup=False,
-            soft_wrap=True,
+            f"{made.chord_error / MICROMETRE:.2g} µm."
         )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, print_json, print_table, say
+from tolalloc.cli.console import AsJson, ReportFolder, print_json, print_table, say, write_report
 
 
 def costs(
@@ -18,11 +18,9 @@ def costs(
     """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
     from tolalloc.allocation.cost.answer import CostFitsAnswer
     from tolalloc.allocation.cost.points import load_shop_points
-    from tolalloc.cli.document_script import written
 
     answer = CostFitsAnswer.of(load_shop_points(shop), shop.name)
-    if out:
-        written(out, lambda: answer.document)
+    write_report(answer, out)
     if as_json:
         print_json(answer.summary)
         return

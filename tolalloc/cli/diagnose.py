@@ -12,13 +12,12 @@ from tolalloc.cli.console import (
     ReportFolder,
     UnitProgress,
     announce_compilation,
-    messages,
     print_json,
     print_table,
     say,
+    write_report,
 )
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
-from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 
 
 def diagnose(
@@ -44,6 +43,7 @@ def diagnose(
     from tolalloc.drawings.error_model import ErrorModel
     from tolalloc.drawings.tolerance_table import load_tolerance_table
     from tolalloc.report.folder import require_usable
+    from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 
     design = load_reducer(named_reducer(reducer, out))
     if stiffness:
@@ -66,8 +66,7 @@ def diagnose(
     announce_compilation()
     with UnitProgress("curves") as progress:
         answer = diagnose_unit(asked, progress)
-    if out:
-        messages.print(f"Report: {answer.save(out) / 'report.html'}", soft_wrap=True, markup=False)
+    write_report(answer, out)
     if as_json:
         print_json(answer.summary)
         return

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
 from tolalloc.cli.console import (
     AsJson,
     ReportFolder,
     UnitProgress,
     announce_compilation,
-    messages,
+    note,
     print_json,
     print_table,
     say,
+    write_report,
 )
 from tolalloc.cli.options import ReducerOption, named_reducer
 from tolalloc.exceptions import InputError
-from tolalloc.files import require_new
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
+
+if TYPE_CHECKING:
+    from tolalloc.bench.identification.parameters import Parameter
+    from tolalloc.rv.reducer.design import Reducer
 
 PLACE = "tolalloc identify"
+NAMES = "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, pin_contact, torque, bias"
+"""Names of `tolalloc.bench.identification.parameters.SYMBOLS`, written out so that help need not import them."""
 
 
 def identify(
@@ -35,7 +38,7 @@ def identify(
         list[str] | None,
         typer.Option(
             "--parameter",
-            help=f"Unknown as NAME or NAME=LOW:HIGH, again for each; NAME one of {', '.join(SYMBOLS)}. Stiffness in "
+            help=f"Unknown as NAME or NAME=LOW:HIGH, again for each; NAME one of {NAMES}. Stiffness in "
             "N/m, bias in arcsec, torque over the stated one. Unless given: liu2020's three, half to double.",
         ),
     ] = None,
@@ -51,10 +54,13 @@ def identify(
     """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
     from tolalloc.bench.identification.exhibits import estimates_table
+    from tolalloc.bench.identification.parameters import LIU2020
     from tolalloc.bench.identification.study import IdentificationStudy
     from tolalloc.bench.identification.study import identify as identified
     from tolalloc.bench.measurement.files import load_measurements
+    from tolalloc.files import require_new
     from tolalloc.report.folder import require_usable
+    from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
 
     design = load_reducer(named_reducer(reducer, stiffness, out))
     study = IdentificationStudy(
@@ -76,11 +82,10 @@ def identify(
     announce_compilation()
     with UnitProgress() as progress:
         answer = identified(study, measurements, design, progress)
-    if out:
-        messages.print(f"Report: {answer.save(out) / 'report.html'}", soft_wrap=True, markup=False)
+    write_report(answer, out)
     if stiffness and answer.stiffness:
         write_identified_stiffness(answer.stiffness, stiffness)
-        messages.print(f"Stiffness file: {stiffness}", soft_wrap=True, markup=False)
+        note(f"Stiffness file: {stiffness}")
     if as_json:
         print_json(answer.summary)
         return
@@ -99,6 +104,8 @@ def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> t
     InputError, UnknownNameError
         What is not allowed.
     """
+    from tolalloc.bench.identification.parameters import parameter
+
     known: dict[str, float] = {}
     for text in priors:
         name, sign, number = text.partition("=")

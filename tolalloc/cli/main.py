@@ -8,7 +8,7 @@ import typer
 
 from tolalloc.cli.assemble import assemble
 from tolalloc.cli.compare import compare
-from tolalloc.cli.console import messages
+from tolalloc.cli.console import note
 from tolalloc.cli.contact import contact
 from tolalloc.cli.costs import costs
 from tolalloc.cli.diagnose import diagnose
@@ -52,7 +52,7 @@ def main() -> None:
     try:
         app()
     except TolallocError as error:
-        messages.print(f"Error: {error}", soft_wrap=True, markup=False, highlight=False)
+        note(f"Error: {error}")
         raise SystemExit(2) from None
 
 

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, print_json, print_table, say
+from tolalloc.cli.console import (
+    AsJson,
+    ReportFolder,
+    UnitProgress,
+    announce_compilation,
+    print_json,
+    print_table,
+    say,
+    write_report,
+)
 from tolalloc.cli.options import ReducerOption, TestTorqueOption, named_reducer
 
 
@@ -24,7 +33,6 @@ def mount(
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.assembly.mounting.study import mount as mounted
     from tolalloc.assembly.mounting.study import prepare_mounting
-    from tolalloc.cli.document_script import written
     from tolalloc.report.folder import require_usable
 
     study = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
@@ -33,8 +41,7 @@ def mount(
     announce_compilation()
     with UnitProgress() as progress:
         answer = mounted(study, progress)
-    if out:
-        written(out, lambda: answer.document)
+    write_report(answer, out)
     if as_json:
         print_json(answer.summary)
         return

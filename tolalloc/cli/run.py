@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,11 +12,10 @@ from tolalloc.cli.console import (
     AsJson,
     UnitProgress,
     announce_compilation,
-    messages,
+    note,
     print_json,
     print_table,
     say,
-    screen,
 )
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
@@ -24,6 +23,7 @@ from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
     from tolalloc.report.answer import Answer
+    from tolalloc.study.prepared import Prepared
     from tolalloc.study.study import Study
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
@@ -126,7 +126,7 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
         announce_compilation()
     with UnitProgress() as progress:
         found = run_study(study, folder, questions, progress, checkpoint)
-    messages.print(f"Report: {folder / 'report.html'}", soft_wrap=True, markup=False)
+    note(f"Report: {folder / 'report.html'}")
     if as_json:
         print_json({"folder": str(folder), **found.document.summary})
         return
@@ -148,37 +148,40 @@ def check(script: Script, as_json: AsJson = False) -> None:
     from tolalloc.study.prepared import Prepared
 
     study = load_study(script)
-    prepared = Prepared(study=study)
-    if not any(question.reads for question in study.questions):
+    if any(question.reads for question in study.questions):
+        summary, lines = _checked(Prepared(study=study), script)
+    else:
         kinds = ", ".join(question.kind for question in study.questions)
-        print_json({"study": study.name, "questions": kinds}) if as_json else screen.print(
-            f"{script}: study {study.name} is in order; it asks: {kinds}.", soft_wrap=True
-        )
-        return
-    errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
+        summary = {"study": study.name, "questions": kinds}
+        lines = [f"{script}: study {study.name} is in order; it asks: {kinds}."]
     if as_json:
-        print_json(
-            {
-                "study": study.name,
-                "model": prepared.model.name,
-                "sources": len(errors.sources),
-                "varying": len(errors.active),
-                "groups": list(space.groups),
-                "limits": {name: [limit.lower, limit.upper] for name, limit in study.limits.items()},
-                "questions": [question.kind for question in study.questions],
-            }
-        )
-        return
-    screen.print(f"{script}: study {study.name} is in order.", soft_wrap=True)
-    screen.print(
-        f"{prepared.model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} "
-        f"groups; it asks: {', '.join(question.kind for question in study.questions)}.",
-        soft_wrap=True,
-    )
-    for requirement in requirements:
-        screen.print(f"  limit: {requirement.sentence}", soft_wrap=True, markup=False)
+        print_json(summary)
+    else:
+        typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
+
+
+def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return what a check found, for a program and in lines for a person."""
+    study, model = prepared.study, prepared.model
+    errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
+    kinds = [question.kind for question in study.questions]
+    summary = {
+        "study": study.name,
+        "model": model.name,
+        "sources": len(errors.sources),
+        "varying": len(errors.active),
+        "groups": list(space.groups),
+        "limits": {name: [limit.lower, limit.upper] for name, limit in study.limits.items()},
+        "questions": kinds,
+    }
+    lines = [
+        f"{script}: study {study.name} is in order.",
+        f"{model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} groups; "
+        f"it asks: {', '.join(kinds)}.",
+        *(f"  limit: {requirement.sentence}" for requirement in requirements),
+    ]
     for source in errors.active:
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
-        screen.print(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}", soft_wrap=True)
-    for sentence in errors.correlation.mappings(errors.sources):
-        screen.print(f"  {sentence}", soft_wrap=True, markup=False)
+        lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
+    lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
+    return summary, lines

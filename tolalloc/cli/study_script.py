@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib.util
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.files import relative_to
-from tolalloc.study.study import Study
+
+if TYPE_CHECKING:
+    from tolalloc.study.study import Study
 
 
 def load_study(path: Path) -> Study:
@@ -21,6 +23,9 @@ def load_study(path: Path) -> Study:
     InputError
         The script is missing, broken, or defines no study.
     """
+    from tolalloc.files import relative_to
+    from tolalloc.study.study import Study
+
     if not path.is_file():
         raise InputError(f"{path}: no such study script.")
     folder, name = path.resolve().parent, path.stem
