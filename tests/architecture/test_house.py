@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tolalloc.bench.identification.parameters import SYMBOLS
+from tolalloc.cli.identify import NAMES
 from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.rv.equivalent.columns import source_name
 
@@ -33,6 +35,8 @@ DOORS = {
 }
 LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
 """Libraries that are loaded when they are used and not with the package."""
+LATER = ("matplotlib", "numba", "scipy.stats", "scipy.special")
+"""Libraries that no check of a study needs either."""
 
 
 def imports(tree: ast.Module) -> set[str]:
@@ -58,10 +62,36 @@ def test_heavy_libraries_enter_through_one_door(path):
         assert place.startswith(DOORS[library]), f"{path}: {library}"
 
 
+def loaded_by(program: str) -> set[str]:
+    """Return the late libraries that a process of its own has loaded when the program is done."""
+    said = f"""
+import sys
+{program}
+sys.stderr.write(" ".join(name for name in {(*LATE, *LATER)!r} if name in sys.modules))
+"""
+    done = subprocess.run([sys.executable, "-c", said], cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(done.stderr.split())
+
+
 def test_the_package_is_imported_without_heavy_libraries():
-    said = f"import sys, tolalloc; print(*(name for name in {LATE!r} if name in sys.modules))"
-    loaded = subprocess.run([sys.executable, "-c", said], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert loaded.stdout.split() == []
+    assert not loaded_by("import tolalloc")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["check", "studies/rv20e_allocation.py"]])
+def test_help_and_check_need_no_heavy_library(words):
+    program = f"""
+from tolalloc.cli.main import main
+sys.argv = ["tolalloc", *{words!r}]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+"""
+    assert not loaded_by(program)
+
+
+def test_help_lists_the_parameters_that_can_be_identified():
+    assert NAMES.split(", ") == list(SYMBOLS)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))

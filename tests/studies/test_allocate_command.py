@@ -34,8 +34,8 @@ SMALL = """AllocationEffort(
             generations_on_kernel=2, designs=10, rounds=1, points=3)))"""
 STUDY = """import tolalloc as ta
 from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.pareto import FrontEffort
-from tolalloc.allocation.search import SearchEffort
+from tolalloc.allocation.effort import FrontEffort
+from tolalloc.allocation.effort import SearchEffort
 
 MOST = ta.AtYield(target=0.95)
 study = ta.Study(

@@ -31,10 +31,10 @@ EFFORT = """effort=ta.Effort(
             points=3))),
     is_quick=True), questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)]"""
 EFFORTS = """from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.pareto import FrontEffort
-from tolalloc.allocation.search import SearchEffort
+from tolalloc.allocation.effort import FrontEffort
+from tolalloc.allocation.effort import SearchEffort
 from tolalloc.sensitivity.effort import RankingEffort
-from tolalloc.sensitivity.sobol import SobolEffort
+from tolalloc.sensitivity.effort import SobolEffort
 """
 
 

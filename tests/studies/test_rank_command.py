@@ -22,7 +22,7 @@ EFFORT = """effort=ta.Effort(ranking=RankingEffort(
 
 
 IMPORTS = """from tolalloc.sensitivity.effort import RankingEffort
-from tolalloc.sensitivity.sobol import SobolEffort
+from tolalloc.sensitivity.effort import SobolEffort
 """
 LIMIT = "{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.99))}"
 

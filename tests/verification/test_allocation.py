@@ -13,13 +13,14 @@ from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.effort import SearchEffort
 from tolalloc.allocation.fronts import exact_front
 from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
 from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.requirement import Requirement
-from tolalloc.allocation.search import SearchEffort, allocate
+from tolalloc.allocation.search import allocate
 from tolalloc.allocation.trust_region import aimed
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits

@@ -12,10 +12,11 @@ from tests.prepared import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import SumOfCosts, Weighted
+from tolalloc.allocation.effort import SearchEffort
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.robustness import COST_CHANGE, Robustness, Variant, robustness
-from tolalloc.allocation.search import SearchEffort, allocate
+from tolalloc.allocation.search import allocate
 from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield

@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolalloc.drawings.distributions import Distribution, moments
+from tolalloc.drawings.distributions import RAYLEIGH, Distribution, moments
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.mixtures import Batch, smoothed_magnitude
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature, harmonic_range_quantile, parsed_spectrum
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import (
+    KNOWN_RANGES,
+    Feature,
+    harmonic_range_quantile,
+    integrated_range_quantile,
+    parsed_spectrum,
+)
 
 SAMPLES = 100_000
 ZONE = 4e-6
@@ -240,6 +247,18 @@ def test_the_fit_finds_the_distribution_that_the_parts_came_from(generator):
     assert radii.cp == pytest.approx(6 / 3.44, rel=4 / np.sqrt(8000) + 0.001)
     below = fitted(np.linspace(-7e-6, 3e-6, 50))
     assert [fit.distribution for fit in below.fits] == [Distribution.NORMAL]
+
+
+@pytest.mark.parametrize("spectrum", KNOWN_RANGES)
+def test_the_known_range_of_a_spectrum_is_the_integrated_one(spectrum):
+    assert harmonic_range_quantile(spectrum) == pytest.approx(
+        integrated_range_quantile(spectrum, 0, RAYLEIGH), rel=1e-14
+    )
+
+
+def test_the_ranges_of_the_shipped_tables_are_known():
+    sources = [*load_tolerance_table("rv20e_baseline"), *load_tolerance_table("rv20e_all_sources")]
+    assert {own.spectrum for own in sources if len(own.spectrum) > 1} == set(KNOWN_RANGES)
 
 
 @pytest.mark.parametrize("teeth", [39, 40])

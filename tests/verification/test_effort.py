@@ -17,10 +17,10 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation
-from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
-from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.target import target_sensitivity
 from tolalloc.study.effort import QUICK
 from tolalloc.surrogate.validation import answers_of

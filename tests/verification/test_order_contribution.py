@@ -14,10 +14,11 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Evaluation
+from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.growth import Growth, Step
 from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 
 NAMES = ("a", "b", "c", "d")

@@ -10,10 +10,11 @@ import pytest
 
 from tests.prepared import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
+from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.design_problem import DesignProblem, large
-from tolalloc.allocation.pareto.front import FrontEffort, pareto_front
+from tolalloc.allocation.pareto.front import pareto_front
 from tolalloc.allocation.pareto.indicators import nondominated
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse

@@ -17,8 +17,7 @@ from tolalloc.models import Evaluation, Model, Response
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.answer import RankingAnswer, rank
-from tolalloc.sensitivity.effort import RankingEffort
-from tolalloc.sensitivity.sobol import SobolEffort
+from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 
 GAP, PLAY = "gap [mm]", "play [deg]"
 EFFORT = RankingEffort(

@@ -16,9 +16,10 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models import Evaluation
+from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
-from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
+from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 
 FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")

@@ -26,7 +26,8 @@ from tolalloc.rv.response.stiffness import (
     StiffnessResponse,
     stiffness_source,
 )
-from tolalloc.sensitivity.sobol import SobolEffort, sobol_indices
+from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.uncertain import FirstOrderError
 
 FIELDS = ("crank_disc_bearing", "pin_contact")

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tolalloc.allocation.pareto import FrontEffort
-from tolalloc.allocation.search import SearchEffort
 from tolalloc.exceptions import InputError
 from tolalloc.surrogate import validation
 
@@ -50,6 +48,52 @@ def _require_enough(effort: object, prefix: str) -> None:
             raise InputError.at(
                 "study", f"effort.allocation.{prefix}{name}", value, f"a whole number, {fewest} or more"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontEffort:
+    """How much the search for the front may spend.
+
+    Parameters
+    ----------
+    population, generations
+        Size of the search on the surrogate [-].
+    population_on_kernel, generations_on_kernel
+        The same where the surrogate does not earn its place and the kernel itself runs [-].
+    designs
+        Designs around the chosen one that the first surrogate learns from [-].
+    rounds
+        Searches, each followed by kernel runs along its front that improve the next surrogate [-].
+    points
+        Kernel runs along the front after each search [-].
+    """
+
+    population: int = 80
+    generations: int = 100
+    population_on_kernel: int = 20
+    generations_on_kernel: int = 3
+    designs: int = 36
+    rounds: int = 2
+    points: int = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchEffort:
+    """How much the search may spend.
+
+    Parameters
+    ----------
+    steps
+        Largest number of verified steps of each search [-].
+    reach
+        Factor by which a scale may change in the first step; later ones reach less [-].
+    front
+        Effort of the Pareto front.
+    """
+
+    steps: int = 8
+    reach: float = 2.5
+    front: FrontEffort = field(default_factory=FrontEffort)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,8 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.pareto import Front, FrontEffort, from_genes, pareto_front, to_genes
+from tolalloc.allocation.effort import FrontEffort
+from tolalloc.allocation.pareto import Front, from_genes, pareto_front, to_genes
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.design_problem import Criterion, Ladders
 from tolalloc.allocation.pareto.indicators import spread_over

@@ -7,7 +7,6 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import beta, kurtosis, norm, skew
 
 from tolalloc.allocation.local_model import Side, root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.program.problem import Stack
@@ -201,6 +200,8 @@ class AtCpk:
 
     def _needed(self, turned: Float[np.ndarray, " unit"]) -> tuple[float, float]:
         """Return the estimate whose lower bound is the target, and its standard error [-]."""
+        from scipy.stats import kurtosis, norm, skew
+
         z, units = float(norm.ppf(CONFIDENCE)), turned.size
         lean, tails = float(skew(turned)), float(kurtosis(turned, fisher=False)) - 1
         # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root.
@@ -326,6 +327,8 @@ def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> fl
     Exact bootstrap: the rank's value of a resample is that of unit i with a probability of the incomplete beta function
     (Maritz & Jarrett 1978).
     """
+    from scipy.stats import beta
+
     weights = np.diff(beta.cdf(np.linspace(0, 1, ordered.size + 1), rank, ordered.size - rank + 1))
     return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
 

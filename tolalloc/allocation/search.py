@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.pareto import FrontEffort
+from tolalloc.allocation.effort import SearchEffort
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
@@ -17,25 +17,6 @@ from tolalloc.exceptions import InputError, SolveError
 
 _ROUNDING = 1e-9
 """Distance from a bound, over the bound, up to which it is rounding [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SearchEffort:
-    """How much the search may spend.
-
-    Parameters
-    ----------
-    steps
-        Largest number of verified steps of each search [-].
-    reach
-        Factor by which a scale may change in the first step; later ones reach less [-].
-    front
-        Effort of the Pareto front.
-    """
-
-    steps: int = 8
-    reach: float = 2.5
-    front: FrontEffort = field(default_factory=FrontEffort)
 
 
 @dataclass(frozen=True, kw_only=True)

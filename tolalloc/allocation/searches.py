@@ -32,7 +32,8 @@ from tolalloc.exceptions import InputError
 from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
-from tolalloc.sensitivity.sobol import FactorGroup, SobolEffort, sobol_indices
+from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 _EXACT = (0.85, 1.25)

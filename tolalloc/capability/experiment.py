@@ -15,6 +15,9 @@ from tolalloc.models import Response, ResponseWithDerivatives
 LARGEST_FAILED_SHARE = 0.01
 """Share of the units that may fail unless a study says otherwise [-]."""
 
+FEWEST_RUNS = 2
+"""Runs of the subset simulation without which their spread is not known [-]."""
+
 Answering = TypeVar("Answering", bound=Response | ResponseWithDerivatives, covariant=True)
 Given = TypeVar("Given", bound=Response | ResponseWithDerivatives)
 

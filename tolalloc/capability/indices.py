@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import binom, norm
 
 from tolalloc.exceptions import InputError
 
@@ -44,6 +43,8 @@ class Limits:
 
     def normal_share_outside(self, mean: float, deviation: float) -> float:
         """Return the share of a normal distribution beyond the limits [-]."""
+        from scipy.stats import norm
+
         return float(norm.cdf((self._low - mean) / deviation) + norm.sf((self._high - mean) / deviation))
 
     @property
@@ -230,6 +231,8 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     ----------
     Wilson 1927, (p + z²/2n ± z·√(p·(1 − p)/n + z²/4n²)) / (1 + z²/n).
     """
+    from scipy.stats import norm
+
     _require_share("Wilson interval", "confidence", confidence)
     if units < 1 or not 0 <= accepted <= units:
         raise InputError.at("Wilson interval", "accepted", accepted, f"0 to {units} units")
@@ -262,6 +265,8 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     ----------
     David & Nagaraja, Order Statistics, ch. 7: P(X₍ᵣ₎ ≤ q < X₍ₛ₎) = P(r ≤ B < s) with B binomial (n, share).
     """
+    from scipy.stats import binom
+
     _require_share("quantile interval", "share", share)
     _require_share("quantile interval", "confidence", confidence)
     if sample.size < 1 or not np.isfinite(sample).all():

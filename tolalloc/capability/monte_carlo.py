@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import beta
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.drawings.seeds import SamplingDesign, uniform_chunks
@@ -95,6 +94,8 @@ class MonteCarlo:
 
 def proportion(units: int, rejected: int) -> Yield:
     """Return the yield of a sample with its exact intervals."""
+    from scipy.stats import beta
+
     accepted, tail = units - rejected, (1 - CONFIDENCE) / 2
     return Yield(
         estimate=accepted / units,

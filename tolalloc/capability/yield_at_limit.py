@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.capability.indices import (
     MILLION,
     Capability,
@@ -25,8 +26,6 @@ from tolalloc.exceptions import InputError
 METHOD = "Monte Carlo"
 RARE = 1e-3
 """Share of random units beyond the limit below which a failure is rare [-]."""
-FEWEST_RUNS = 2
-"""Runs of the subset simulation without which their spread is not known [-]."""
 LARGEST_DIFFERENCE = 3.0
 """Difference of two estimates in standard errors beyond which they contradict each other [-]."""
 

@@ -9,8 +9,8 @@ from itertools import combinations, zip_longest
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtri
 
+from tolalloc.drawings.distributions import ndtri
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
 

@@ -11,7 +11,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
 
 Numbers = Float[np.ndarray, "..."]
 
@@ -24,6 +23,20 @@ ABOVE_ZERO, BELOW_ONE = float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0
 LEVELS = np.linspace(-8.2, 8.2, 4097)
 """Standard normal numbers that cover all probabilities between 0 and the float below 1 [-]."""
 LEVELS.setflags(write=False)
+
+
+def ndtr(number: Any) -> Any:
+    """Return the standard normal probabilities of not exceeding these numbers; scipy is imported when it is used."""
+    from scipy import special
+
+    return special.ndtr(number)
+
+
+def ndtri(probability: Any) -> Any:
+    """Return the standard normal numbers that are not exceeded with these probabilities."""
+    from scipy import special
+
+    return special.ndtri(probability)
 
 
 class Distribution(StrEnum):

@@ -7,10 +7,9 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
-from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE
+from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
 
 

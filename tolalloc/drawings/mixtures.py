@@ -9,7 +9,6 @@ from math import sqrt
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 from tolalloc.drawings.distributions import (
     BELOW_ONE,
@@ -18,6 +17,8 @@ from tolalloc.drawings.distributions import (
     NUMBER,
     Marginal,
     Numbers,
+    ndtr,
+    ndtri,
 )
 
 

@@ -3,30 +3,78 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import ceil
 
-from tolalloc.capability import yield_at_limit
+from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
-from tolalloc.sensitivity import screening, target
-from tolalloc.sensitivity.sobol import SobolEffort
 from tolalloc.surrogate import validation
 
+WORST_SHARE = 0.05
+"""Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
+FEWEST_OUTSIDE = 50
+"""Units needed on either side of the threshold [-]."""
+FEWEST_TRAJECTORIES = 2
+"""Trajectories without which the effects have no scatter [-]."""
+FEWEST_UNITS_OF_CLASS = 10
+"""Units of a class of PAWN, below which its distance to the whole sample is chance [-]."""
+CLASSES = 10
+"""Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
+
+
+def fewest_units(fewest: int = FEWEST_OUTSIDE) -> int:
+    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
+    return ceil(fewest / WORST_SHARE)
+
+
 _FEWEST = {
-    "units": target.fewest_units(),
-    "trajectories": screening.FEWEST_TRAJECTORIES,
-    "moment_units": screening.FEWEST_UNITS_OF_CLASS * screening.CLASSES,
+    "units": fewest_units(),
+    "trajectories": FEWEST_TRAJECTORIES,
+    "moment_units": FEWEST_UNITS_OF_CLASS * CLASSES,
     # A bootstrap resample of fewer could be one unit again and again, and would not vary.
     "derivative_units": 10,
     "inverse_units": 1,
     "surrogate_units": validation.FEWEST_OF_FOLD * validation.FOLDS,
     "level_units": 100,
-    "level_runs": yield_at_limit.FEWEST_RUNS,
+    "level_runs": FEWEST_RUNS,
     "widened_units": 100,
     "permutations": 2,
 }
 """Smallest numbers that the estimators take [-]."""
 _CHAIN = 10
 """Units of a level come in chains of so many [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SobolEffort:
+    """How much a Sobol analysis may compute.
+
+    Parameters
+    ----------
+    start, limit
+        First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-].
+    places
+        First places whose order must be stable in the ranking over all outputs [-].
+    probability
+        Share of resamples that must have that order [-].
+    resamples
+        Bootstrap resamples [-].
+    second_order
+        Whether pairs of sources get an index, at nearly twice the samples.
+    """
+
+    start: int = 512
+    limit: int = 65_536
+    places: int = 3
+    probability: float = 0.9
+    resamples: int = 400
+    second_order: bool = False
+
+    def __post_init__(self) -> None:
+        if self.start < 2 or self.start & (self.start - 1):
+            raise InputError.at("Sobol indices", "first number of blocks", self.start, "a power of two, 2 or more")
+        if self.places < 1:
+            raise InputError.at("Sobol indices", "number of stable places", self.places, "1 or more")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,18 +19,13 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Response
+from tolalloc.sensitivity.effort import CLASSES, FEWEST_TRAJECTORIES, FEWEST_UNITS_OF_CLASS
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
 
 _CURVE_POINTS = 100
 """Points at which delta compares two densities, SALib's number."""
-FEWEST_TRAJECTORIES = 2
-"""Trajectories without which the effects have no scatter [-]."""
-FEWEST_UNITS_OF_CLASS = 10
-"""Units of a class of PAWN, below which its distance to the whole sample is chance [-]."""
-CLASSES = 10
-"""Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

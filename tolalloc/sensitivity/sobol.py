@@ -17,6 +17,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation, Response
+from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.growth import Resampled, grow_until_stable
 from tolalloc.sensitivity.saltelli import SaltelliIndices, saltelli_indices
 from tolalloc.sensitivity.saltelli_design import SaltelliDesign
@@ -33,38 +34,6 @@ class FactorGroup(StrEnum):
     """One source; the sources must be independent."""
     BLOCK = "block"
     """Sources that depend on each other, together; one source where it depends on no other."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SobolEffort:
-    """How much a Sobol analysis may compute.
-
-    Parameters
-    ----------
-    start, limit
-        First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-].
-    places
-        First places whose order must be stable in the ranking over all outputs [-].
-    probability
-        Share of resamples that must have that order [-].
-    resamples
-        Bootstrap resamples [-].
-    second_order
-        Whether pairs of sources get an index, at nearly twice the samples.
-    """
-
-    start: int = 512
-    limit: int = 65_536
-    places: int = 3
-    probability: float = 0.9
-    resamples: int = 400
-    second_order: bool = False
-
-    def __post_init__(self) -> None:
-        if self.start < 2 or self.start & (self.start - 1):
-            raise InputError.at("Sobol indices", "first number of blocks", self.start, "a power of two, 2 or more")
-        if self.places < 1:
-            raise InputError.at("Sobol indices", "number of stable places", self.places, "1 or more")
 
 
 @dataclass

@@ -13,12 +13,9 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.sensitivity.effort import FEWEST_OUTSIDE, WORST_SHARE, fewest_units
 from tolalloc.sensitivity.ranking import percentile_interval
 
-WORST_SHARE = 0.05
-"""Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
-FEWEST_OUTSIDE = 50
-"""Units needed on either side of the threshold [-]."""
 _CLASSES_PER_ROOT = 2
 """Classes of a measure over √units: fewer would hide how steeply the chance rises, more would scatter [-]."""
 
@@ -201,11 +198,6 @@ def _varying_columns(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) 
     """Return how many of each source's columns vary [-]."""
     where, varies = np.array(errors.source_of_column), x.std(axis=0) > 0.0
     return np.array([np.count_nonzero(varies[where == name]) for name in dict.fromkeys(errors.source_of_column)])
-
-
-def fewest_units(fewest: int = FEWEST_OUTSIDE) -> int:
-    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
-    return int(np.ceil(fewest / WORST_SHARE))
 
 
 def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, fewest: int, *, units: int) -> tuple[float, bool]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem, Ladders
@@ -53,33 +54,6 @@ class Front:
     def rms_error(self) -> float:
         """Root-mean-square difference between what the search was told and the kernel, along the front [arcsec]."""
         return float(np.sqrt(np.nanmean((self.quantile - self.on_kernel) ** 2)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrontEffort:
-    """How much the search for the front may spend.
-
-    Parameters
-    ----------
-    population, generations
-        Size of the search on the surrogate [-].
-    population_on_kernel, generations_on_kernel
-        The same where the surrogate does not earn its place and the kernel itself runs [-].
-    designs
-        Designs around the chosen one that the first surrogate learns from [-].
-    rounds
-        Searches, each followed by kernel runs along its front that improve the next surrogate [-].
-    points
-        Kernel runs along the front after each search [-].
-    """
-
-    population: int = 80
-    generations: int = 100
-    population_on_kernel: int = 20
-    generations_on_kernel: int = 3
-    designs: int = 36
-    rounds: int = 2
-    points: int = 12
 
 
 def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front:
