@@ -105,25 +105,31 @@ def test_files_and_functions_stay_small(path):
             assert lines <= 65, f"{path}: {node.name} has {lines} lines"
 
 
+def _documented_numbers(record: ast.ClassDef) -> list[tuple[str, str]]:
+    """Return the number fields of a record with what is said of them, in its docstring or beside the field."""
+    fields = [item for item in record.body if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)]
+    numbers = {
+        item.target.id for item in fields if ast.unparse(item.annotation).startswith(("float", "int", "Float", "Int"))
+    }
+    entries = re.finditer(r"^(\w[\w, ]*)\n((?:    .*\n?)+)", ast.get_docstring(record) or "", re.MULTILINE)
+    said = [(entry[1], entry[2]) for entry in entries if {*entry[1].split(", ")} & numbers]
+    for field, after in zip(record.body, record.body[1:], strict=False):
+        is_number = isinstance(field, ast.AnnAssign) and getattr(field.target, "id", "") in numbers
+        if is_number and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            said.append((field.target.id, str(after.value.value)))
+    return said
+
+
 def test_every_documented_number_states_its_unit():
-    """Every parameter of a public record ends with a unit in brackets, unless it is a name, a flag or a record."""
-    wanting = []
-    for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.ClassDef):
-                continue
-            numbers = {
-                item.target.id
-                for item in node.body
-                if isinstance(item, ast.AnnAssign)
-                and isinstance(item.target, ast.Name)
-                and ast.unparse(item.annotation).startswith(("float", "int", "Float", "Int"))
-            }
-            text = ast.get_docstring(node) or ""
-            for match in re.finditer(r"^(\w[\w, ]*)\n((?:    .*\n?)+)", text, re.MULTILINE):
-                names = set(match[1].split(", "))
-                if names & numbers and "[" not in match[2]:
-                    wanting.append(f"{path.name}: {node.name}.{match[1]}")
+    """What is said of a number field ends with a unit in brackets, unless it is a name, a flag or a record."""
+    wanting = [
+        f"{path.name}: {node.name}.{name}"
+        for path in FILES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+        for name, text in _documented_numbers(node)
+        if "[" not in text
+    ]
     assert not wanting
 
 
