@@ -223,16 +223,28 @@ class BoundFunction(Model):
             try:
                 found = np.asarray(function(*arguments), float).reshape(count, x.shape[0])
             except (TypeError, *_FAILURES):
-                found = np.array([_one(function, [*row, *self.values], count) for row in inputs * self._per_input]).T
+                rows = inputs * self._per_input
+                found = np.array([self._one(function, [*row, *self.values], count) for row in rows]).T
         return np.ascontiguousarray(found.reshape(count, x.shape[0]).T)
 
+    def _one(self, function: Callable[..., Any], arguments: Sequence[float], count: int) -> Float[np.ndarray, " value"]:
+        """Return what a function says of one sample, NaN where it raises.
 
-def _one(function: Callable[..., Any], arguments: Sequence[float], count: int) -> Float[np.ndarray, " value"]:
-    """Return what a function says of one sample, NaN where it raises."""
-    try:
-        return np.asarray(function(*arguments), float).reshape(count)
-    except _FAILURES:
-        return np.full(count, np.nan)
+        Raises
+        ------
+        InputError
+            A function that takes or returns another number of values.
+        """
+        try:
+            found = np.asarray(function(*arguments), float).ravel()
+        except _FAILURES:
+            return np.full(count, np.nan)
+        except TypeError as error:
+            given = f"{len(self.source.inputs)} inputs and {len(self.values)} settings"
+            raise InputError(f"model {self.name}: the function cannot be called with {given} ({error}).") from None
+        if found.size != count:
+            raise InputError(f"model {self.name}: the function returned {found.size} values; asked for are {count}.")
+        return found
 
 
 def model(
@@ -254,6 +266,9 @@ def model(
     >>> gap.outputs
     ('gap [mm]',)
     """
+    for field, names in (("inputs", inputs), ("outputs", outputs)):
+        if isinstance(names, str):
+            raise InputError.at("ta.model", field, names, f"a sequence of names, such as ({names!r},)")
     called = name or getattr(function, "__name__", "own model").replace("_", " ").replace("<lambda>", "own model")
     return FunctionModel(
         function=function,

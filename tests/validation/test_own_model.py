@@ -142,3 +142,40 @@ def test_without_the_extra_a_mock_up_unit_is_refused_in_one_sentence(monkeypatch
     monkeypatch.setitem(sys.modules, "fmpy", None)
     with pytest.raises(ta.InputError, match=r"need the optional extra: pip install tolalloc\[fmu\]"):
         ta.from_fmu(str(tmp_path / "gap.fmu"), inputs={"a": "a"}, outputs={"b [mm]": "b"})
+
+
+def test_grades_of_a_model_without_settings(study):
+    own = ta.Study(
+        study.model,
+        study.drawing,
+        limits=study.limits,
+        questions=[ta.Allocation(grades=True, what_if=False)],
+        effort=ta.Effort(allocation=QUICK_ALLOCATION),
+    )
+    found = own.allocate()
+    assert found.met
+    assert all(source.grade for source in found.drawing.sources)
+    assert found.cost >= published()["total"]
+    assert str(found).startswith("The cheapest drawing of contact angle")
+
+
+def test_what_a_function_takes_and_returns_is_checked(study):
+    errors = study.drawing.errors
+    inputs = study.model.inputs
+    for function, words in (
+        (lambda hub: hub, "cannot be called with 4 inputs"),
+        (lambda *sizes: [1.0, 2.0, 3.0], "returned 3 values; asked for are 1"),
+    ):
+        model = ta.model(function, inputs=inputs, outputs=("y [mm]",)).bound(errors, "test")
+        with pytest.raises(ta.InputError, match=words):
+            model(np.zeros((5, 4)))
+    with pytest.raises(ta.InputError, match=r"such as \('y \[mm\]',\)"):
+        ta.model(lambda hub: hub, inputs=("hub",), outputs="y [mm]")
+
+
+def test_a_row_of_process_costs_has_five_entries(study):
+    row = {"id": "hub", "plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 1.0}
+    drawing = ta.Drawing.of_rows([row], costs={"hub": [("turn", 5, 0.5, 0.06)]})
+    model = ta.model(lambda hub: hub, inputs=("hub",), outputs=("y [mm]",))
+    with pytest.raises(ta.InputError, match="name, A, B, smallest t, largest t"):
+        ta.Study(model, drawing, limits={"y [mm]": ta.Limit(upper=1.0)}).allocate("quick")

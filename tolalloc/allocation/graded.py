@@ -131,6 +131,8 @@ class _Grid:
     def _settings(self) -> Float[np.ndarray, "choice setting"]:
         """Settings of all combinations of amounts, those outside their range left out."""
         count = len(self.amounts)
+        if not count:
+            return np.empty((1, 0))  # a model without settings leaves the zones alone to choose
         pairs = np.array(np.meshgrid(*self.amounts)).reshape(count, -1).T @ self._to_setting.T
         low, high = self.space.shared.lower, self.space.shared.upper
         return np.asarray(pairs[np.all((pairs >= low - _ROUNDING) & (pairs <= high + _ROUNDING), axis=1)])

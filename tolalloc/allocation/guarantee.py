@@ -78,7 +78,7 @@ class Guarantee(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class AtYield:
     """So many units lie within all limits of the output, shown with one-sided 95 % confidence.
 
@@ -137,7 +137,7 @@ class AtYield:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class AtCpk:
     """The capability index of the output reaches a target, shown with one-sided 95 % confidence.
 

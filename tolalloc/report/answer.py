@@ -185,6 +185,14 @@ class Answer(ABC):
             self.add_files(path)
         return path
 
+    def __str__(self) -> str:
+        """Return title, sentences and warnings."""
+        return "\n".join([self.title, *self.sentences, *self.warnings])
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # noqa: ARG002
+        """Show a terminal session what a person reads, not the numbers behind it."""
+        printer.text(str(self))
+
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the key sentence, the first table, one figure."""
         from tolalloc.report.writer import html_table, inline_png

@@ -132,7 +132,8 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
             "radial clearance at tip and root [µm]": amounts.radial_clearance / MICROMETRE,
             **{name: value(found) if found else np.nan for name, value in _CARRIED.items()},
         }
-    frame = pd.DataFrame(columns).rename(columns=lambda label: label.removeprefix("median unit "))
+    shown = {label: f"{label.removeprefix('median unit ')} [unit of the amount]" for label in columns}
+    frame = pd.DataFrame(columns).rename(columns=shown)
     return frame.rename_axis("amount").reset_index()
 
 

@@ -90,6 +90,10 @@ class Prepared:
 
         costs = self.study.drawing.costs if self.study.drawing else ""
         if isinstance(costs, Mapping):
+            for name, row in ((name, row) for name, rows in costs.items() for row in rows):
+                if len(row) != 5:
+                    allowed = "(name, A, B, smallest t, largest t)"
+                    raise InputError.at(f"{self.place}, process costs of {name}", "row", row, allowed)
             # What a person writes in Python is a tolerance ± t, half a zone.
             processes = priced(costs, self.errors.sources, "half zone")
         else:
