@@ -28,10 +28,8 @@ import numba
 import numpy as np
 from kernel_speed import SEED, progress
 
-from tolalloc.assembly.mounting.parts import drawn_parts
-from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting
-from tolalloc.assembly.mounting.steps import units_from
-from tolalloc.assembly.mounting.stock import PartStock
+from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting, units_from
+from tolalloc.assembly.mounting.stock import PartStock, drawn_parts
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

@@ -14,9 +14,8 @@ from published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
 from tolalloc.assembly.angular.tuning import best_precision
 from tolalloc.assembly.control import regulator
-from tolalloc.assembly.mounting.parts import drawn_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
-from tolalloc.assembly.mounting.stock import PartStock
+from tolalloc.assembly.mounting.stock import PartStock, drawn_parts
 from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
 from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
 from tolalloc.capability.rare_failure.importance import importance_sampling
-from tolalloc.capability.rare_failure.result import RareFailure
+from tolalloc.capability.rare_failure.limit_state import RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.drawings.seeds import SeedTree
 

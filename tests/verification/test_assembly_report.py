@@ -10,14 +10,13 @@ import pandas as pd
 import pytest
 
 from tolalloc.assembly.answer import tables, tolerance_tables, transmission
-from tolalloc.assembly.answer.answer import AssemblyAnswer, TransmissionEffect
+from tolalloc.assembly.answer.answer import AssemblyAnswer
 from tolalloc.assembly.answer.cautions import assumptions, warnings
-from tolalloc.assembly.answer.characteristics import characteristic_table, larger
-from tolalloc.assembly.answer.plan_record import plan_record
-from tolalloc.assembly.answer.summary import summary
+from tolalloc.assembly.answer.summary import plan_record, summary
+from tolalloc.assembly.answer.tables import characteristic_table, larger
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
-from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves
+from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.assembly.trajectory import random_numbers

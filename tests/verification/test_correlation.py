@@ -11,8 +11,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import kstest
 
-from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair
-from tolalloc.drawings.correlation_file import load_correlations
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair, load_correlations
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.mixtures import Batch

@@ -7,8 +7,7 @@ from tests.seeds import seeds
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program import choice_search
-from tolalloc.allocation.program.choice_rows import ChoiceRows
-from tolalloc.allocation.program.choice_search import best_choice
+from tolalloc.allocation.program.choice_search import ChoiceRows, best_choice
 from tolalloc.allocation.program.discrete import DiscreteProblem, Option, feature_options
 from tolalloc.allocation.program.multiple_choice import MultipleChoice
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack

@@ -7,9 +7,9 @@ import pytest
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.importance import widened_sampling
+from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from tests.prepared import prepared as baseline
-from tolalloc.allocation.grade.iso286 import grade_zones
-from tolalloc.allocation.grade.ladder import SERIES, ZONES
+from tolalloc.allocation.grade import SERIES, ZONES, grade_zones
 from tolalloc.allocation.graded import allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import Verifier

@@ -29,7 +29,7 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.surrogate.polynomial import fit_box_polynomial, total_degrees
+from tolalloc.surrogate.regression import fit_box_polynomial, total_degrees
 from tolalloc.units import ARCSECOND
 
 NONE = np.empty(0)

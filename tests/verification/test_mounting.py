@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.assembly.mounting.parts import MeasuredPart, drawn_parts, load_parts, own_errors
 from tolalloc.assembly.mounting.places import (
     PartTurn,
     Place,
@@ -23,9 +22,8 @@ from tolalloc.assembly.mounting.places import (
     sun_turn,
     unmounted,
 )
-from tolalloc.assembly.mounting.search import best_mounting, random_mounting
-from tolalloc.assembly.mounting.steps import units_from
-from tolalloc.assembly.mounting.stock import PartStock
+from tolalloc.assembly.mounting.search import best_mounting, random_mounting, units_from
+from tolalloc.assembly.mounting.stock import MeasuredPart, PartStock, drawn_parts, load_parts, own_errors
 from tolalloc.bench.diagnosis.sources import half_turn
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree

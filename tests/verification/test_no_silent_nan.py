@@ -15,10 +15,9 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
-from tolalloc.capability.rare_failure.importance import importance_sampling
-from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.importance import importance_sampling, widened_sampling
+from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -26,7 +25,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation
-from tolalloc.sensitivity.classical import classical_estimate
+from tolalloc.sensitivity.derivatives import classical_estimate
 from tolalloc.sensitivity.saltelli import saltelli_indices
 
 KINDS = ("NaN", "status")

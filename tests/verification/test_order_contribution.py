@@ -15,11 +15,10 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.growth import Growth, Step
-from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
+from tolalloc.sensitivity.ranking import Growth, Step
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
+from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, order_contribution
 
 NAMES = ("a", "b", "c", "d")
 ORDERS = (1, 2, 39)

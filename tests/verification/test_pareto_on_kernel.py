@@ -13,9 +13,9 @@ from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
-from tolalloc.allocation.pareto.design_problem import DesignProblem, large
+from tolalloc.allocation.pareto.found import nondominated
 from tolalloc.allocation.pareto.front import pareto_front
-from tolalloc.allocation.pareto.indicators import nondominated
+from tolalloc.allocation.pareto.problem import DesignProblem, large
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree

@@ -13,11 +13,16 @@ from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
 from tolalloc.capability.rare_failure.form import design_point
-from tolalloc.capability.rare_failure.limit_state import LimitState, LimitStateWithGradient
-from tolalloc.capability.rare_failure.response_limit import ResponseLimit, ResponseLimitWithGradient
-from tolalloc.capability.rare_failure.result import Level, RareFailure
+from tolalloc.capability.rare_failure.importance import widened_sampling
+from tolalloc.capability.rare_failure.limit_state import (
+    Level,
+    LimitState,
+    LimitStateWithGradient,
+    RareFailure,
+    ResponseLimit,
+    ResponseLimitWithGradient,
+)
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel

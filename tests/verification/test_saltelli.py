@@ -9,11 +9,11 @@ from SALib.analyze import sobol as salib
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation
-from tolalloc.sensitivity.growth import grow_until_stable
 from tolalloc.sensitivity.ranking import (
     SourceRanking,
     among_first,
     before,
+    grow_until_stable,
     indistinguishable_from_zero,
     neighbours,
     percentile_interval,

@@ -17,8 +17,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.saltelli_design import SAMPLES_AT_ONCE, SaltelliDesign
+from tolalloc.sensitivity.saltelli import SAMPLES_AT_ONCE, SaltelliDesign, saltelli_indices
 from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 

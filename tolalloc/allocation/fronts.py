@@ -12,8 +12,8 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.pareto import Front, from_genes, pareto_front, to_genes
 from tolalloc.allocation.pareto.answers import Checkpoint
-from tolalloc.allocation.pareto.design_problem import Criterion, Ladders
-from tolalloc.allocation.pareto.indicators import spread_over
+from tolalloc.allocation.pareto.found import spread_over
+from tolalloc.allocation.pareto.problem import Criterion, Ladders
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.convex import front
 from tolalloc.allocation.program.problem import Solution, Stack

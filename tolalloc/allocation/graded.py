@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.grade.ladder import Ladder, group_ladder
+from tolalloc.allocation.grade import Ladder, group_ladder
 from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSolution, Option, feature_options
 from tolalloc.allocation.program.problem import AllocationProblem, Shared, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks

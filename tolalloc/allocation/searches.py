@@ -15,7 +15,7 @@ from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
 from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
-from tolalloc.allocation.pareto.design_problem import large
+from tolalloc.allocation.pareto.problem import large
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement

@@ -1,23 +1,31 @@
-"""What the final orientations of an assembly do to the transmission: its error, the load on pins and teeth."""
+"""What the final orientations of an assembly do to the transmission, over the precision weight too."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from tolalloc.assembly.chain import DatumFlowChain
+from tolalloc.assembly.control import regulator
+from tolalloc.assembly.gains import assembled, tuned_gains
+from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.trajectory import foreseen, random_numbers
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.chunks import Mapper
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation, Observer
 from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
 from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.line_load import ContactPattern, contact_pattern, peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
@@ -136,6 +144,48 @@ TRANSMISSION = (
 
 
 @dataclass(frozen=True, kw_only=True)
+class TransmissionEffect:
+    """What the final angles do to the transmission, over the precision.
+
+    Parameters
+    ----------
+    reducer
+        The reducer that the parts belong to.
+    test_torque
+        Torque of the transmission error that is not said to be at rated torque [N·m].
+    precisions
+        Q [-].
+    outputs
+        Names of the outputs, units in them.
+    perfect
+        Outputs without any angular error [as the names say].
+    values
+        Outputs of the same assemblies at every precision; one assembly where the parts are measured
+        [as the names say].
+    good
+        Which assemblies have all outputs at every precision.
+    perfect_curves
+        One output turn without any angular error, at rated torque.
+    curves
+        One output turn of the first good assembly at every precision, at rated torque.
+    patterns
+        Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
+        which the line load is largest if nothing is turned.
+    """
+
+    reducer: Reducer
+    test_torque: float
+    precisions: Float[np.ndarray, " precision"]
+    outputs: tuple[str, ...]
+    perfect: Float[np.ndarray, " output"]
+    values: Float[np.ndarray, "precision sample output"]
+    good: Bool[np.ndarray, " sample"]
+    perfect_curves: TransmissionCurves
+    curves: TransmissionCurves
+    patterns: tuple[ContactPattern, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class OrientationResponse:
     """Transmission of a reducer over the final orientations of its parts; every other error is zero.
 
@@ -229,3 +279,94 @@ class OrientationResponse:
 
 def _disc_tilts(discs: int) -> tuple[str, ...]:
     return tuple(f"disc{disc + 1}.tilt" for disc in range(discs))
+
+
+def transmission_effect(
+    plan: AssemblyPlan,
+    errors: Float[np.ndarray, "part 3"] | None,
+    precisions: Float[np.ndarray, " precision"],
+    draws: int,
+    seeds: SeedTree,
+    observe: Observer,
+) -> TransmissionEffect:
+    """Return what the final angles do to the transmission.
+
+    Parameters
+    ----------
+    plan
+        The assembly; it names a reducer.
+    errors
+        Measured errors of the parts; unless given, parts are drawn from the plan's tolerances [rad].
+    precisions
+        Q [-].
+    draws
+        Assemblies drawn if no errors are given [-].
+    seeds
+        Node of the seed tree.
+    observe
+        Told the statuses of each chunk.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The reducer cannot be read, or does not have a column that the chain moves.
+    SolveError
+        The first assembly or too many others have no answer.
+    """
+    reducer = load_reducer(plan.reducer)
+    model, torque = EquivalentModel(reducer), reducer.load.test_torque
+    response = OrientationResponse(model=model, chain=plan.chain, torque=torque, observe=observe)
+    final = final_angles(plan, errors, precisions, draws, seeds)
+    perfect = response(np.zeros((1, final.shape[2])))
+    found = response(final.reshape(-1, final.shape[2]))
+    good = np.asarray(found.good.reshape(final.shape[:2]).all(axis=0))
+    if not (perfect.good.all() and good.any() and (~good).mean() <= LARGEST_FAILED_SHARE):
+        raise SolveError(
+            f"{plan.name}: {int((~good).sum())} of {good.size} assemblies have no equilibrium at some angle."
+        )
+    shown = response.errors(np.concatenate([np.zeros((1, final.shape[2])), final[:, np.argmax(good)]]))
+    rated = float(np.copysign(reducer.load.rated_torque, torque))
+    discs = [contact_pattern(model, shown[1], rated, disc + 1) for disc in range(reducer.disc_count)]
+    worst = max(discs, key=lambda pattern: float(pattern.line_load.max()))
+    return TransmissionEffect(
+        reducer=reducer,
+        test_torque=torque,
+        precisions=precisions,
+        outputs=response.outputs,
+        perfect=perfect.values[0],
+        values=found.values.reshape(*final.shape[:2], -1),
+        good=good,
+        perfect_curves=transmission_curves(model, shown[:1], rated),
+        curves=transmission_curves(model, shown[1:], rated),
+        patterns=tuple(contact_pattern(model, each, rated, worst.disc, worst.carrier_angle) for each in shown[1:]),
+    )
+
+
+def final_angles(
+    plan: AssemblyPlan,
+    errors: Float[np.ndarray, "part 3"] | None,
+    precisions: Float[np.ndarray, " precision"],
+    draws: int,
+    seeds: SeedTree,
+) -> Float[np.ndarray, "precision sample state"]:
+    """Return final angles of the measured parts, or of the same random assemblies at every precision [rad].
+
+    Parameters
+    ----------
+    plan, errors, precisions, draws, seeds
+        As in `transmission_effect`.
+    """
+    space = plan.space
+    if errors is not None:
+        own = errors.ravel()[np.newaxis]
+        weights = (plan.final_weight(float(precision)) for precision in precisions)
+        return np.array([foreseen(space, regulator(space, weight), own).adjusted[:, -1] for weight in weights])
+    standard = seeds.generator().standard_normal((draws, random_numbers(space)))
+    return np.array(
+        [
+            assembled(plan, tuned_gains(plan, float(precision), plan.tolerances), plan.tolerances, standard).adjusted[
+                :, -1
+            ]
+            for precision in precisions
+        ]
+    )

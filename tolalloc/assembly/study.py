@@ -15,10 +15,10 @@ from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, As
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.assembly.gains import expected_angles, tuned_gains
+from tolalloc.assembly.orientations import transmission_effect
 from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.assembly.transmission import transmission_effect
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, RunRecord

@@ -17,10 +17,9 @@ from tolalloc.capability.indices import (
     defects_per_million_opportunities,
 )
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, require_few_failures
-from tolalloc.capability.rare_failure.response_limit import ResponseLimit
-from tolalloc.capability.rare_failure.result import RareFailure
+from tolalloc.capability.rare_failure.importance import widened_sampling
+from tolalloc.capability.rare_failure.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened import widened_sampling
 from tolalloc.exceptions import InputError
 
 METHOD = "Monte Carlo"

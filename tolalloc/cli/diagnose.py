@@ -38,8 +38,7 @@ def diagnose(
     """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.bench.diagnosis.study import DiagnosisStudy, diagnose_unit
-    from tolalloc.drawings.correlation import Correlation
-    from tolalloc.drawings.correlation_file import load_correlations
+    from tolalloc.drawings.correlation import Correlation, load_correlations
     from tolalloc.drawings.error_model import ErrorModel
     from tolalloc.drawings.tolerance_table import load_tolerance_table
     from tolalloc.report.folder import require_usable

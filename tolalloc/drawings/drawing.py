@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tolalloc.drawings.correlation import Correlation
-from tolalloc.drawings.correlation_file import load_correlations
+from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import ToleranceRow
 from tolalloc.drawings.sources import Source

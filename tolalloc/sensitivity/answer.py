@@ -18,21 +18,21 @@ from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
-from tolalloc.sensitivity.classical import ClassicalEstimate, classical_estimate
 from tolalloc.sensitivity.derivatives import (
+    ClassicalEstimate,
     DerivativeMeasures,
     LocalDerivatives,
+    classical_estimate,
     derivative_measures,
     local_derivatives,
 )
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.measures import Measures
-from tolalloc.sensitivity.order_contribution import OrderContribution, order_contribution
 from tolalloc.sensitivity.ranking import Reproduction
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent, elementary_effects
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, SobolIndices, order_contribution
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
 from tolalloc.surrogate.choice import Choice

@@ -1,4 +1,4 @@
-"""Exact derivatives by source: at the nominal, over random units, and the bounds on total indices that they give."""
+"""Each error alone: at its limit, as a hand calculation adds it, and by derivatives, which bound total indices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
-from tolalloc.models import ResponseWithDerivatives
+from tolalloc.models import Response, ResponseWithDerivatives
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.units import MICROMETRE
@@ -199,3 +199,70 @@ def _zone_per_column(experiment: Experiment[ResponseWithDerivatives]) -> Float[n
     """Return the zone of every column's source [m]."""
     ones = np.ones((1, len(experiment.errors.columns)))
     return np.asarray((experiment.deviations(ones) - experiment.deviations(0.0 * ones))[0])
+
+
+DIRECTIONS = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClassicalEstimate:
+    """Single-error outputs and the two sums that assume they add up.
+
+    Parameters
+    ----------
+    sources
+        Names, in the order of ``alone``.
+    without
+        Output without any error, from modification and torque alone [output].
+    alone
+        Largest output of each source alone at the limit of its zone, over random phases, beyond ``without`` [output].
+    """
+
+    sources: tuple[str, ...]
+    without: float
+    alone: Float[np.ndarray, " source"]
+
+    @property
+    def worst_case(self) -> float:
+        """Sum of all single errors [output]."""
+        return self.without + float(self.alone.sum())
+
+    @property
+    def root_sum_square(self) -> float:
+        """Root of the sum of the squared single errors [output]."""
+        return self.without + float(np.sqrt((self.alone**2).sum()))
+
+
+def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
+    """Return worst case and root-sum-square from one error at a time.
+
+    Raises
+    ------
+    SolveError
+        A sample failed.
+
+    Notes
+    -----
+    Both sums assume that single errors add up, which contact switching denies; they stand beside Monte Carlo for
+    comparison with a hand calculation.
+    """
+    errors = experiment.errors
+    middle = experiment.deviations(np.zeros((1, len(errors.columns))))
+    x, start = [middle], 0
+    for source, zone in zip(errors.active, experiment.zones, strict=True):
+        own = slice(start, start + len(source.columns))
+        rows = np.repeat(middle, DIRECTIONS, axis=0)
+        uniform = next(experiment.seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
+        rows[:, own] += zone * source.at_limit(uniform)
+        x.append(rows)
+        start = own.stop
+    evaluation = experiment.response(np.concatenate(x))
+    if not evaluation.good.all():
+        raise SolveError(f"Classical estimate: {np.count_nonzero(~evaluation.good)} single-error units failed.")
+    values = evaluation.values[:, 0]
+    without = float(values[0])
+    return ClassicalEstimate(
+        sources=tuple(source.name for source in errors.active),
+        without=without,
+        alone=np.maximum(values[1:].reshape(len(errors.active), DIRECTIONS).max(axis=1) - without, 0.0),
+    )

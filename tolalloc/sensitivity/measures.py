@@ -13,7 +13,7 @@ from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.capability.one_sided import OneSided
-from tolalloc.capability.rare_failure.response_limit import ResponseLimit
+from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.differences import DifferencedResponse
 from tolalloc.drawings.error_model import ErrorModel

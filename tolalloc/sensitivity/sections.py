@@ -6,7 +6,7 @@ import pandas as pd
 
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.report.document import Section
-from tolalloc.sensitivity import driver_tables, figures, limit_tables, trust_tables
+from tolalloc.sensitivity import driver_tables, figures, limit_tables
 from tolalloc.sensitivity.answer import RankingAnswer
 
 
@@ -110,18 +110,18 @@ def trust_sections(answer: RankingAnswer) -> tuple[Section, ...]:
                 f"An index of PAWN below {answer.moments.pawn_dummy:.3f} or of delta below "
                 f"{answer.moments.delta_dummy:.3f} means nothing: an input that does nothing reaches as much.",
             ),
-            tables=(("measures", trust_tables.measures_table(answer)),),
+            tables=(("measures", limit_tables.measures_table(answer)),),
         ),
         Section(
             heading="Stand-ins for the model",
             paragraphs=(answer.choice.reason,),
-            tables=(("surrogates", trust_tables.surrogate_table(answer)),),
+            tables=(("surrogates", limit_tables.surrogate_table(answer)),),
         ),
         Section(
             heading="From zone to distribution",
             tables=(
-                ("mapping", trust_tables.mapping_table(answer)),
-                *trust_tables.measured_tables(answer),
+                ("mapping", limit_tables.mapping_table(answer)),
+                *limit_tables.measured_tables(answer),
                 ("tolerances", table_frame(answer.errors.sources)),
             ),
         ),
@@ -130,6 +130,6 @@ def trust_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             paragraphs=(
                 ", ".join(f"{count} units: {outcome}" for outcome, count in answer.header.statuses.items() if count),
             ),
-            tables=(("work", trust_tables.work_table(answer)),),
+            tables=(("work", limit_tables.work_table(answer)),),
         ),
     )

@@ -3,7 +3,7 @@
 SALib's traps and the guards against them: seed 0 means unseeded, so seeds are positive; one NaN makes every index zero
 and ``conf`` is a multiple of a standard deviation, so `tolalloc.sensitivity.saltelli` estimates, drops blocks with a
 failed sample whole, counts them, and keeps the resamples, from which intervals are percentiles; the design is held
-whole, so `tolalloc.sensitivity.saltelli_design` gives the same samples in chunks.
+whole, so `tolalloc.sensitivity.saltelli` gives the same samples in chunks.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.growth import Resampled, grow_until_stable
-from tolalloc.sensitivity.saltelli import SaltelliIndices, saltelli_indices
-from tolalloc.sensitivity.saltelli_design import SaltelliDesign
+from tolalloc.sensitivity.ranking import Resampled, grow_until_stable
+from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, overall_ranking
 
 _HALF_STEP = 2.0**-31

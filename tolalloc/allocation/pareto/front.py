@@ -10,9 +10,8 @@ from jaxtyping import Float
 from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
-from tolalloc.allocation.pareto.design_problem import Criterion, DesignProblem, Ladders
-from tolalloc.allocation.pareto.found import SearchedDesigns
-from tolalloc.allocation.pareto.indicators import knee, spread_over
+from tolalloc.allocation.pareto.found import SearchedDesigns, knee, spread_over
+from tolalloc.allocation.pareto.problem import Criterion, DesignProblem, Ladders
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError

@@ -20,8 +20,7 @@ from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedAnswers
-from tolalloc.allocation.pareto.found import SearchedDesigns
-from tolalloc.allocation.pareto.indicators import spread_over
+from tolalloc.allocation.pareto.found import SearchedDesigns, spread_over
 from tolalloc.allocation.pareto.problem import Genes, Objectives, ParetoProblem
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError

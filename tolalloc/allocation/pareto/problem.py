@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from tolalloc.exceptions import InputError
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.local_model import Side
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models import Response
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,3 +131,131 @@ class ParetoProblem(Protocol):
     def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
         """Return the objectives of every design."""
         ...
+
+
+COST = Objective(name="cost [cost units]")
+
+Ladders = Mapping[str, Float[np.ndarray, " position"]]
+"""Group → the scales that it may have, rising [-]."""
+
+
+def to_genes(designs: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
+    """Return designs with the logarithms of their scales, of which there are as many as groups."""
+    return np.concatenate([np.log(designs[..., :groups]), designs[..., groups:]], axis=-1)
+
+
+def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
+    """Return the designs whose scales have these logarithms."""
+    return np.concatenate([np.exp(genes[..., :groups]), genes[..., groups:]], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """A further objective.
+
+    Parameters
+    ----------
+    objective
+        What is made small or large.
+    value
+        Its values at designs, NaN where it failed.
+    """
+
+    objective: Objective
+    value: Callable[[Float[np.ndarray, "design variable"]], Float[np.ndarray, " design"]]
+
+
+def large(setting: str, column: int) -> Criterion:
+    """Return the criterion that a setting, whose value stands in a column of the designs, shall be large."""
+    return Criterion(objective=Objective(name=setting, better="large"), value=lambda designs: designs[:, column])
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignProblem:
+    """Cost against the quantile of the leading output, and whatever else is asked for.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    quantile
+        Quantile of designs: the real kernel or what stands in for it.
+    ladders
+        Group → the scales that it may have, rising; other groups have every scale within their bounds [-].
+    further
+        Further objectives.
+    sides
+        Limited sides of other requirements, kept by their local models.
+
+    Raises
+    ------
+    InputError
+        A ladder that does not rise or leaves the bounds of its group.
+    UnknownNameError
+        A ladder of no group.
+    """
+
+    space: DesignSpace
+    quantile: Response
+    ladders: Ladders = field(default_factory=dict)
+    further: tuple[Criterion, ...] = ()
+    sides: tuple[Side, ...] = ()
+
+    def __post_init__(self) -> None:
+        for group, ladder in self.ladders.items():
+            if group not in self.space.groups:
+                raise UnknownNameError.among("ladders", "group", group, self.space.groups)
+            at = self.space.groups.index(group)
+            lower, upper = float(self.space.lower[at]), float(self.space.upper[at])
+            if not (ladder.size and lower <= ladder[0] and ladder[-1] <= upper and np.all(np.diff(ladder) > 0)):
+                raise InputError.at(
+                    f"ladder of {group}", "scales", ladder.tolist(), f"rising numbers from {lower:.4g} to {upper:.4g}"
+                )
+
+    @cached_property
+    def objectives(self) -> tuple[Objective, ...]:
+        """What is traded off."""
+        return (COST, Objective(name=self.quantile.outputs[0]), *(criterion.objective for criterion in self.further))
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of the other limits."""
+        return tuple(side.stack.name for side in self.sides)
+
+    @cached_property
+    def genes(self) -> Genes:
+        """Logarithms of scales or positions on ladders, and the settings."""
+        groups = len(self.space.groups)
+        lower, upper = to_genes(self.space.lower, groups), to_genes(self.space.upper, groups)
+        names, integer = list(self.space.columns), np.zeros(lower.size, bool)
+        for at, ladder in self._ladders:
+            names[at] = f"position of {names[at]} on {ladder.tolist()}"
+            integer[at], lower[at], upper[at] = True, 0.0, ladder.size - 1.0
+        return Genes(names=tuple(names), lower=lower, upper=upper, integer=integer)
+
+    @property
+    def _ladders(self) -> list[tuple[int, Float[np.ndarray, " position"]]]:
+        return [(self.space.groups.index(group), ladder) for group, ladder in self.ladders.items()]
+
+    def genes_of(self, designs: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, "design gene"]:
+        """Return the genes of designs; on a ladder the nearest step counts."""
+        genes = to_genes(designs, len(self.space.groups))
+        for at, ladder in self._ladders:
+            genes[:, at] = np.abs(genes[:, at, np.newaxis] - np.log(ladder)).argmin(axis=1)
+        return self.genes.rounded(genes)
+
+    def designs_of(self, genes: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design variable"]:
+        """Return the designs that have these genes."""
+        genes = genes.copy()
+        for at, ladder in self._ladders:
+            genes[:, at] = np.log(ladder)[genes[:, at].astype(int)]
+        return from_genes(genes, len(self.space.groups))
+
+    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
+        """Return the objectives of every design."""
+        designs = self.designs_of(designs)
+        evaluation = self.quantile(designs)
+        others = [criterion.value(designs) for criterion in self.further]
+        values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *others])
+        violation = np.array([side.predicted(designs) / side.scale for side in self.sides]).T
+        return Objectives(values=values, violation=violation.reshape(len(designs), -1), status=evaluation.status)

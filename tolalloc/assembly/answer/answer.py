@@ -7,19 +7,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from tolalloc.assembly.angular.allocation import AngularAllocation, AngularVerification
 from tolalloc.assembly.angular.tuning import PrecisionCost, RetunedAllocation
 from tolalloc.assembly.gains import Gains
-from tolalloc.assembly.orientations import TransmissionCurves
+from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import PrecisionSweep
 from tolalloc.assembly.trajectory import Trajectory
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section
-from tolalloc.rv.equivalent.line_load import ContactPattern
-from tolalloc.rv.reducer.design import Reducer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,48 +60,6 @@ class AdjustedParts:
     def adjusted(self) -> Float[np.ndarray, "part 3"]:
         """Final state [rad]."""
         return np.asarray(self.sequence.adjusted[-1].reshape(-1, 3))
-
-
-@dataclass(frozen=True, kw_only=True)
-class TransmissionEffect:
-    """What the final angles do to the transmission, over the precision.
-
-    Parameters
-    ----------
-    reducer
-        The reducer that the parts belong to.
-    test_torque
-        Torque of the transmission error that is not said to be at rated torque [N·m].
-    precisions
-        Q [-].
-    outputs
-        Names of the outputs, units in them.
-    perfect
-        Outputs without any angular error [as the names say].
-    values
-        Outputs of the same assemblies at every precision; one assembly where the parts are measured
-        [as the names say].
-    good
-        Which assemblies have all outputs at every precision.
-    perfect_curves
-        One output turn without any angular error, at rated torque.
-    curves
-        One output turn of the first good assembly at every precision, at rated torque.
-    patterns
-        Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
-        which the line load is largest if nothing is turned.
-    """
-
-    reducer: Reducer
-    test_torque: float
-    precisions: Float[np.ndarray, " precision"]
-    outputs: tuple[str, ...]
-    perfect: Float[np.ndarray, " output"]
-    values: Float[np.ndarray, "precision sample output"]
-    good: Bool[np.ndarray, " sample"]
-    perfect_curves: TransmissionCurves
-    curves: TransmissionCurves
-    patterns: tuple[ContactPattern, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,7 +164,7 @@ class AssemblyAnswer(Answer):
     @cached_property
     def characteristics(self) -> pd.DataFrame:
         """Tilt and rotation of every characteristic before and after adjusting."""
-        from tolalloc.assembly.answer.characteristics import characteristic_table
+        from tolalloc.assembly.answer.tables import characteristic_table
 
         return characteristic_table(self)
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
-from tolalloc.assembly.answer.characteristics import MISSED, has_limits, larger
-from tolalloc.assembly.answer.tables import at_precision
+from tolalloc.assembly.answer.tables import MISSED, at_precision, has_limits, larger
 from tolalloc.assembly.answer.tolerance_tables import is_retuned, limited_tolerances
 from tolalloc.assembly.answer.transmission import risen
 from tolalloc.units import ARCSECOND

@@ -10,8 +10,7 @@ import pandas as pd
 from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem
 from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer
-from tolalloc.assembly.answer.characteristics import has_limits
-from tolalloc.assembly.answer.tables import rounded
+from tolalloc.assembly.answer.tables import has_limits, rounded
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.units import ARCSECOND
 

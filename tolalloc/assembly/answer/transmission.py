@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.answer import TransmissionEffect
 from tolalloc.assembly.answer.tables import rounded
+from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE

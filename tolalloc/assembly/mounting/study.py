@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tolalloc.assembly.mounting.answer import MountingAnswer
-from tolalloc.assembly.mounting.parts import load_parts
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
-from tolalloc.assembly.mounting.stock import PartStock
+from tolalloc.assembly.mounting.stock import PartStock, load_parts
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, RunRecord

@@ -23,7 +23,7 @@ from tolalloc.report.document import Section
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import write_identified_stiffness
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.surrogate.polynomial import BoxPolynomial
+from tolalloc.surrogate.regression import BoxPolynomial
 from tolalloc.units import ARCSECOND
 
 

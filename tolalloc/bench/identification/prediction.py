@@ -25,7 +25,7 @@ from tolalloc.rv.equivalent.answers import Derivatives
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
-from tolalloc.surrogate.polynomial import BoxPolynomial, fit_box_polynomial
+from tolalloc.surrogate.regression import BoxPolynomial, fit_box_polynomial
 from tolalloc.units import ARCSECOND
 
 _SAMPLES_AT_ONCE = 16

@@ -1,14 +1,16 @@
-"""What a limit state is: values of many points of standard normal space, negative where the product fails."""
+"""What a rare failure is: values of points of standard normal space, negative where the product fails; its estimate."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import SolveError
+from tolalloc.models import Response, ResponseWithDerivatives
 
 _CALLS_TO_JUDGE = 100
 """Below so many calls one failed sample would already exceed the allowed share."""
@@ -121,3 +123,163 @@ class CountedLimitState:
     def cautions(self) -> tuple[str, ...]:
         """What a reader must know about the failed samples; empty if there were none."""
         return (f"{self.failed} of {self.calls} samples have no usable answer and count as safe",) * bool(self.failed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """One level of a subset simulation.
+
+    Parameters
+    ----------
+    run
+        Which of the independent runs, from 0 [-].
+    threshold
+        Value of the limit state that bounds the next level, 0 at the last one [unit of the limited output].
+    share
+        Share of this level's samples beyond the threshold [-].
+    correlation
+        Factor γ by which correlated chains raise the variance of the share to (1 + γ) times [-].
+    accepted
+        Share of accepted chain steps, 1 at the first level, which has no chains [-].
+    coefficient_of_variation
+        Of the share [-].
+    """
+
+    run: int
+    threshold: float
+    share: float
+    correlation: float
+    accepted: float
+    coefficient_of_variation: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RareFailure:
+    """Probability of failure with its standard error and what it took.
+
+    Parameters
+    ----------
+    probability
+        Estimate [-].
+    standard_error
+        Of the estimate; infinite if no sample failed, because then nothing is known about the spread [-].
+    calls, failed
+        Calls of the limit state, and how many of them gave no usable answer [-].
+    method
+        Name of the method.
+    cautions
+        Reasons not to rely on the estimate; empty if the method sees none.
+    effective_samples
+        Number of equally weighted failures that would know as much; 0 if no sample failed [-].
+    missed_share
+        Share of the probability that lies where no design point explains it; 0 for subset simulation [-].
+    levels
+        Levels of a subset simulation, run by run; empty for other methods.
+    failing
+        Failing states of every run of a subset simulation, not independent of each other; empty for other methods [-].
+    """
+
+    probability: float
+    standard_error: float
+    calls: int
+    failed: int
+    method: str
+    cautions: tuple[str, ...]
+    effective_samples: float
+    missed_share: float = 0.0
+    levels: tuple[Level, ...] = ()
+    failing: tuple[Float[np.ndarray, "_state variable"], ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def coefficient_of_variation(self) -> float:
+        """Standard error over probability, infinite for a probability of zero [-]."""
+        return self.standard_error / self.probability if self.probability > 0 else float("inf")
+
+    def difference_from(self, other: RareFailure) -> float:
+        """Return the difference from an independent estimate in standard errors of that difference [-].
+
+        Notes
+        -----
+        Beyond 3 the two methods contradict each other, and one of them has missed something. An estimate without a
+        failure contradicts nothing, so the difference from it is 0.
+        """
+        error = float(np.hypot(self.standard_error, other.standard_error))
+        return (self.probability - other.probability) / error
+
+    @property
+    def trustworthy(self) -> bool:
+        """Whether the method sees no reason against its own estimate."""
+        return not self.cautions
+
+    @property
+    def status(self) -> str:
+        """One sentence for a person."""
+        text = (
+            f"{self.method}: probability {self.probability:.3g} with standard error {self.standard_error:.2g} "
+            f"from {self.calls} calls"
+        )
+        return f"{text}; do not rely on it: {'; '.join(self.cautions)}." if self.cautions else f"{text}."
+
+
+_STEP = 1e-3
+"""Step of the differences in standard normal space; up to 6, rounding and curvature both cost less than 1e-4 [-]."""
+
+
+@runtime_checkable
+class DifferentiableResponse(Response, ResponseWithDerivatives, Protocol):
+    """A response that answers with its derivatives or without."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseLimit:
+    """Distance of a response's first output from its upper limit, negative where a unit exceeds it.
+
+    Parameters
+    ----------
+    experiment
+        Every column of its sources has a standard normal variable of its own, whatever its distribution.
+    limit
+        Largest output allowed [output].
+    """
+
+    experiment: Experiment[Response]
+    limit: float
+
+    @property
+    def variables(self) -> int:
+        """Number of columns."""
+        return len(self.experiment.errors.columns)
+
+    def deviations(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
+        """Return the deviations that are as probable as the standard normal numbers [m, angles rad]."""
+        return self.experiment.errors.deviations_of_normal(u, self.experiment.zones)
+
+    def __call__(self, u: Float[np.ndarray, "sample variable"]) -> LimitValues:
+        """Return the distance of every sample from the limit [output]."""
+        evaluation = self.experiment.response(self.deviations(u))
+        # Another output of a sample may have failed, and then the sample is lost as a whole.
+        values = np.where(evaluation.good, self.limit - evaluation.values[:, 0], np.nan)
+        return LimitValues(values=values, status=evaluation.status)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseLimitWithGradient(ResponseLimit):
+    """The same limit on a response that knows its derivatives."""
+
+    experiment: Experiment[DifferentiableResponse]
+
+    def gradient(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
+        """Return the derivatives of every distance by the standard normal numbers, NaN where a sample failed [output].
+
+        Notes
+        -----
+        The chain rule takes all deviations by all numbers, because those of one source, or of sources that depend on
+        each other, mix: central differences of the distributions, exact derivatives of the response.
+        """
+        answer = self.experiment.response.with_derivatives(self.deviations(u))
+        by_column = np.where(answer.evaluation.good[:, np.newaxis], answer.by_column, np.nan)
+        gradient = np.empty_like(u)
+        for variable, shift in enumerate(_STEP * np.eye(self.variables)):
+            by_number = (self.deviations(u + shift) - self.deviations(u - shift)) / (2 * _STEP)
+            gradient[:, variable] = -np.sum(by_column * by_number, axis=1)
+        return gradient

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
-from tolalloc.capability.rare_failure.result import Level, RareFailure
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState, Level, LimitState, RareFailure
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
