@@ -104,21 +104,14 @@ number of a radius, a grade would be one of a feature half as large."""
 class Ladder:
     """Increasing zones with the grade or the series of each.
 
-    Parameters
-    ----------
-    zones
-        The zones, tightest first [m].
-    labels
-        Where each comes from: a grade, or the series of preferred numbers.
-
     Raises
     ------
     InputError
         No zones, or zones that are not finite, above 0 and increasing.
     """
 
-    zones: Float[np.ndarray, " step"]
-    labels: tuple[str, ...]
+    zones: Float[np.ndarray, " step"]  # The zones, tightest first [m]
+    labels: tuple[str, ...]  # Where each comes from: a grade, or the series of preferred numbers
 
     def __post_init__(self) -> None:
         zones = self.zones

@@ -14,42 +14,22 @@ from tolalloc.exceptions import InputError, UnknownNameError
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One part, known by its key characteristic: the axis that it brings into the assembly.
+    """One part, known by its key characteristic: the axis that it brings into the assembly."""
 
-    Parameters
-    ----------
-    name
-        Name of the key characteristic.
-    on
-        Name of the part that it is mounted on, or of the chain's datum.
-    turned
-        Rotation vector from the datum's axes to the part's own axes, nominal [rad].
-    position
-        Where its axis stands, in the datum's axes, nominal [m].
-    tilts
-        Error columns of the equivalent model, without ``.x`` and ``.y``, that its tilt against the datum moves.
-    rotates
-        Error columns of the equivalent model that its rotation about the datum's axis moves.
-    """
-
-    name: str
-    on: str
+    name: str  # Name of the key characteristic
+    on: str  # Name of the part that it is mounted on, or of the chain's datum
+    # Rotation vector from the datum's axes to the part's own axes, nominal [rad]
     turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)  # Where its axis stands, in the datum's axes, nominal [m]
+    # Error columns of the equivalent model, without ``.x`` and ``.y``, that its tilt against the datum moves
     tilts: tuple[str, ...] = field(default=())
+    # Error columns of the equivalent model that its rotation about the datum's axis moves
     rotates: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True, kw_only=True)
 class DatumFlowChain:
     """Parts in the order in which they are mounted, a chain or a tree from one datum.
-
-    Parameters
-    ----------
-    datum
-        Name of the characteristic that all others are measured against.
-    parts
-        The parts in the order of assembly.
 
     Raises
     ------
@@ -60,8 +40,8 @@ class DatumFlowChain:
         A part on something that is neither a part nor the datum.
     """
 
-    datum: str
-    parts: tuple[Part, ...]
+    datum: str  # Name of the characteristic that all others are measured against
+    parts: tuple[Part, ...]  # The parts in the order of assembly
 
     def __post_init__(self) -> None:
         names = [self.datum, *self.names]

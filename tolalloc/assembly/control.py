@@ -17,18 +17,12 @@ _NOTHING_NEW = 1e-13
 
 @dataclass(frozen=True, kw_only=True)
 class Regulator:
-    """What to turn at every step: u(k) = −K(k) ẑ(k).
+    """What to turn at every step: u(k) = −K(k) ẑ(k)."""
 
-    Parameters
-    ----------
-    gains
-        K(k): adjustment of every part in its own axes per state before the adjustment [rad/rad].
-    cost_to_go
-        P(k): weight of the state before step k's adjustment in the least cost from there on; the last one is the weight
-        of the final errors [-].
-    """
-
+    # K(k): adjustment of every part in its own axes per state before the adjustment [rad/rad]
     gains: Float[np.ndarray, "step adjustment state"]
+    # P(k): weight of the state before step k's adjustment in the least cost from there on; the last one is the weight
+    # of the final errors [-]
     cost_to_go: Float[np.ndarray, "time state state"]
 
 
@@ -78,17 +72,11 @@ def limiting_regulator(space: StateSpace, final_weight: Float[np.ndarray, "state
 
 @dataclass(frozen=True, kw_only=True)
 class KalmanFilter:
-    """How far every reading moves the estimate of the state.
+    """How far every reading moves the estimate of the state."""
 
-    Parameters
-    ----------
-    gains
-        L(k): change of the estimated state per deviation of a reading from what was expected [rad/rad].
-    covariance
-        Covariance of state less estimate after every step, adjustment included [rad²].
-    """
-
+    # L(k): change of the estimated state per deviation of a reading from what was expected [rad/rad]
     gains: tuple[Float[np.ndarray, "state _reading"], ...]
+    # Covariance of state less estimate after every step, adjustment included [rad²]
     covariance: Float[np.ndarray, "step state state"]
 
 

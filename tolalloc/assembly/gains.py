@@ -18,28 +18,19 @@ from tolalloc.exceptions import InputError
 class FinalErrors:
     """Final state and adjustments as linear maps of everything random.
 
-    Parameters
-    ----------
-    by_part
-        Final state per part error [rad/rad].
-    by_noise
-        Final state per standard deviation of every reading, then of every adjustment of every step [rad].
-    adjustments_by_part, adjustments_by_noise
-        Adjustments of all steps in the same way [rad/rad, rad].
-    effort
-        Diagonal of R(k) [-].
-
     Notes
     -----
     Part errors and noise are independent of each other, so covariance and expected effort are affine in the part
     variances as long as the gains stay as they are.
     """
 
-    by_part: Float[np.ndarray, "state error"]
+    by_part: Float[np.ndarray, "state error"]  # Final state per part error [rad/rad]
+    # Final state per standard deviation of every reading, then of every adjustment of every step [rad]
     by_noise: Float[np.ndarray, "state noise"]
+    # Adjustments of all steps in the same way [rad/rad, rad]
     adjustments_by_part: Float[np.ndarray, "step adjustment error"]
     adjustments_by_noise: Float[np.ndarray, "step adjustment noise"]
-    effort: Float[np.ndarray, "step adjustment"]
+    effort: Float[np.ndarray, "step adjustment"]  # Diagonal of R(k) [-]
 
     def covariance(self, variances: Float[np.ndarray, " error"]) -> Float[np.ndarray, "state state"]:
         """Return the covariance of the final state for variances of every part error [rad²]."""
@@ -85,27 +76,13 @@ def final_errors(
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """Gains of regulator and filter, fixed while tolerances are allocated.
+    """Gains of regulator and filter, fixed while tolerances are allocated."""
 
-    Parameters
-    ----------
-    precision
-        Q, weight of the final errors against the effort [-].
-    regulator
-        The adjustments.
-    kalman
-        The estimator.
-    adjustment_noise
-        Standard deviation of what an adjustment misses; 0 where nothing is turned [rad].
-    errors
-        What parts and noise leave with these gains.
-    """
-
-    precision: float
-    regulator: Regulator
-    kalman: KalmanFilter
-    adjustment_noise: float
-    errors: FinalErrors
+    precision: float  # Q, weight of the final errors against the effort [-]
+    regulator: Regulator  # The adjustments
+    kalman: KalmanFilter  # The estimator
+    adjustment_noise: float  # Standard deviation of what an adjustment misses; 0 where nothing is turned [rad]
+    errors: FinalErrors  # What parts and noise leave with these gains
 
 
 def tuned_gains(plan: AssemblyPlan, precision: float, tolerances: Float[np.ndarray, "part 3"]) -> Gains:

@@ -36,36 +36,16 @@ _AT_ONCE = 64
 
 @dataclass(frozen=True, kw_only=True)
 class TransmissionCurves:
-    """Transmission of samples over one output turn at one torque.
+    """Transmission of samples over one output turn at one torque."""
 
-    Parameters
-    ----------
-    carrier_angle
-        θc [rad].
-    transmission_error
-        Carrier rotation beyond θc, output side [rad].
-    pin_force
-        Largest force between a pin and a tooth [N].
-    disc_force
-        Largest sum of the pin forces of one disc [N].
-    line_load
-        Largest line load of pins and teeth [N/m].
-    pressure
-        Largest Hertz pressure of pins and teeth [Pa].
-    pins_in_contact
-        Pins that carry load, all discs [-].
-    status
-        Values of `tolalloc.rv.equivalent.answers.Status` [-].
-    """
-
-    carrier_angle: Float[np.ndarray, " angle"]
-    transmission_error: Float[np.ndarray, "sample angle"]
-    pin_force: Float[np.ndarray, "sample angle"]
-    disc_force: Float[np.ndarray, "sample angle"]
-    line_load: Float[np.ndarray, "sample angle"]
-    pressure: Float[np.ndarray, "sample angle"]
-    pins_in_contact: Float[np.ndarray, "sample angle"]
-    status: UInt8[np.ndarray, "sample angle"]
+    carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
+    transmission_error: Float[np.ndarray, "sample angle"]  # Carrier rotation beyond θc, output side [rad]
+    pin_force: Float[np.ndarray, "sample angle"]  # Largest force between a pin and a tooth [N]
+    disc_force: Float[np.ndarray, "sample angle"]  # Largest sum of the pin forces of one disc [N]
+    line_load: Float[np.ndarray, "sample angle"]  # Largest line load of pins and teeth [N/m]
+    pressure: Float[np.ndarray, "sample angle"]  # Largest Hertz pressure of pins and teeth [Pa]
+    pins_in_contact: Float[np.ndarray, "sample angle"]  # Pins that carry load, all discs [-]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.rv.equivalent.answers.Status` [-]
 
 
 def transmission_curves(
@@ -145,43 +125,20 @@ TRANSMISSION = (
 
 @dataclass(frozen=True, kw_only=True)
 class TransmissionEffect:
-    """What the final angles do to the transmission, over the precision.
+    """What the final angles do to the transmission, over the precision."""
 
-    Parameters
-    ----------
-    reducer
-        The reducer that the parts belong to.
-    test_torque
-        Torque of the transmission error that is not said to be at rated torque [N·m].
-    precisions
-        Q [-].
-    outputs
-        Names of the outputs, units in them.
-    perfect
-        Outputs without any angular error [as the names say].
-    values
-        Outputs of the same assemblies at every precision; one assembly where the parts are measured
-        [as the names say].
-    good
-        Which assemblies have all outputs at every precision.
-    perfect_curves
-        One output turn without any angular error, at rated torque.
-    curves
-        One output turn of the first good assembly at every precision, at rated torque.
-    patterns
-        Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
-        which the line load is largest if nothing is turned.
-    """
-
-    reducer: Reducer
-    test_torque: float
-    precisions: Float[np.ndarray, " precision"]
-    outputs: tuple[str, ...]
-    perfect: Float[np.ndarray, " output"]
+    reducer: Reducer  # The reducer that the parts belong to
+    test_torque: float  # Torque of the transmission error that is not said to be at rated torque [N·m]
+    precisions: Float[np.ndarray, " precision"]  # Q [-]
+    outputs: tuple[str, ...]  # Names of the outputs, units in them
+    perfect: Float[np.ndarray, " output"]  # Outputs without any angular error [as the names say]
+    # Outputs of the same assemblies at every precision; one assembly where the parts are measured [as the names say]
     values: Float[np.ndarray, "precision sample output"]
-    good: Bool[np.ndarray, " sample"]
-    perfect_curves: TransmissionCurves
-    curves: TransmissionCurves
+    good: Bool[np.ndarray, " sample"]  # Which assemblies have all outputs at every precision
+    perfect_curves: TransmissionCurves  # One output turn without any angular error, at rated torque
+    curves: TransmissionCurves  # One output turn of the first good assembly at every precision, at rated torque
+    # Load of one of its discs on the pins at every precision, at rated torque: disc and carrier angle are those at
+    # which the line load is largest if nothing is turned
     patterns: tuple[ContactPattern, ...]
 
 
@@ -189,33 +146,18 @@ class TransmissionEffect:
 class OrientationResponse:
     """Transmission of a reducer over the final orientations of its parts; every other error is zero.
 
-    Parameters
-    ----------
-    model
-        The reducer.
-    chain
-        Its parts, and which columns of the model their orientations move.
-    torque
-        Test torque on the carrier; negative resists the rotation [N·m].
-    observe
-        Told the statuses of each chunk.
-    mapper
-        What solves the chunks, `tolalloc.chunks.map_chunks`.
-    readings
-        What is read.
-
     Raises
     ------
     InputError
         The chain moves a column that the model does not have, or none at all.
     """
 
-    model: EquivalentModel
-    chain: DatumFlowChain
-    torque: float
-    observe: Observer = KernelResponse.observe
-    mapper: Mapper = map
-    readings: tuple[Reading, ...] = TRANSMISSION
+    model: EquivalentModel  # The reducer
+    chain: DatumFlowChain  # Its parts, and which columns of the model their orientations move
+    torque: float  # Test torque on the carrier; negative resists the rotation [N·m]
+    observe: Observer = KernelResponse.observe  # Told the statuses of each chunk
+    mapper: Mapper = map  # What solves the chunks, `tolalloc.chunks.map_chunks`
+    readings: tuple[Reading, ...] = TRANSMISSION  # What is read
 
     def __post_init__(self) -> None:
         reducer, law = self.model.reducer, self.model.reducer.stiffness.pin_contact_law

@@ -17,79 +17,40 @@ LARGEST_PRECISION = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class AngularRequirements:
-    """What the final angles must keep, and what the angular tolerances of the parts cost.
+    """What the final angles must keep, and what the angular tolerances of the parts cost."""
 
-    Parameters
-    ----------
-    tilt_limit
-        Limit of three standard deviations of every part's tilt, x and y together; infinite where there is none [rad].
-    rotation_limit
-        The same of its rotation about the datum's axis [rad].
-    smallest, largest
-        Bounds of every tolerance [rad].
-    form
-        Cost of a tolerance t: ``reciprocal`` is fixed + factor/t, ``exponential`` fixed + factor·exp(−t/scale).
-    factor
-        Of every part's three tolerances [cost units·rad, or cost units].
-    fixed
-        The same [cost units].
-    scale
-        The same, of the exponential form [rad].
-    effort_price
-        Cost of one unit of effort times angle² [cost units/rad²].
-    """
-
+    # Limit of three standard deviations of every part's tilt, x and y together; infinite where there is none [rad]
     tilt_limit: Float[np.ndarray, " part"]
-    rotation_limit: Float[np.ndarray, " part"]
+    rotation_limit: Float[np.ndarray, " part"]  # The same of its rotation about the datum's axis [rad]
+    # Bounds of every tolerance [rad]
     smallest: float
     largest: float
-    form: str
-    factor: Float[np.ndarray, "part 3"]
-    fixed: Float[np.ndarray, "part 3"]
-    scale: Float[np.ndarray, "part 3"]
-    effort_price: float = 0.0
+    form: str  # Cost of a tolerance t: ``reciprocal`` is fixed + factor/t, ``exponential`` fixed + factor·exp(−t/scale)
+    factor: Float[np.ndarray, "part 3"]  # Of every part's three tolerances [cost units·rad, or cost units]
+    fixed: Float[np.ndarray, "part 3"]  # The same [cost units]
+    scale: Float[np.ndarray, "part 3"]  # The same, of the exponential form [rad]
+    effort_price: float = 0.0  # Cost of one unit of effort times angle² [cost units/rad²]
 
 
 @dataclass(frozen=True, kw_only=True)
 class AssemblyPlan:
-    """Chain, steps and weights of one assembly.
+    """Chain, steps and weights of one assembly."""
 
-    Parameters
-    ----------
-    name, source
-        What it is, and who describes it.
-    chain
-        The parts.
-    steps
-        The steps.
-    tolerances
-        Angular tolerance of every part about its own axes, ±, three standard deviations [rad].
-    precision
-        Q, weight of the final errors against the effort [-].
-    weights
-        Further weight of every part's final errors [-].
-    measurement_noise, adjustment_noise
-        Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad].
-    requirements
-        Limits and costs, if any are stated.
-    reducer
-        Preset or file of the reducer that the parts' errors act on; empty if there is none.
-    assumptions
-        What no source prints.
-    """
-
+    # What it is, and who describes it
     name: str
     source: str
-    chain: DatumFlowChain
-    steps: tuple[AssemblyStep, ...]
+    chain: DatumFlowChain  # The parts
+    steps: tuple[AssemblyStep, ...]  # The steps
+    # Angular tolerance of every part about its own axes, ±, three standard deviations [rad]
     tolerances: Float[np.ndarray, "part 3"]
-    precision: float
-    weights: Float[np.ndarray, " part"]
+    precision: float  # Q, weight of the final errors against the effort [-]
+    weights: Float[np.ndarray, " part"]  # Further weight of every part's final errors [-]
+    # Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad]
     measurement_noise: float
     adjustment_noise: float
-    requirements: AngularRequirements | None = None
-    reducer: str = ""
-    assumptions: tuple[str, ...] = ()
+    requirements: AngularRequirements | None = None  # Limits and costs, if any are stated
+    reducer: str = ""  # Preset or file of the reducer that the parts' errors act on; empty if there is none
+    assumptions: tuple[str, ...] = ()  # What no source prints
 
     @cached_property
     def space(self) -> StateSpace:

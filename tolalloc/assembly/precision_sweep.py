@@ -15,33 +15,15 @@ from tolalloc.assembly.trajectory import foreseen
 
 @dataclass(frozen=True, kw_only=True)
 class PrecisionSweep:
-    """Final errors and effort over the precision weight.
+    """Final errors and effort over the precision weight."""
 
-    Parameters
-    ----------
-    precisions
-        Q [-].
-    total
-        Root of the sum of the variances of all final angles [rad].
-    tilt
-        Standard deviation of every part's final tilt, x and y together [rad].
-    rotation
-        The same of its rotation about the datum's axis [rad].
-    effort
-        Expected Σ uᵀRu [rad²].
-    next_unit
-        Share of the total that another unit of Q takes off [-].
-    noise_floor
-        Total that is left however large Q is [rad].
-    """
-
-    precisions: Float[np.ndarray, " precision"]
-    total: Float[np.ndarray, " precision"]
-    tilt: Float[np.ndarray, "precision part"]
-    rotation: Float[np.ndarray, "precision part"]
-    effort: Float[np.ndarray, " precision"]
-    next_unit: Float[np.ndarray, " precision"]
-    noise_floor: float
+    precisions: Float[np.ndarray, " precision"]  # Q [-]
+    total: Float[np.ndarray, " precision"]  # Root of the sum of the variances of all final angles [rad]
+    tilt: Float[np.ndarray, "precision part"]  # Standard deviation of every part's final tilt, x and y together [rad]
+    rotation: Float[np.ndarray, "precision part"]  # The same of its rotation about the datum's axis [rad]
+    effort: Float[np.ndarray, " precision"]  # Expected Σ uᵀRu [rad²]
+    next_unit: Float[np.ndarray, " precision"]  # Share of the total that another unit of Q takes off [-]
+    noise_floor: float  # Total that is left however large Q is [rad]
 
     def diminished(self, share: float = 0.01) -> float | None:
         """Return the smallest Q from which on another unit takes off less than a share of the total, if reached [-]."""

@@ -21,35 +21,20 @@ Choice = Literal["current", "mounted", "all"]
 
 @dataclass(frozen=True, kw_only=True)
 class AssemblyStep:
-    """One step: mount a part, measure, adjust.
+    """One step: mount a part, measure, adjust."""
 
-    Parameters
-    ----------
-    mount
-        Name of the part that is mounted.
-    adjust
-        T(k): names of the parts that may be turned.
-    effort
-        R(k): effort of turning each of them by one unit of angle, against the precision weight [-].
-    measure
-        C(k): what is measured against the datum, ``A``, or of one part against another, ``A - B``.
-    """
-
-    mount: str
-    adjust: tuple[str, ...]
+    mount: str  # Name of the part that is mounted
+    adjust: tuple[str, ...]  # T(k): names of the parts that may be turned
+    # R(k): effort of turning each of them by one unit of angle, against the precision weight [-]
     effort: Mapping[str, float] = field(default_factory=dict)
+    # C(k): what is measured against the datum, ``A``, or of one part against another, ``A - B``
     measure: tuple[str, ...] = ()
 
 
 class Efforts(Record):
-    """Effort of turning a part by one unit of angle over that of the precision weight; table ``[effort]`` of a file.
+    """Effort of turning a part by one unit of angle over that of the precision weight; table ``[effort]`` of a file."""
 
-    Parameters
-    ----------
-    just_mounted, mounted_earlier, not_mounted
-        Of the part mounted in this step; before; afterwards [-].
-    """
-
+    # Of the part mounted in this step; before; afterwards [-]
     just_mounted: Positive = 1.0
     mounted_earlier: Positive = 10.0
     not_mounted: Positive = 1000.0
@@ -103,27 +88,18 @@ def observed(chain: DatumFlowChain, step: AssemblyStep) -> Float[np.ndarray, "re
 class StateSpace:
     """Steps mount → measure → adjust: z = x + F w, y = C z + v, x⁺ = z + B (u + n).
 
-    Parameters
-    ----------
-    entering
-        F(k): state per error of every part, zero for parts that the step does not mount [rad/rad].
-    adjusting
-        B(k): state per adjustment of every part in its own axes, zero where it may not be turned [rad/rad].
-    effort
-        Diagonal of R(k) [-].
-    observing
-        C(k): readings per state [-].
-
     Notes
     -----
     zhang2025's equations with A = 1, in the causal order: what a step brings in is measured before it is adjusted;
     otherwise the last part's error could never be taken out.
     """
 
+    # F(k): state per error of every part, zero for parts that the step does not mount [rad/rad]
     entering: Float[np.ndarray, "step state error"]
+    # B(k): state per adjustment of every part in its own axes, zero where it may not be turned [rad/rad]
     adjusting: Float[np.ndarray, "step state adjustment"]
-    effort: Float[np.ndarray, "step adjustment"]
-    observing: tuple[Float[np.ndarray, "_reading state"], ...]
+    effort: Float[np.ndarray, "step adjustment"]  # Diagonal of R(k) [-]
+    observing: tuple[Float[np.ndarray, "_reading state"], ...]  # C(k): readings per state [-]
 
     @property
     def steps(self) -> int:

@@ -57,30 +57,14 @@ TRIED = np.geomspace(0.01, LARGEST_PRECISION, 161)
 
 @dataclass(frozen=True, kw_only=True)
 class AssemblyStudy:
-    """Which assembly is asked about.
+    """Which assembly is asked about."""
 
-    Parameters
-    ----------
-    plan
-        The chain at the precision that was asked for.
-    name
-        Where the errors of the parts come from; empty if they are not measured.
-    errors
-        Measured errors of its parts, if there are any [rad].
-    assemblies
-        Random assemblies that verify the tolerances [-].
-    draws
-        Random assemblies whose transmission is solved where the parts are not measured [-].
-    seed
-        Seed of every random number [-].
-    """
-
-    plan: AssemblyPlan
-    name: str = ""
-    errors: Float[np.ndarray, "part 3"] | None = None
-    assemblies: int = 100_000
-    draws: int = 50
-    seed: int = 1
+    plan: AssemblyPlan  # The chain at the precision that was asked for
+    name: str = ""  # Where the errors of the parts come from; empty if they are not measured
+    errors: Float[np.ndarray, "part 3"] | None = None  # Measured errors of its parts, if there are any [rad]
+    assemblies: int = 100_000  # Random assemblies that verify the tolerances [-]
+    draws: int = 50  # Random assemblies whose transmission is solved where the parts are not measured [-]
+    seed: int = 1  # Seed of every random number [-]
 
 
 def prepare_assembly(

@@ -16,21 +16,12 @@ State = Float[np.ndarray, "*samples state"]
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """Assemblies step by step.
+    """Assemblies step by step."""
 
-    Parameters
-    ----------
-    mounted
-        z(k), state with the part of step k, before anything is turned [rad].
-    adjustments
-        u(k), what is turned, in the parts' own axes [rad].
-    adjusted
-        x(k), state after that [rad].
-    """
-
+    # z(k), state with the part of step k, before anything is turned [rad]
     mounted: Float[np.ndarray, "*samples step state"]
-    adjustments: Float[np.ndarray, "*samples step adjustment"]
-    adjusted: Float[np.ndarray, "*samples step state"]
+    adjustments: Float[np.ndarray, "*samples step adjustment"]  # u(k), what is turned, in the parts' own axes [rad]
+    adjusted: Float[np.ndarray, "*samples step state"]  # x(k), state after that [rad]
 
 
 def foreseen(space: StateSpace, regulator: Regulator, errors: Float[np.ndarray, "*samples error"]) -> Trajectory:

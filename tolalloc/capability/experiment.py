@@ -24,26 +24,14 @@ Given = TypeVar("Given", bound=Response | ResponseWithDerivatives)
 
 @dataclass(frozen=True)
 class Experiment(Generic[Answering]):
-    """Units that may be drawn and solved.
+    """Units that may be drawn and solved."""
 
-    Parameters
-    ----------
-    response
-        What answers; its columns are those of the error model. Where a question has one output, it is the first.
-    errors
-        The sources.
-    zones
-        Zones of the active sources [m], then 1 for every joint one [-].
-    seeds
-        Node of the seed tree that belongs to this experiment alone.
-    largest_failed_share
-        Share of the units, blocks or samples that may fail; more would bias every figure [-].
-    """
-
+    # What answers; its columns are those of the error model. Where a question has one output, it is the first.
     response: Answering
-    errors: ErrorModel
-    zones: Float[np.ndarray, " source"]
-    seeds: SeedTree
+    errors: ErrorModel  # The sources
+    zones: Float[np.ndarray, " source"]  # Zones of the active sources [m], then 1 for every joint one [-]
+    seeds: SeedTree  # Node of the seed tree that belongs to this experiment alone
+    # Share of the units, blocks or samples that may fail; more would bias every figure [-]
     largest_failed_share: float = LARGEST_FAILED_SHARE
 
     @staticmethod

@@ -16,14 +16,9 @@ _MOVING_RANGE = 2 / np.sqrt(np.pi)
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Limits of a characteristic, one of which may be absent.
+    """Limits of a characteristic, one of which may be absent."""
 
-    Parameters
-    ----------
-    lower, upper
-        Limits, none for an open side [unit of the characteristic].
-    """
-
+    # Limits, none for an open side [unit of the characteristic]
     lower: float | None = None
     upper: float | None = None
 
@@ -63,83 +58,51 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class Capability:
-    """Capability of a sample.
+    """Capability of a sample."""
 
-    Parameters
-    ----------
-    mean
-        Mean of the sample [unit of the characteristic].
-    deviation_within, deviation_overall
-        Standard deviation within subgroups, and of the whole sample [unit of the characteristic].
-    cp, cpk
-        (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is
-        open [-].
-    pp, ppk
-        The same with the deviation of the whole sample [-].
-    normal_ppm
-        Units beyond the limits per million if the characteristic is normal with the sample's mean and overall
-        deviation; the only figure here besides the indices that assumes a normal distribution [-].
-    empirical_ppm
-        Units of the sample beyond the limits per million [-].
-    units, outside
-        Units of the sample, and how many lie beyond a limit [-].
-    """
-
-    mean: float
+    mean: float  # Mean of the sample [unit of the characteristic]
+    # Standard deviation within subgroups, and of the whole sample [unit of the characteristic]
     deviation_within: float
     deviation_overall: float
+    # (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is open [-]
     cp: float | None
     cpk: float
+    # The same with the deviation of the whole sample [-]
     pp: float | None
     ppk: float
+    # Units beyond the limits per million if the characteristic is normal with the sample's mean and overall deviation;
+    # the only figure here besides the indices that assumes a normal distribution [-]
     normal_ppm: float
-    empirical_ppm: float
+    empirical_ppm: float  # Units of the sample beyond the limits per million [-]
+    # Units of the sample, and how many lie beyond a limit [-]
     units: int
     outside: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShareInterval:
-    """A share of units with its two-sided interval.
+    """A share of units with its two-sided interval."""
 
-    Parameters
-    ----------
-    estimate, low, high
-        Share and the ends of its interval [-].
-    confidence
-        Confidence of the interval [-].
-    """
-
+    # Share and the ends of its interval [-]
     estimate: float
     low: float
     high: float
-    confidence: float
+    confidence: float  # Confidence of the interval [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class QuantileInterval:
-    """A quantile with an interval that holds for every continuous distribution.
+    """A quantile with an interval that holds for every continuous distribution."""
 
-    Parameters
-    ----------
-    share
-        Which quantile [-].
-    estimate
-        Empirical quantile [unit of the characteristic].
-    low, high
-        Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic].
-    confidence, attained
-        Confidence asked for, and the exact one of the order statistics chosen, which is not less [-].
-    units, needed
-        Units of the sample, and the fewest that bound both sides [-].
-    """
-
-    share: float
-    estimate: float
+    share: float  # Which quantile [-]
+    estimate: float  # Empirical quantile [unit of the characteristic]
+    # Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic]
     low: float
     high: float
+    # Confidence asked for, and the exact one of the order statistics chosen, which is not less [-]
     confidence: float
     attained: float
+    # Units of the sample, and the fewest that bound both sides [-]
     units: int
     needed: int
 

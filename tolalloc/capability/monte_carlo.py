@@ -21,39 +21,24 @@ class Yield:
 
     The interval and the bound hold for independent units alone, those of the Monte Carlo design; for a Latin hypercube
     or a Sobol' sequence only the estimate may be used.
-
-    Parameters
-    ----------
-    estimate, low, high
-        Yield and its 95 % interval [-].
-    bound
-        One-sided 95 % lower bound, the one that decides whether a target is met [-].
-    units, rejected
-        Numbers of units [-].
     """
 
+    # Yield and its 95 % interval [-]
     estimate: float
     low: float
     high: float
-    bound: float
+    bound: float  # One-sided 95 % lower bound, the one that decides whether a target is met [-]
+    # Numbers of units [-]
     units: int
     rejected: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class MonteCarlo:
-    """Random units and what the response said of them.
+    """Random units and what the response said of them."""
 
-    Parameters
-    ----------
-    x
-        The units' deviations, in the order of the response's columns [m].
-    evaluation
-        The answers; a failed unit counts as rejected.
-    """
-
-    x: Float[np.ndarray, "sample column"]
-    evaluation: Evaluation
+    x: Float[np.ndarray, "sample column"]  # The units' deviations, in the order of the response's columns [m]
+    evaluation: Evaluation  # The answers; a failed unit counts as rejected
 
     @property
     def values(self) -> Float[np.ndarray, " sample"]:

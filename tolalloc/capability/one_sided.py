@@ -16,21 +16,14 @@ from tolalloc.models import Evaluation, Response
 class OneSided:
     """The first output of a response, turned so that only its large values are bad.
 
-    Parameters
-    ----------
-    response
-        What answers.
-    limits
-        Limits of its first output.
-
     Notes
     -----
     An upper limit leaves the output as it is, a lower one turns its sign. Two limits take the larger of the distances
     beyond either, to which the distance between them is added, so that a tolerance relative to the limit has a scale.
     """
 
-    response: Response
-    limits: Limits
+    response: Response  # What answers
+    limits: Limits  # Limits of its first output
 
     @property
     def columns(self) -> tuple[str, ...]:

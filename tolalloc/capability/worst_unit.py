@@ -22,24 +22,14 @@ _TURNS = 0.5 ** np.arange(2, 8)
 
 @dataclass(frozen=True, kw_only=True)
 class WorstUnit:
-    """The worst unit found inside the zones.
+    """The worst unit found inside the zones."""
 
-    Parameters
-    ----------
-    value
-        Its output. Nothing proves that no other unit is worse: the true worst case is this or beyond [output].
-    x
-        Its deviations, in the order of the response's columns [m, angles rad].
-    by_zone
-        Change of the worst value with each zone [output/m].
-    ends
-        Worst value of every start, NaN where it had none; how closely they agree tells how far to trust the
-        search [output].
-    """
-
+    # Its output. Nothing proves that no other unit is worse: the true worst case is this or beyond [output].
     value: float
-    x: Float[np.ndarray, " column"]
-    by_zone: Float[np.ndarray, " source"]
+    x: Float[np.ndarray, " column"]  # Its deviations, in the order of the response's columns [m, angles rad]
+    by_zone: Float[np.ndarray, " source"]  # Change of the worst value with each zone [output/m]
+    # Worst value of every start, NaN where it had none; how closely they agree tells how far to trust the search
+    # [output]
     ends: Float[np.ndarray, " start"]
 
 

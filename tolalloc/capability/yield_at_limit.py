@@ -31,34 +31,18 @@ LARGEST_DIFFERENCE = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class YieldAtLimit:
-    """Yield at a limit, by the method that can be relied on.
+    """Yield at a limit, by the method that can be relied on."""
 
-    Parameters
-    ----------
-    limit
-        Largest output allowed [output].
-    interval
-        Yield with its two-sided 95 % interval: that of `MonteCarlo.within` from random units, or where few of them
-        exceed the limit that of a log-normally distributed estimate [-].
-    estimate
-        Probability of a unit beyond the limit by the method relied on, with its calls, failed samples and cautions.
-    estimates
-        The same by every method that ran, random units first.
-    verdict
-        One sentence that says which estimate to rely on, and why.
-    capability
-        Indices of the random units.
-    defects_per_million
-        Random units rejected per million opportunities, one for each unit [-].
-    """
-
-    limit: float
+    limit: float  # Largest output allowed [output]
+    # Yield with its two-sided 95 % interval: that of `MonteCarlo.within` from random units, or where few of them exceed
+    # the limit that of a log-normally distributed estimate [-]
     interval: ShareInterval
+    # Probability of a unit beyond the limit by the method relied on, with its calls, failed samples and cautions
     estimate: RareFailure
-    estimates: tuple[RareFailure, ...]
-    verdict: str
-    capability: Capability
-    defects_per_million: float
+    estimates: tuple[RareFailure, ...]  # The same by every method that ran, random units first
+    verdict: str  # One sentence that says which estimate to rely on, and why
+    capability: Capability  # Indices of the random units
+    defects_per_million: float  # Random units rejected per million opportunities, one for each unit [-]
 
     @property
     def parts_per_million(self) -> ShareInterval:

@@ -23,39 +23,23 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """Two correlated sources of a tolerance table, made on one spindle, in one fixture, or from one lot.
+    """Two correlated sources of a tolerance table, made on one spindle, in one fixture, or from one lot."""
 
-    Parameters
-    ----------
-    one, other
-        Names of the sources; like columns of both go together, x with x and cos1 with cos1.
-    correlation
-        Of the standard normal numbers behind the columns; for normal sources that of the columns themselves, for others
-        near it [-].
-    place
-        Where it stands, for messages.
-    """
-
+    # Names of the sources; like columns of both go together, x with x and cos1 with cos1
     one: str
     other: str
+    # Of the standard normal numbers behind the columns; for normal sources that of the columns themselves, for others
+    # near it [-]
     correlation: float
-    place: str = field(default="correlations", repr=False)
+    place: str = field(default="correlations", repr=False)  # Where it stands, for messages
 
 
 @dataclass(frozen=True, kw_only=True)
 class Correlation:
-    """All correlations of an error model, as a Gaussian copula: every source keeps its own distribution.
+    """All correlations of an error model, as a Gaussian copula: every source keeps its own distribution."""
 
-    Parameters
-    ----------
-    pairs
-        Correlated pairs; all other pairs are independent.
-    origin
-        Where all of them stand, for messages.
-    """
-
-    pairs: tuple[Pair, ...] = ()
-    origin: str = field(default="correlations", repr=False)
+    pairs: tuple[Pair, ...] = ()  # Correlated pairs; all other pairs are independent
+    origin: str = field(default="correlations", repr=False)  # Where all of them stand, for messages
 
     def among(self, sources: Sequence[Source]) -> tuple[Pair, ...]:
         """Return the pairs whose sources both vary and whose correlation is not zero."""
@@ -160,19 +144,12 @@ def _require_allowed(pair: Pair, known: Mapping[str, Source]) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CorrelatedSource:
-    """Columns that no drawing limits, common to all units: jointly normal, independent of every other source.
+    """Columns that no drawing limits, common to all units: jointly normal, independent of every other source."""
 
-    Parameters
-    ----------
-    name, columns
-        What a report calls it, and the columns that it moves.
-    covariance
-        Covariance of the columns, singular or zero if need be [column²].
-    """
-
+    # What a report calls it, and the columns that it moves
     name: str
     columns: tuple[str, ...]
-    covariance: Float[np.ndarray, "column column"]
+    covariance: Float[np.ndarray, "column column"]  # Covariance of the columns, singular or zero if need be [column²]
 
     @cached_property
     def factor(self) -> Float[np.ndarray, "column column"]:

@@ -103,21 +103,12 @@ class Marginal(Hashable, Protocol):
 
 @dataclass(frozen=True)
 class Family:
-    """A distribution with a closed form.
+    """A distribution with a closed form."""
 
-    Parameters
-    ----------
-    name
-        As in scipy.stats.
-    arguments
-        Its shape, start and width as scipy.stats takes them; without them it is the standard one [-].
-    end
-        Value at the limit of the zone at Cp = 1; without it the 99.73 % quantile [own unit].
-    """
-
-    name: str
+    name: str  # As in scipy.stats
+    # Its shape, start and width as scipy.stats takes them; without them it is the standard one [-]
     arguments: tuple[float, ...] = ()
-    end: float | None = None
+    end: float | None = None  # Value at the limit of the zone at Cp = 1; without it the 99.73 % quantile [own unit]
 
     @property
     def _scipy(self) -> Any:
@@ -148,14 +139,9 @@ RAYLEIGH = Family("rayleigh", end=sqrt(-2.0 * log(1.0 - INSIDE_AT_CP_1)))
 
 @dataclass(frozen=True)
 class Placed:
-    """A distribution moved and scaled.
+    """A distribution moved and scaled."""
 
-    Parameters
-    ----------
-    base, offset, scale
-        What is moved and scaled, where its 0 comes to lie, and the length of its unit [half zone].
-    """
-
+    # What is moved and scaled, where its 0 comes to lie, and the length of its unit [half zone]
     base: Marginal
     offset: float
     scale: float
@@ -176,14 +162,9 @@ class Placed:
 
 @dataclass(frozen=True)
 class Sorted:
-    """What is left of a distribution when everything outside two limits is sorted out.
+    """What is left of a distribution when everything outside two limits is sorted out."""
 
-    Parameters
-    ----------
-    base, low, high
-        Distribution before sorting, and the limits [unit of the base].
-    """
-
+    # Distribution before sorting, and the limits [unit of the base]
     base: Marginal
     low: float
     high: float

@@ -24,21 +24,11 @@ Costs = str | Path | Mapping[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """What is known of the parts before anything is computed.
+    """What is known of the parts before anything is computed."""
 
-    Parameters
-    ----------
-    name
-        Tolerance table as it was named, for reports.
-    errors
-        The sources of the table with their correlations.
-    costs
-        Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads.
-    """
-
-    name: str
-    errors: ErrorModel
-    costs: Costs = ""
+    name: str  # Tolerance table as it was named, for reports
+    errors: ErrorModel  # The sources of the table with their correlations
+    costs: Costs = ""  # Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads
 
     @classmethod
     def of_rows(

@@ -17,24 +17,17 @@ from tolalloc.drawings.sources import Source
 class ErrorModel:
     """All sources of a reducer: each random column is its zone times a standard value.
 
-    Parameters
-    ----------
-    sources
-        The rows of the tolerance table.
-    joint
-        What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and
-        its zone is 1. Rankings take it; allocation, tolerance tables and hand estimates have none.
-    correlation
-        Correlations between the sources of the table; a joint source is independent of all others.
-
     Raises
     ------
     InputError, UnknownNameError
         Correlations that name no source or cannot hold together.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[Source, ...]  # The rows of the tolerance table
+    # What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and its
+    # zone is 1. Rankings take it; allocation, tolerance tables and hand estimates have none.
     joint: tuple[CorrelatedSource, ...] = ()
+    # Correlations between the sources of the table; a joint source is independent of all others
     correlation: Correlation = field(default_factory=Correlation)
 
     def __post_init__(self) -> None:

@@ -34,25 +34,15 @@ Cell = str | int | float | Path | None
 
 @dataclass(frozen=True)
 class Column:
-    """What a tolerance table knows of a field beside its type, its limits and its default.
+    """What a tolerance table knows of a field beside its type, its limits and its default."""
 
-    Parameters
-    ----------
-    meaning, unit
-        What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name.
-    attribute
-        Field of the source that is this cell; empty where several cells make it together.
-    scale
-        What a number of the cell is multiplied by for the source, if by anything [SI unit per unit].
-    write
-        Returns the cell of a source, where it is not its attribute.
-    """
-
+    # What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name
     meaning: str
     unit: str = ""
-    attribute: str = ""
+    attribute: str = ""  # Field of the source that is this cell; empty where several cells make it together
+    # What a number of the cell is multiplied by for the source, if by anything [SI unit per unit]
     scale: float | None = None
-    write: Callable[[Source], Cell] | None = None
+    write: Callable[[Source], Cell] | None = None  # Returns the cell of a source, where it is not its attribute
 
     def read(self, cell: Cell) -> Cell:
         """Return the attribute of the source for a cell."""

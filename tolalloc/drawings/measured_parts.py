@@ -28,56 +28,29 @@ _LAYOUTS = {Feature.SIZE: (("deviation",),), Feature.POSITION: (("x", "y"), ("ra
 
 @dataclass(frozen=True, kw_only=True)
 class FittedDistribution:
-    """A distribution fitted to measured parts by maximum likelihood.
+    """A distribution fitted to measured parts by maximum likelihood."""
 
-    Parameters
-    ----------
-    distribution
-        Normal (for radii: normal on each axis), lognormal or Weibull; the latter two start at the lower limit.
-    shape
-        Shape, 0 for a normal distribution [-].
-    scale
-        σ of the normal, median of the lognormal, scale of the Weibull distribution [m].
-    log_likelihood
-        Logarithm of the likelihood, with densities per µm [-].
-    aic
-        Akaike's information criterion; the smaller the better [-].
-    distance
-        Kolmogorov and Smirnov's largest distance from the measured shares [-].
-    """
-
+    # Normal (for radii: normal on each axis), lognormal or Weibull; the latter two start at the lower limit
     distribution: Distribution
-    shape: float
-    scale: float
-    log_likelihood: float
-    aic: float
-    distance: float
+    shape: float  # Shape, 0 for a normal distribution [-]
+    scale: float  # σ of the normal, median of the lognormal, scale of the Weibull distribution [m]
+    log_likelihood: float  # Logarithm of the likelihood, with densities per µm [-]
+    aic: float  # Akaike's information criterion; the smaller the better [-]
+    distance: float  # Kolmogorov and Smirnov's largest distance from the measured shares [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredFit:
-    """What the measured parts say about the process.
+    """What the measured parts say about the process."""
 
-    Parameters
-    ----------
-    parts
-        Number of measured parts [-].
-    mean, deviation
-        Mean and sample standard deviation of the deviations or radii [m].
-    cp
-        How many times the spread fits into the zone; for radii that of a normal deviation on each axis [-].
-    cpk
-        Distance of the mean from the nearer limit, for radii from the largest one, over 3σ [-].
-    fits
-        Fitted distributions, the best by Akaike's criterion first; a distribution that starts at the lower limit is
-        left out where a part is at or below it.
-    """
-
-    parts: int
+    parts: int  # Number of measured parts [-]
+    # Mean and sample standard deviation of the deviations or radii [m]
     mean: float
     deviation: float
-    cp: float
-    cpk: float
+    cp: float  # How many times the spread fits into the zone; for radii that of a normal deviation on each axis [-]
+    cpk: float  # Distance of the mean from the nearer limit, for radii from the largest one, over 3σ [-]
+    # Fitted distributions, the best by Akaike's criterion first; a distribution that starts at the lower limit is left
+    # out where a part is at or below it
     fits: tuple[FittedDistribution, ...]
 
     @property
@@ -90,26 +63,16 @@ class MeasuredFit:
 class MeasuredParts:
     """Measured parts and the zone that they were made to.
 
-    Parameters
-    ----------
-    path
-        Where they were read.
-    values
-        Deviations from the nominal size, or radii of a position [m].
-    are_radii
-        Whether the values are radii.
-    zone, middle
-        Width and middle of the zone that they were made to [m].
-
     Notes
     -----
     At another zone the parts are assumed to deviate in proportion to it. The path stays out of the text of a record, so
     that a digest of the same parts in another folder is the same.
     """
 
-    path: Path = field(repr=False)
-    values: tuple[float, ...]
-    are_radii: bool
+    path: Path = field(repr=False)  # Where they were read
+    values: tuple[float, ...]  # Deviations from the nominal size, or radii of a position [m]
+    are_radii: bool  # Whether the values are radii
+    # Width and middle of the zone that they were made to [m]
     zone: float
     middle: float
 

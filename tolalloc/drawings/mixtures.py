@@ -24,21 +24,11 @@ from tolalloc.drawings.distributions import (
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
-    """One batch of a mixture.
+    """One batch of a mixture."""
 
-    Parameters
-    ----------
-    weight
-        Share of all parts; the weights are taken relative to their sum [-].
-    shift
-        Mean off the middle of the zone, 0 for a position [half zone].
-    spread
-        σ over that of Cp = 1 [-].
-    """
-
-    weight: float
-    shift: float
-    spread: float
+    weight: float  # Share of all parts; the weights are taken relative to their sum [-]
+    shift: float  # Mean off the middle of the zone, 0 for a position [half zone]
+    spread: float  # σ over that of Cp = 1 [-]
 
 
 def parsed_batches(text: str) -> tuple[Batch, ...]:

@@ -19,14 +19,9 @@ _SOBOL_BITS = 32
 
 @dataclass(frozen=True)
 class SeedTree:
-    """A node of the tree.
+    """A node of the tree."""
 
-    Parameters
-    ----------
-    seed, path
-        Seed of the study, where 0 is a seed like every other [-]; names from the root to this node.
-    """
-
+    # Seed of the study, where 0 is a seed like every other [-]; names from the root to this node
     seed: int
     path: tuple[str, ...] = ()
 

@@ -76,18 +76,12 @@ def _sheet(path: Path) -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True, kw_only=True)
 class TextTable:
-    """Cells of a CSV file as text.
+    """Cells of a CSV file as text."""
 
-    Parameters
-    ----------
-    path, headers
-        Where it was read, and the first line that is not a comment.
-    rows, cells
-        Line of each row as counted in the file [-], and its cells, as many as there are headers.
-    """
-
+    # Where it was read, and the first line that is not a comment
     path: Path
     headers: tuple[str, ...]
+    # Line of each row as counted in the file [-], and its cells, as many as there are headers
     rows: tuple[int, ...]
     cells: tuple[tuple[str, ...], ...]
 

@@ -55,71 +55,35 @@ def sign_of(unit: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class RankingAnswer(Answer):
-    """What drives a model's outputs, and how sure that is.
-
-    Parameters
-    ----------
-    model
-        What answered.
-    errors
-        Sources, their distributions and correlations.
-    limits
-        Output → limits; the first one leads.
-    target
-        Share of units that must keep a limit [-].
-    outputs
-        Names of all outputs, in the order of the sample's columns, the leading one first.
-    sample, design
-        Random units with all these outputs, and how they are spread.
-    sobol
-        Indices of these outputs and of the waves of the model's spectra.
-    reproduction
-        How much of the ranking a second seed has shown.
-    orders
-        What each source adds to each order; none for a model without spectra.
-    effect
-        What not knowing the model itself does to the leading output; none where all of it is known.
-    shapley
-        Effects of correlated sources; none where all are independent.
-    classical
-        What a hand calculation says.
-    local, derivatives
-        Derivatives by each source, and what they bound.
-    effects, moments
-        Measures beside Sobol's.
-    reject
-        What drives the units out of the limits.
-    inverse
-        How far each zone may open alone.
-    beyond
-        Probability of a leading output beyond its limits.
-    choice
-        Stand-ins for the model with their errors.
-    """
+    """What drives a model's outputs, and how sure that is."""
 
     kind: ClassVar[str] = "ranking"
 
-    model: Model
-    errors: ErrorModel
-    limits: Mapping[str, Limits]
-    target: float
-    outputs: tuple[str, ...]
+    model: Model  # What answered
+    errors: ErrorModel  # Sources, their distributions and correlations
+    limits: Mapping[str, Limits]  # Output → limits; the first one leads
+    target: float  # Share of units that must keep a limit [-]
+    outputs: tuple[str, ...]  # Names of all outputs, in the order of the sample's columns, the leading one first
+    # Random units with all these outputs, and how they are spread
     sample: MonteCarlo
     design: SamplingDesign
-    sobol: SobolAnalysis
-    reproduction: Reproduction
-    orders: OrderContribution | None
+    sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
+    reproduction: Reproduction  # How much of the ranking a second seed has shown
+    orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
+    # What not knowing the model itself does to the leading output; none where all of it is known
     effect: UncertainEffect | None
-    shapley: ShapleyEffects | None
-    classical: ClassicalEstimate
+    shapley: ShapleyEffects | None  # Effects of correlated sources; none where all are independent
+    classical: ClassicalEstimate  # What a hand calculation says
+    # Derivatives by each source, and what they bound
     local: LocalDerivatives
     derivatives: DerivativeMeasures
+    # Measures beside Sobol's
     effects: ElementaryEffects
     moments: MomentIndependent
-    reject: TargetSensitivity
-    inverse: InverseSensitivity
-    beyond: YieldAtLimit
-    choice: Choice
+    reject: TargetSensitivity  # What drives the units out of the limits
+    inverse: InverseSensitivity  # How far each zone may open alone
+    beyond: YieldAtLimit  # Probability of a leading output beyond its limits
+    choice: Choice  # Stand-ins for the model with their errors
 
     @property
     def leading(self) -> str:

@@ -23,59 +23,32 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class LocalDerivatives:
-    """What a micrometre of each source does to the output.
+    """What a micrometre of each source does to the output."""
 
-    Parameters
-    ----------
-    sources
-        Names of the sources that a drawing limits, in the order of all arrays.
-    nominal
-        Output in the middle of all zones [output].
-    at_nominal
-        Derivative there: with its sign for a source of one column, the length of the gradient for any other
-        [output/µm].
-    direction
-        Direction of the gradient of a source of two columns, x or the cosine at 0; NaN for any other [rad].
-    root_mean_square
-        Root mean square of the gradient's length over random units [output/µm].
-    units, failed
-        Good random units, and those without a usable answer [-].
-    """
-
-    sources: tuple[str, ...]
-    nominal: float
+    sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
+    nominal: float  # Output in the middle of all zones [output]
+    # Derivative there: with its sign for a source of one column, the length of the gradient for any other [output/µm]
     at_nominal: Float[np.ndarray, " source"]
+    # Direction of the gradient of a source of two columns, x or the cosine at 0; NaN for any other [rad]
     direction: Float[np.ndarray, " source"]
+    # Root mean square of the gradient's length over random units [output/µm]
     root_mean_square: Float[np.ndarray, " source"]
+    # Good random units, and those without a usable answer [-]
     units: int
     failed: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class DerivativeMeasures:
-    """Derivative-based global measures and the bounds that they put on the total indices.
+    """Derivative-based global measures and the bounds that they put on the total indices."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of all arrays; correlated sources stand together, joined by " + ".
-    measure
-        Mean square of the gradient by the source's standard normal numbers [output²].
-    variance
-        Variance of the output [output²].
-    bound
-        Measure over variance, not less than the total Sobol index [-].
-    bound_resamples
-        The same from bootstrap resamples of the units [-].
-    units, failed
-        Good units, and those without a usable answer [-].
-    """
-
-    sources: tuple[str, ...]
+    sources: tuple[str, ...]  # Names, in the order of all arrays; correlated sources stand together, joined by " + "
+    # Mean square of the gradient by the source's standard normal numbers [output²]
     measure: Float[np.ndarray, " source"]
-    variance: float
-    bound: Float[np.ndarray, " source"]
-    bound_resamples: Float[np.ndarray, "resample source"]
+    variance: float  # Variance of the output [output²]
+    bound: Float[np.ndarray, " source"]  # Measure over variance, not less than the total Sobol index [-]
+    bound_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
+    # Good units, and those without a usable answer [-]
     units: int
     failed: int
 
@@ -206,20 +179,11 @@ DIRECTIONS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class ClassicalEstimate:
-    """Single-error outputs and the two sums that assume they add up.
+    """Single-error outputs and the two sums that assume they add up."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of ``alone``.
-    without
-        Output without any error, from modification and torque alone [output].
-    alone
-        Largest output of each source alone at the limit of its zone, over random phases, beyond ``without`` [output].
-    """
-
-    sources: tuple[str, ...]
-    without: float
+    sources: tuple[str, ...]  # Names, in the order of ``alone``
+    without: float  # Output without any error, from modification and torque alone [output]
+    # Largest output of each source alone at the limit of its zone, over random phases, beyond ``without`` [output]
     alone: Float[np.ndarray, " source"]
 
     @property

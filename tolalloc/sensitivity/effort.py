@@ -47,28 +47,15 @@ _CHAIN = 10
 
 @dataclass(frozen=True, kw_only=True)
 class SobolEffort:
-    """How much a Sobol analysis may compute.
+    """How much a Sobol analysis may compute."""
 
-    Parameters
-    ----------
-    start, limit
-        First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-].
-    places
-        First places whose order must be stable in the ranking over all outputs [-].
-    probability
-        Share of resamples that must have that order [-].
-    resamples
-        Bootstrap resamples [-].
-    second_order
-        Whether pairs of sources get an index, at nearly twice the samples.
-    """
-
+    # First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-]
     start: int = 512
     limit: int = 65_536
-    places: int = 3
-    probability: float = 0.9
-    resamples: int = 400
-    second_order: bool = False
+    places: int = 3  # First places whose order must be stable in the ranking over all outputs [-]
+    probability: float = 0.9  # Share of resamples that must have that order [-]
+    resamples: int = 400  # Bootstrap resamples [-]
+    second_order: bool = False  # Whether pairs of sources get an index, at nearly twice the samples
 
     def __post_init__(self) -> None:
         if self.start < 2 or self.start & (self.start - 1):
@@ -81,43 +68,30 @@ class SobolEffort:
 class RankingEffort:
     """How much a ranking may compute.
 
-    Parameters
-    ----------
-    units
-        Random units behind yields, capabilities and what the units out of the limit share [-].
-    design
-        How these units are spread; yields have an interval for the Monte Carlo design alone.
-    sobol
-        Blocks of the Sobol analysis, and what stops their growth.
-    trajectories
-        Trajectories of Morris' elementary effects [-].
-    moment_units, derivative_units, inverse_units, surrogate_units
-        Units behind PAWN and delta, behind derivatives, behind every trial zone, and behind the surrogates; the yield
-        target may ask for more behind the trial zones [-].
-    level_units, level_runs, widened_units
-        Units of a level and runs of the subset simulation, and units of the widened distribution that checks it, all
-        for limits that are rarely exceeded [-].
-    permutations
-        Permutations behind Shapley effects, where sources are correlated [-].
-
     Raises
     ------
     InputError
         A number with which an estimator would stop, often after long work of others.
     """
 
-    units: int = 16_384
+    units: int = 16_384  # Random units behind yields, capabilities and what the units out of the limit share [-]
+    # How these units are spread; yields have an interval for the Monte Carlo design alone
     design: SamplingDesign = SamplingDesign.MONTE_CARLO
+    # Blocks of the Sobol analysis, and what stops their growth
     sobol: SobolEffort = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
-    trajectories: int = 32
+    trajectories: int = 32  # Trajectories of Morris' elementary effects [-]
+    # Units behind PAWN and delta, behind derivatives, behind every trial zone, and behind the surrogates; the yield
+    # target may ask for more behind the trial zones [-]
     moment_units: int = 4096
     derivative_units: int = 1024
     inverse_units: int = 2048
     surrogate_units: int = 2048
+    # Units of a level and runs of the subset simulation, and units of the widened distribution that checks it, all for
+    # limits that are rarely exceeded [-]
     level_units: int = 4000
     level_runs: int = 5
     widened_units: int = 20_000
-    permutations: int = 1000
+    permutations: int = 1000  # Permutations behind Shapley effects, where sources are correlated [-]
 
     def __post_init__(self) -> None:
         for field_name, fewest in _FEWEST.items():

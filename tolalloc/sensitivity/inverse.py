@@ -26,34 +26,19 @@ _ROWS_AT_ONCE = 2**17
 
 @dataclass(frozen=True, kw_only=True)
 class InverseSensitivity:
-    """The factor of each zone at which the requirement is just kept, all other zones as they are.
+    """The factor of each zone at which the requirement is just kept, all other zones as they are."""
 
-    Parameters
-    ----------
-    sources
-        Names of the sources that a drawing limits, in the order of all arrays.
-    quantile
-        Quantile of the output at the target yield with the zones as they are [output].
-    meets
-        Whether that keeps the limit; if so the factors are above 1, if not below.
-    factor
-        Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
-        without the source [-].
-    low, high
-        Ends of the 90 % interval of the factor, NaN where it is not finite [-].
-    zone
-        Factor times the zone [m].
-    units, failed, calls
-        Units of every trial, samples without a usable answer over all trials, and calls of the response [-].
-    """
-
-    sources: tuple[str, ...]
-    quantile: float
-    meets: bool
+    sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
+    quantile: float  # Quantile of the output at the target yield with the zones as they are [output]
+    meets: bool  # Whether that keeps the limit; if so the factors are above 1, if not below
+    # Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
+    # without the source [-]
     factor: Float[np.ndarray, " source"]
+    # Ends of the 90 % interval of the factor, NaN where it is not finite [-]
     low: Float[np.ndarray, " source"]
     high: Float[np.ndarray, " source"]
-    zone: Float[np.ndarray, " source"]
+    zone: Float[np.ndarray, " source"]  # Factor times the zone [m]
+    # Units of every trial, samples without a usable answer over all trials, and calls of the response [-]
     units: int
     failed: int
     calls: int

@@ -56,33 +56,15 @@ class _Exact:
 
 @dataclass(frozen=True, kw_only=True)
 class Measures:
-    """What may be measured of a model at the zones of its drawing.
+    """What may be measured of a model at the zones of its drawing."""
 
-    Parameters
-    ----------
-    model
-        What answers, observed.
-    errors
-        Sources of the drawing.
-    limits
-        Output → limits; the first one leads: measures of one output are of this one.
-    target
-        Share of units that must keep the limits [-].
-    effort
-        How much may be computed.
-    seeds
-        Node of the seed tree.
-    largest_failed_share
-        Share of units that may fail [-].
-    """
-
-    model: Model
-    errors: ErrorModel
-    limits: Mapping[str, Limits]
-    target: float
-    effort: RankingEffort
-    seeds: SeedTree
-    largest_failed_share: float
+    model: Model  # What answers, observed
+    errors: ErrorModel  # Sources of the drawing
+    limits: Mapping[str, Limits]  # Output → limits; the first one leads: measures of one output are of this one
+    target: float  # Share of units that must keep the limits [-]
+    effort: RankingEffort  # How much may be computed
+    seeds: SeedTree  # Node of the seed tree
+    largest_failed_share: float  # Share of units that may fail [-]
 
     @property
     def leading(self) -> str:

@@ -15,28 +15,17 @@ from tolalloc.exceptions import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbours:
-    """Two sources that follow each other in the ranking.
+    """Two sources that follow each other in the ranking."""
 
-    Parameters
-    ----------
-    before, after
-        Positions of the two sources [-].
-    difference, deviation
-        Difference of their indices, and its standard deviation over the resamples [-].
-    probability
-        Share of resamples in which they have this order [-].
-    separated
-        Whether that share reaches the confidence asked for.
-    more_blocks
-        Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal [-].
-    """
-
+    # Positions of the two sources [-]
     before: int
     after: int
+    # Difference of their indices, and its standard deviation over the resamples [-]
     difference: float
     deviation: float
-    probability: float
-    separated: bool
+    probability: float  # Share of resamples in which they have this order [-]
+    separated: bool  # Whether that share reaches the confidence asked for
+    # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal [-]
     more_blocks: int | None
 
 
@@ -44,20 +33,14 @@ class Neighbours:
 class Reproduction:
     """How much of what a ranking promised another one has shown, which had other samples.
 
-    Parameters
-    ----------
-    confidence
-        Share of resamples from which an order counts as promised [-].
-    promised, reproduced
-        Pairs of sources whose order was promised, and those among them that the other ranking has in that order [-].
-
     Notes
     -----
     Most promised pairs lie far above the confidence, so a share just at it is a weak result. Pairs share sources and
     depend on each other: the share has no binomial error.
     """
 
-    confidence: float
+    confidence: float  # Share of resamples from which an order counts as promised [-]
+    # Pairs of sources whose order was promised, and those among them that the other ranking has in that order [-]
     promised: int
     reproduced: int
 
@@ -69,22 +52,13 @@ class Reproduction:
 
 @dataclass(frozen=True, kw_only=True)
 class SourceRanking:
-    """Sources by their total index.
+    """Sources by their total index."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of all arrays.
-    total, total_resamples
-        Total index, and the same from bootstrap resamples of the blocks [-].
-    blocks
-        Saltelli blocks used [-].
-    """
-
-    sources: tuple[str, ...]
+    sources: tuple[str, ...]  # Names, in the order of all arrays
+    # Total index, and the same from bootstrap resamples of the blocks [-]
     total: Float[np.ndarray, " source"]
     total_resamples: Float[np.ndarray, "resample source"]
-    blocks: int
+    blocks: int  # Saltelli blocks used [-]
 
     @property
     def total_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -265,37 +239,19 @@ Resampled = tuple[Float[np.ndarray, " source"], Float[np.ndarray, "resample sour
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One number of blocks on the way to a stable order.
+    """One number of blocks on the way to a stable order."""
 
-    Parameters
-    ----------
-    blocks
-        Number of blocks [-].
-    first
-        Positions of the first sources, largest index first [-].
-    probability
-        Share of resamples whose first sources are these in this order [-].
-    """
-
-    blocks: int
-    first: tuple[int, ...]
-    probability: float
+    blocks: int  # Number of blocks [-]
+    first: tuple[int, ...]  # Positions of the first sources, largest index first [-]
+    probability: float  # Share of resamples whose first sources are these in this order [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Growth:
-    """How the order settled as the blocks grew.
+    """How the order settled as the blocks grew."""
 
-    Parameters
-    ----------
-    history
-        One step per number of blocks.
-    probability
-        Share of resamples that was asked for [-].
-    """
-
-    history: tuple[Step, ...]
-    probability: float
+    history: tuple[Step, ...]  # One step per number of blocks
+    probability: float  # Share of resamples that was asked for [-]
 
     @property
     def stable(self) -> bool:

@@ -30,15 +30,6 @@ SAMPLES_AT_ONCE = 8192
 class SaltelliDesign:
     """Scrambled Sobol' points A and B, and the samples between them: A, AB₁ … AB_D, if asked for BA₁ … BA_D, and B.
 
-    Parameters
-    ----------
-    factor_groups
-        Name of the factor group of each column; the columns of a factor group are exchanged together.
-    seed
-        Seed of the scrambling, positive: 0 would be no seed at all for other libraries [-].
-    second_order
-        Whether the design has the BA samples.
-
     Notes
     -----
     The sequence is one and the same for any number of blocks: a larger design begins with the smaller one.
@@ -49,9 +40,10 @@ class SaltelliDesign:
     1998), as `scipy.stats.qmc.Sobol` draws them for `SALib.sample.sobol`.
     """
 
+    # Name of the factor group of each column; the columns of a factor group are exchanged together
     factor_groups: tuple[str, ...]
-    seed: int
-    second_order: bool = False
+    seed: int  # Seed of the scrambling, positive: 0 would be no seed at all for other libraries [-]
+    second_order: bool = False  # Whether the design has the BA samples
 
     def __post_init__(self) -> None:
         if self.seed < 1:
@@ -98,33 +90,22 @@ _ROUNDING = 64 * np.finfo(float).eps
 
 @dataclass(frozen=True, kw_only=True)
 class SaltelliIndices:
-    """Indices of every output; those of an output that does not vary are NaN.
+    """Indices of every output; those of an output that does not vary are NaN."""
 
-    Parameters
-    ----------
-    first, total
-        First-order and total index [-].
-    second
-        Second-order index of the pairs in the order of ``pairs``, none if the design has no BA samples [-].
-    first_resamples, total_resamples, second_resamples
-        The same from bootstrap resamples of the blocks, the same blocks for all outputs [-].
-    variance, variance_resamples
-        Variance of A and B together, of which the indices are shares [output²].
-    varies
-        Whether the output varies; only then do its indices exist.
-    blocks, dropped
-        Blocks used, and blocks dropped because one of their samples failed [-].
-    """
-
+    # First-order and total index [-]
     first: Float[np.ndarray, "output source"]
     total: Float[np.ndarray, "output source"]
+    # Second-order index of the pairs in the order of ``pairs``, none if the design has no BA samples [-]
     second: Float[np.ndarray, "output pair"] | None
+    # The same from bootstrap resamples of the blocks, the same blocks for all outputs [-]
     first_resamples: Float[np.ndarray, "output resample source"]
     total_resamples: Float[np.ndarray, "output resample source"]
     second_resamples: Float[np.ndarray, "output resample pair"] | None
+    # Variance of A and B together, of which the indices are shares [output²]
     variance: Float[np.ndarray, " output"]
     variance_resamples: Float[np.ndarray, "output resample"]
-    varies: Bool[np.ndarray, " output"]
+    varies: Bool[np.ndarray, " output"]  # Whether the output varies; only then do its indices exist
+    # Blocks used, and blocks dropped because one of their samples failed [-]
     blocks: int
     dropped: int
 

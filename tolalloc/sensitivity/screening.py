@@ -30,31 +30,18 @@ _CURVE_POINTS = 100
 
 @dataclass(frozen=True, kw_only=True)
 class ElementaryEffects:
-    """What a large step of one source alone does, from many places.
+    """What a large step of one source alone does, from many places."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of all arrays; correlated sources stand together, joined by " + ".
-    effects
-        Change of the output per step over the length of the step in uniform numbers; its sign is that of the change
-        for a rising number, and for a source of several columns, which step in random directions, has no meaning
-        [output].
-    mu_star
-        Mean of the effects' magnitudes [output].
-    mu_star_resamples
-        The same from bootstrap resamples of the trajectories [output].
-    sigma
-        Standard deviation of the effects, NaN for a source of several columns [output].
-    trajectories, dropped
-        Trajectories used, and those dropped because one of their samples failed [-].
-    """
-
-    sources: tuple[str, ...]
+    sources: tuple[str, ...]  # Names, in the order of all arrays; correlated sources stand together, joined by " + "
+    # Change of the output per step over the length of the step in uniform numbers; its sign is that of the change for a
+    # rising number, and for a source of several columns, which step in random directions, has no meaning [output]
     effects: Float[np.ndarray, "output trajectory source"]
-    mu_star: Float[np.ndarray, "output source"]
+    mu_star: Float[np.ndarray, "output source"]  # Mean of the effects' magnitudes [output]
+    # The same from bootstrap resamples of the trajectories [output]
     mu_star_resamples: Float[np.ndarray, "output resample source"]
+    # Standard deviation of the effects, NaN for a source of several columns [output]
     sigma: Float[np.ndarray, "output source"]
+    # Trajectories used, and those dropped because one of their samples failed [-]
     trajectories: int
     dropped: int
 
@@ -65,30 +52,16 @@ class ElementaryEffects:
 
 @dataclass(frozen=True, kw_only=True)
 class MomentIndependent:
-    """How much knowing a source changes the whole distribution of the first output.
+    """How much knowing a source changes the whole distribution of the first output."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of all arrays.
-    pawn
-        Median over classes of the Kolmogorov–Smirnov distance to the whole sample [-].
-    delta
-        Half the mean distance between the densities, less its bias [-].
-    delta_resamples
-        The same from bootstrap resamples of the units [-].
-    pawn_dummy, delta_dummy
-        Largest index among the dummies, vectors that the output does not depend on: a level that means nothing [-].
-    units, failed
-        Good units, and those without a usable answer [-].
-    """
-
-    sources: tuple[str, ...]
-    pawn: Float[np.ndarray, " source"]
-    delta: Float[np.ndarray, " source"]
-    delta_resamples: Float[np.ndarray, "resample source"]
+    sources: tuple[str, ...]  # Names, in the order of all arrays
+    pawn: Float[np.ndarray, " source"]  # Median over classes of the Kolmogorov–Smirnov distance to the whole sample [-]
+    delta: Float[np.ndarray, " source"]  # Half the mean distance between the densities, less its bias [-]
+    delta_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
+    # Largest index among the dummies, vectors that the output does not depend on: a level that means nothing [-]
     pawn_dummy: float
     delta_dummy: float
+    # Good units, and those without a usable answer [-]
     units: int
     failed: int
 

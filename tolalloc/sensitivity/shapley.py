@@ -23,30 +23,19 @@ _PIVOT = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class ShapleyEffects:
-    """Shapley effects of every source on every output.
+    """Shapley effects of every source on every output."""
 
-    Parameters
-    ----------
-    sources, outputs
-        Names, in the order of all arrays.
-    effects
-        Share of the output's variance; the shares of one output add up to 1. Not a number for an output that is the
-        same for all samples [-].
-    resamples
-        The same from bootstrap resamples of the permutations [-].
-    permutations, dropped
-        Permutations used, and permutations dropped because one of their samples failed [-].
-    samples
-        Samples evaluated [-].
-    """
-
+    # Names, in the order of all arrays
     sources: tuple[str, ...]
     outputs: tuple[str, ...]
+    # Share of the output's variance; the shares of one output add up to 1. Not a number for an output that is the same
+    # for all samples [-].
     effects: Float[np.ndarray, "output source"]
-    resamples: Float[np.ndarray, "output resample source"]
+    resamples: Float[np.ndarray, "output resample source"]  # The same from bootstrap resamples of the permutations [-]
+    # Permutations used, and permutations dropped because one of their samples failed [-]
     permutations: int
     dropped: int
-    samples: int
+    samples: int  # Samples evaluated [-]
 
     def interval(self, output: int) -> Float[np.ndarray, "2 source"]:
         """Return the 90 % percentile interval of the effects on an output [-]."""

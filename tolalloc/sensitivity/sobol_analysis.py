@@ -16,28 +16,18 @@ from tolalloc.sensitivity.saltelli import SaltelliIndices
 
 @dataclass(frozen=True, kw_only=True)
 class SobolIndices(SourceRanking):
-    """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b".
+    """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b"."""
 
-    Parameters
-    ----------
-    first, first_resamples
-        First-order index, and the same from bootstrap resamples of the blocks [-].
-    pairs, second, second_resamples
-        Positions of the two sources of every pair, their second-order index, and the same from the resamples; no pairs
-        unless asked for [-].
-    dropped
-        Saltelli blocks dropped because one of their samples failed [-].
-    samples
-        Samples evaluated [-].
-    """
-
+    # First-order index, and the same from bootstrap resamples of the blocks [-]
     first: Float[np.ndarray, " source"]
     first_resamples: Float[np.ndarray, "resample source"]
+    # Positions of the two sources of every pair, their second-order index, and the same from the resamples; no pairs
+    # unless asked for [-]
     pairs: tuple[tuple[int, int], ...]
     second: Float[np.ndarray, " pair"]
     second_resamples: Float[np.ndarray, "resample pair"]
-    dropped: int
-    samples: int
+    dropped: int  # Saltelli blocks dropped because one of their samples failed [-]
+    samples: int  # Samples evaluated [-]
 
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -57,43 +47,21 @@ class SobolIndices(SourceRanking):
 
 @dataclass(frozen=True, kw_only=True)
 class OverallRanking(SourceRanking):
-    """One ranking over all outputs: the total index of a source is its largest one over the outputs that vary.
+    """One ranking over all outputs: the total index of a source is its largest one over the outputs that vary."""
 
-    Parameters
-    ----------
-    drives
-        Output for which each source has that index.
-    """
-
-    drives: tuple[str, ...]
+    drives: tuple[str, ...]  # Output for which each source has that index
 
 
 @dataclass(frozen=True, kw_only=True)
 class SobolAnalysis:
-    """Indices of all outputs from the same samples.
+    """Indices of all outputs from the same samples."""
 
-    Parameters
-    ----------
-    outputs
-        Names of the outputs with their units.
-    ranked
-        Those among them that count in the ranking over all.
-    sources
-        Names of the sources, or of the blocks of dependent ones.
-    indices
-        Indices of all outputs.
-    growth
-        How the order of the first places settled; one step for a fixed number of blocks.
-    samples
-        Samples evaluated [-].
-    """
-
-    outputs: tuple[str, ...]
-    ranked: tuple[str, ...]
-    sources: tuple[str, ...]
-    indices: SaltelliIndices
-    growth: Growth
-    samples: int
+    outputs: tuple[str, ...]  # Names of the outputs with their units
+    ranked: tuple[str, ...]  # Those among them that count in the ranking over all
+    sources: tuple[str, ...]  # Names of the sources, or of the blocks of dependent ones
+    indices: SaltelliIndices  # Indices of all outputs
+    growth: Growth  # How the order of the first places settled; one step for a fixed number of blocks
+    samples: int  # Samples evaluated [-]
 
     @property
     def blocks(self) -> int:
@@ -192,29 +160,18 @@ def overall_ranking(
 
 @dataclass(frozen=True, kw_only=True)
 class OrderContribution:
-    """Generalised Sobol indices of the wave of every order.
+    """Generalised Sobol indices of the wave of every order."""
 
-    Parameters
-    ----------
-    orders
-        Orders of the output turn [-].
-    sources
-        Names, in the order of all arrays.
-    first, total
-        Share of the wave's variance that a source gives alone, and in which it takes part; NaN for a wave that does
-        not vary [-].
-    first_resamples, total_resamples
-        The same from bootstrap resamples of the blocks [-].
-    deviation
-        Root of the sum of the variances of cosine and sine, the standard deviation of the wave [output].
-    """
-
-    orders: tuple[int, ...]
-    sources: tuple[str, ...]
+    orders: tuple[int, ...]  # Orders of the output turn [-]
+    sources: tuple[str, ...]  # Names, in the order of all arrays
+    # Share of the wave's variance that a source gives alone, and in which it takes part; NaN for a wave that does not
+    # vary [-]
     first: Float[np.ndarray, "order source"]
     total: Float[np.ndarray, "order source"]
+    # The same from bootstrap resamples of the blocks [-]
     first_resamples: Float[np.ndarray, "order resample source"]
     total_resamples: Float[np.ndarray, "order resample source"]
+    # Root of the sum of the variances of cosine and sine, the standard deviation of the wave [output]
     deviation: Float[np.ndarray, " order"]
 
     @property

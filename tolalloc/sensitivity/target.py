@@ -22,46 +22,25 @@ _CLASSES_PER_ROOT = 2
 
 @dataclass(frozen=True, kw_only=True)
 class TargetSensitivity:
-    """How each source takes part in the units beyond a threshold of the first output.
+    """How each source takes part in the units beyond a threshold of the first output."""
 
-    Parameters
-    ----------
-    sources
-        Names, in the order of all arrays.
-    threshold
-        Output beyond which a unit counts as outside [output].
-    is_limit
-        Whether the threshold is the limit; if not, it cuts off the worst 5 % of the units.
-    units, outside, failed
-        Good units, how many of them are outside, and units without a usable answer, which are left out [-].
-    first
-        First-order index of "is outside" given the measure that the drawing limits [-].
-    first_resamples
-        The same from resamples [-].
-    lift
-        Mean square of the standardised columns among the units outside over that of all units; 1 means no part [-].
-    lift_resamples
-        The same from bootstrap resamples of the units [-].
-    columns
-        Columns of each source that vary [-].
-    p_value
-        Share of random choices of as many units whose lift is as far from 1 or farther, two-sided [-].
-    median, median_outside
-        Median of the measure that the drawing limits, of all units and of those outside [m].
-    """
-
-    sources: tuple[str, ...]
-    threshold: float
-    is_limit: bool
+    sources: tuple[str, ...]  # Names, in the order of all arrays
+    threshold: float  # Output beyond which a unit counts as outside [output]
+    is_limit: bool  # Whether the threshold is the limit; if not, it cuts off the worst 5 % of the units
+    # Good units, how many of them are outside, and units without a usable answer, which are left out [-]
     units: int
     outside: int
     failed: int
+    # First-order index of "is outside" given the measure that the drawing limits [-]
     first: Float[np.ndarray, " source"]
-    first_resamples: Float[np.ndarray, "resample source"]
+    first_resamples: Float[np.ndarray, "resample source"]  # The same from resamples [-]
+    # Mean square of the standardised columns among the units outside over that of all units; 1 means no part [-]
     lift: Float[np.ndarray, " source"]
-    lift_resamples: Float[np.ndarray, "resample source"]
-    columns: Int[np.ndarray, " source"]
+    lift_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
+    columns: Int[np.ndarray, " source"]  # Columns of each source that vary [-]
+    # Share of random choices of as many units whose lift is as far from 1 or farther, two-sided [-]
     p_value: Float[np.ndarray, " source"]
+    # Median of the measure that the drawing limits, of all units and of those outside [m]
     median: Float[np.ndarray, " source"]
     median_outside: Float[np.ndarray, " source"]
 

@@ -22,26 +22,16 @@ _DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrderError:
-    """First order minus model at a change of what is uncertain.
+    """First order minus model at a change of what is uncertain."""
 
-    Parameters
-    ----------
-    root_mean_square, largest
-        Of the difference [output].
-    effect
-        Root-mean-square of what the same changes do to the output [output].
-    units, changes
-        Units and changes behind it [-].
-    accuracy
-        How well the model answers; no smaller difference means anything [output].
-    """
-
+    # Of the difference [output]
     root_mean_square: float
     largest: float
-    effect: float
+    effect: float  # Root-mean-square of what the same changes do to the output [output]
+    # Units and changes behind it [-]
     units: int
     changes: int
-    accuracy: float
+    accuracy: float  # How well the model answers; no smaller difference means anything [output]
 
     @property
     def fails(self) -> bool:
@@ -51,24 +41,12 @@ class FirstOrderError:
 
 @dataclass(frozen=True, kw_only=True)
 class UncertainEffect:
-    """What not knowing the model does to the output, and how well that is known.
+    """What not knowing the model does to the output, and how well that is known."""
 
-    Parameters
-    ----------
-    sources
-        What is uncertain.
-    sigma
-        Standard deviation of one unit's output from the sources alone, root-mean-square over units [output].
-    sigma_of_mean
-        Standard deviation of the mean over all units, which the sources shift together [output].
-    first_order
-        First order against model.
-    """
-
-    sources: tuple[CorrelatedSource, ...]
-    sigma: float
-    sigma_of_mean: float
-    first_order: FirstOrderError
+    sources: tuple[CorrelatedSource, ...]  # What is uncertain
+    sigma: float  # Standard deviation of one unit's output from the sources alone, root-mean-square over units [output]
+    sigma_of_mean: float  # Standard deviation of the mean over all units, which the sources shift together [output]
+    first_order: FirstOrderError  # First order against model
 
     def summary(self, total: float, unit: str) -> dict[str, Any]:
         """Return the effect for a program, with its total index in the ranking and the unit of the output."""

@@ -17,21 +17,11 @@ from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_va
 
 @dataclass(frozen=True, kw_only=True)
 class Gate:
-    """What a surrogate must reach on answers that it has not seen.
+    """What a surrogate must reach on answers that it has not seen."""
 
-    Parameters
-    ----------
-    q2
-        Smallest predictivity [-].
-    quantile_error
-        Largest error of the quantile over the quantile [-].
-    failed_share
-        Largest share of failed predictions [-].
-    """
-
-    q2: float = NEEDED_Q2
-    quantile_error: float = 0.02
-    failed_share: float = 0.01
+    q2: float = NEEDED_Q2  # Smallest predictivity [-]
+    quantile_error: float = 0.02  # Largest error of the quantile over the quantile [-]
+    failed_share: float = 0.01  # Largest share of failed predictions [-]
 
     def shortfalls(self, score: Score) -> tuple[str, ...]:
         """Return what a candidate fails in, one phrase each; nothing if it has earned its place."""
@@ -49,30 +39,14 @@ class Gate:
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Candidates, what they are worth, and the one that was chosen.
+    """Candidates, what they are worth, and the one that was chosen."""
 
-    Parameters
-    ----------
-    output
-        What is predicted, with its unit of measurement.
-    scores
-        One per candidate.
-    gate
-        What they had to reach.
-    failed
-        Answers to learn from that failed and were left out [-].
-    best
-        Place of the highest Q² among those that passed the gate, or among all if none did [-].
-    chosen
-        That candidate fitted to all answers; none if no candidate passed.
-    """
-
-    output: str
-    scores: tuple[Score, ...]
-    gate: Gate
-    failed: int
-    best: int
-    chosen: Response | None
+    output: str  # What is predicted, with its unit of measurement
+    scores: tuple[Score, ...]  # One per candidate
+    gate: Gate  # What they had to reach
+    failed: int  # Answers to learn from that failed and were left out [-]
+    best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
+    chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
 
     @property
     def reason(self) -> str:

@@ -28,28 +28,17 @@ Answers = Callable[[Float[np.ndarray, "sample variable"]], Float[np.ndarray, "sa
 
 @dataclass(frozen=True, kw_only=True)
 class BoxPolynomial:
-    """A fitted stand-in for a function with many outputs.
+    """A fitted stand-in for a function with many outputs."""
 
-    Parameters
-    ----------
-    lower, upper
-        The box [variable].
-    degrees
-        Degree of each term in each variable [-].
-    coefficients
-        Coefficient of each term for each output [output].
-    rms_error, largest_error
-        Root-mean-square and largest error on held-out answers, over all outputs [output].
-    trained, held_out
-        Numbers of answers [-].
-    """
-
+    # The box [variable]
     lower: Float[np.ndarray, " variable"]
     upper: Float[np.ndarray, " variable"]
-    degrees: Int[np.ndarray, "term variable"]
-    coefficients: Float[np.ndarray, "term output"]
+    degrees: Int[np.ndarray, "term variable"]  # Degree of each term in each variable [-]
+    coefficients: Float[np.ndarray, "term output"]  # Coefficient of each term for each output [output]
+    # Root-mean-square and largest error on held-out answers, over all outputs [output]
     rms_error: float
     largest_error: float
+    # Numbers of answers [-]
     trained: int
     held_out: int
 
@@ -170,22 +159,13 @@ def _no_baseline(x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " s
 
 @dataclass(frozen=True, kw_only=True)
 class Regression:
-    """A fitted regression in place of a response with one output.
+    """A fitted regression in place of a response with one output."""
 
-    Parameters
-    ----------
-    columns, outputs
-        As in `tolalloc.models.Response`.
-    estimator
-        The fitted scikit-learn estimator of the output over the baseline.
-    baseline
-        A rough answer that the estimator corrects.
-    """
-
+    # As in `tolalloc.models.Response`
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
-    estimator: Any
-    baseline: Baseline = _no_baseline
+    estimator: Any  # The fitted scikit-learn estimator of the output over the baseline
+    baseline: Baseline = _no_baseline  # A rough answer that the estimator corrects
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the predictions."""
@@ -222,22 +202,13 @@ class Surrogate(Regression):
 
 @dataclass(frozen=True, kw_only=True)
 class RegressionCandidate:
-    """A regression that may stand in for a response with one output.
+    """A regression that may stand in for a response with one output."""
 
-    Parameters
-    ----------
-    name
-        What a table calls it.
-    columns, outputs
-        As in `tolalloc.models.Response`.
-    estimator
-        Makes the unfitted scikit-learn regressor.
-    """
-
-    name: str
+    name: str  # What a table calls it
+    # As in `tolalloc.models.Response`
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
-    estimator: Callable[[], Any]
+    estimator: Callable[[], Any]  # Makes the unfitted scikit-learn regressor
 
     def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
         """Return the regression through answers."""

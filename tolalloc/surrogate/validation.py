@@ -41,27 +41,13 @@ class Candidate(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Answers:
-    """Good answers of a response, dealt out to folds.
+    """Good answers of a response, dealt out to folds."""
 
-    Parameters
-    ----------
-    x
-        Columns of every sample [m, angles rad].
-    y
-        The answers [output].
-    fold
-        Fold of every sample [-].
-    response
-        What gave the answers.
-    failed
-        Failed samples, which are left out [-].
-    """
-
-    x: Float[np.ndarray, "sample column"]
-    y: Float[np.ndarray, " sample"]
-    fold: Int[np.ndarray, " sample"]
-    response: Response
-    failed: int
+    x: Float[np.ndarray, "sample column"]  # Columns of every sample [m, angles rad]
+    y: Float[np.ndarray, " sample"]  # The answers [output]
+    fold: Int[np.ndarray, " sample"]  # Fold of every sample [-]
+    response: Response  # What gave the answers
+    failed: int  # Failed samples, which are left out [-]
 
     @property
     def splits(self) -> list[tuple[Bool[np.ndarray, " sample"], Bool[np.ndarray, " sample"]]]:
@@ -71,43 +57,20 @@ class Answers:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """What a candidate is worth on held-out answers.
+    """What a candidate is worth on held-out answers."""
 
-    Parameters
-    ----------
-    name
-        The candidate.
-    q2
-        Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) [-].
-    rms_error
-        Root-mean-square error [output].
-    quantile_error
-        Quantile of the predictions less that of the answers [output].
-    quantile
-        Quantile of the answers [output].
-    target
-        Share of the units below that quantile [-].
-    speed
-        Predictions in the time of one answer [-].
-    per_second
-        Predictions per second [1/s].
-    trained, held_out
-        Answers that each fit saw, at least; answers that were predicted [-].
-    failed
-        Failed predictions, which the errors leave out [-].
-    """
-
-    name: str
-    q2: float
-    rms_error: float
-    quantile_error: float
-    quantile: float
-    target: float
-    speed: float
-    per_second: float
+    name: str  # The candidate
+    q2: float  # Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) [-]
+    rms_error: float  # Root-mean-square error [output]
+    quantile_error: float  # Quantile of the predictions less that of the answers [output]
+    quantile: float  # Quantile of the answers [output]
+    target: float  # Share of the units below that quantile [-]
+    speed: float  # Predictions in the time of one answer [-]
+    per_second: float  # Predictions per second [1/s]
+    # Answers that each fit saw, at least; answers that were predicted [-]
     trained: int
     held_out: int
-    failed: int
+    failed: int  # Failed predictions, which the errors leave out [-]
 
     @property
     def quantile_share(self) -> float:

@@ -25,24 +25,12 @@ _DRAWN = 80
 
 @dataclass(frozen=True, kw_only=True)
 class FittedProcess:
-    """The points of one process and the forms through them.
+    """The points of one process and the forms through them."""
 
-    Parameters
-    ----------
-    name
-        Process, and the kind of callout if the points are for one kind alone.
-    points
-        Zones [µm] and costs.
-    forms
-        All forms that the points suffice for.
-    best
-        The form that a process cost table would take.
-    """
-
-    name: str
-    points: Points
-    forms: tuple[CostFit, ...]
-    best: CostFit
+    name: str  # Process, and the kind of callout if the points are for one kind alone
+    points: Points  # Zones [µm] and costs
+    forms: tuple[CostFit, ...]  # All forms that the points suffice for
+    best: CostFit  # The form that a process cost table would take
 
 
 def fitted_processes(shop: ShopPoints) -> tuple[FittedProcess, ...]:
@@ -74,16 +62,10 @@ def formula(model: ClosedForm) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class CostFitsAnswer(Answer):
-    """What the zones of a shop's processes cost.
-
-    Parameters
-    ----------
-    processes
-        The fits.
-    """
+    """What the zones of a shop's processes cost."""
 
     kind: ClassVar[str] = "costs"
-    processes: tuple[FittedProcess, ...]
+    processes: tuple[FittedProcess, ...]  # The fits
 
     @classmethod
     def of(cls, shop: ShopPoints, place: str) -> CostFitsAnswer:

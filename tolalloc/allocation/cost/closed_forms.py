@@ -19,21 +19,14 @@ Expression = Any
 class _FallingCost:
     """Parameters that all closed forms have.
 
-    Parameters
-    ----------
-    fixed
-        What the feature costs however wide its zone, a [cost units].
-    factor
-        What the falling part is multiplied by, b [cost units × (unit of the zone)ⁿ].
-
     Raises
     ------
     InputError
         A parameter with which the cost would not fall with the zone.
     """
 
-    fixed: float = 0.0
-    factor: float
+    fixed: float = 0.0  # What the feature costs however wide its zone, a [cost units]
+    factor: float  # What the falling part is multiplied by, b [cost units × (unit of the zone)ⁿ]
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -68,15 +61,9 @@ class Reciprocal(_FallingCost):
 
 @dataclass(frozen=True, kw_only=True)
 class ReciprocalPower(_FallingCost):
-    """Cost a + b·t⁻ⁿ.
+    """Cost a + b·t⁻ⁿ."""
 
-    Parameters
-    ----------
-    exponent
-        n [-].
-    """
-
-    exponent: float
+    exponent: float  # n [-]
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""
@@ -109,15 +96,9 @@ def reciprocal_squared(*, fixed: float = 0.0, factor: float) -> ReciprocalPower:
 
 @dataclass(frozen=True, kw_only=True)
 class Exponential(_FallingCost):
-    """Cost a + b·exp(−t/s).
+    """Cost a + b·exp(−t/s)."""
 
-    Parameters
-    ----------
-    scale
-        s, the change of the zone that divides the falling part by e [unit of the zone].
-    """
-
-    scale: float
+    scale: float  # s, the change of the zone that divides the falling part by e [unit of the zone]
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""
@@ -142,21 +123,14 @@ class Exponential(_FallingCost):
 class Combined(_FallingCost):
     """Cost a + b·t⁻ⁿ·exp(−t/s).
 
-    Parameters
-    ----------
-    exponent
-        n [-].
-    scale
-        s [unit of the zone].
-
     References
     ----------
     W. Michael, J. N. Siddall, The optimization problem with optimal tolerance assignment and full acceptance,
     J. Mech. Des. 103 (1981).
     """
 
-    exponent: float
-    scale: float
+    exponent: float  # n [-]
+    scale: float  # s [unit of the zone]
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""

@@ -28,23 +28,12 @@ _EXACT = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class CostFit:
-    """A closed form through points, and how well it keeps to them.
+    """A closed form through points, and how well it keeps to them."""
 
-    Parameters
-    ----------
-    model
-        The form with the parameters of the smallest relative errors.
-    errors
-        Relative error of the cost at every point [-].
-    unseen
-        The same where the point was left out of the fit [-].
-    smallest, largest
-        Zones between which there are points; beyond them the form is a guess [unit of the zone].
-    """
-
-    model: ClosedForm
-    errors: Float[np.ndarray, " point"]
-    unseen: Float[np.ndarray, " point"]
+    model: ClosedForm  # The form with the parameters of the smallest relative errors
+    errors: Float[np.ndarray, " point"]  # Relative error of the cost at every point [-]
+    unseen: Float[np.ndarray, " point"]  # The same where the point was left out of the fit [-]
+    # Zones between which there are points; beyond them the form is a guess [unit of the zone]
     smallest: float
     largest: float
 

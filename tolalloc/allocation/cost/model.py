@@ -39,27 +39,18 @@ class CostModel(Protocol):
 class Process:
     """One way to make a feature.
 
-    Parameters
-    ----------
-    name
-        Name of the process.
-    cost
-        Cost of the feature made in this way.
-    minimum, maximum
-        Smallest and largest zone that it can hold [unit of the zone].
-    change
-        Fixed cost of making the feature in this way, such as that of leaving today's process [cost units].
-
     Raises
     ------
     InputError
         Contradictory bounds, or a cost that grows with the zone.
     """
 
-    name: str
-    cost: CostModel
+    name: str  # Name of the process
+    cost: CostModel  # Cost of the feature made in this way
+    # Smallest and largest zone that it can hold [unit of the zone]
     minimum: float
     maximum: float
+    # Fixed cost of making the feature in this way, such as that of leaving today's process [cost units]
     change: float = 0.0
 
     def __post_init__(self) -> None:
@@ -85,18 +76,10 @@ class Process:
 
 @dataclass(frozen=True, kw_only=True)
 class Weighted:
-    """A cost model times a number, such as a price that may be off by a fifth.
+    """A cost model times a number, such as a price that may be off by a fifth."""
 
-    Parameters
-    ----------
-    model
-        The cost model.
-    weight
-        The number, above 0 [-].
-    """
-
-    model: CostModel
-    weight: float
+    model: CostModel  # The cost model
+    weight: float  # The number, above 0 [-]
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""
@@ -129,17 +112,10 @@ def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostM
 
 @dataclass(frozen=True, kw_only=True)
 class SumOfCosts:
-    """Cost of several callouts that are made in the same way and change together.
+    """Cost of several callouts that are made in the same way and change together."""
 
-    Parameters
-    ----------
-    models
-        Cost of each callout as a function of its own zone.
-    ratios
-        Zone of each callout over the common variable [unit of the zone per unit of the variable].
-    """
-
-    models: tuple[CostModel, ...]
+    models: tuple[CostModel, ...]  # Cost of each callout as a function of its own zone
+    # Zone of each callout over the common variable [unit of the zone per unit of the variable]
     ratios: tuple[float, ...]
 
     @cached_property

@@ -22,24 +22,15 @@ from tolalloc.exceptions import InputError, UnknownNameError
 class Points:
     """Zones and what they cost, the smallest zone first.
 
-    Parameters
-    ----------
-    zones
-        Zones, ascending; equal ones are the same zone priced more than once [unit of the zone].
-    costs
-        Their costs [cost units].
-    place
-        Where the points stand, for messages.
-
     Raises
     ------
     InputError
         Fewer than two zones, not in order, or a number that is not above 0.
     """
 
-    zones: tuple[float, ...]
-    costs: tuple[float, ...]
-    place: str = "cost points"
+    zones: tuple[float, ...]  # Zones, ascending; equal ones are the same zone priced more than once [unit of the zone]
+    costs: tuple[float, ...]  # Their costs [cost units]
+    place: str = "cost points"  # Where the points stand, for messages
 
     def __post_init__(self) -> None:
         if len(self.zones) != len(self.costs) or len(set(self.zones)) < 2:

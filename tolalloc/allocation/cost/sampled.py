@@ -23,18 +23,13 @@ OUTER_ERROR = 1e-6
 class Tabulated:
     """Cost on straight lines between points; the first and the last line go on beyond them.
 
-    Parameters
-    ----------
-    points
-        The points, falling.
-
     Raises
     ------
     InputError
         Points that rise with the zone.
     """
 
-    points: Points
+    points: Points  # The points, falling
 
     def __post_init__(self) -> None:
         self.points.require_falling()
@@ -73,11 +68,6 @@ class Tabulated:
 class Spline:
     """Cost on a monotone cubic spline through points; the tangents at both ends go on beyond them.
 
-    Parameters
-    ----------
-    points
-        The points, falling.
-
     Raises
     ------
     InputError
@@ -94,7 +84,7 @@ class Spline:
     SIAM J. Sci. Stat. Comput. 5 (1984).
     """
 
-    points: Points
+    points: Points  # The points, falling
 
     def __post_init__(self) -> None:
         self.points.require_falling()

@@ -16,13 +16,6 @@ from tolalloc.exceptions import InputError
 class QualityLoss:
     """What a unit costs its user although it is within its limit, growing with the square of the deviation.
 
-    Parameters
-    ----------
-    limit
-        Deviation from the best value at which the loss is `at_limit` [unit of the output].
-    at_limit
-        Loss of a unit at the limit, such as its repair [cost units].
-
     Raises
     ------
     InputError
@@ -33,8 +26,8 @@ class QualityLoss:
     G. Taguchi, E. A. Elsayed, T. C. Hsiang, Quality Engineering in Production Systems, McGraw-Hill (1989).
     """
 
-    limit: float
-    at_limit: float
+    limit: float  # Deviation from the best value at which the loss is `at_limit` [unit of the output]
+    at_limit: float  # Loss of a unit at the limit, such as its repair [cost units]
 
     def __post_init__(self) -> None:
         if not (isfinite(self.limit) and self.limit > 0):
@@ -58,27 +51,16 @@ class QualityLoss:
 class UnitPrice:
     """What becomes of units beyond the limit, and so what a good unit costs.
 
-    Parameters
-    ----------
-    inspection
-        Inspecting one unit [cost units].
-    rework_share
-        Share of the units beyond the limit that rework makes good; the others are scrapped [-].
-    rework
-        Reworking one unit [cost units].
-    scrap
-        Scrapping one unit, beyond what making it cost [cost units].
-
     Raises
     ------
     InputError
         A cost below 0 or a share outside 0 to 1.
     """
 
-    inspection: float = 0.0
-    rework_share: float = 0.0
-    rework: float = 0.0
-    scrap: float = 0.0
+    inspection: float = 0.0  # Inspecting one unit [cost units]
+    rework_share: float = 0.0  # Share of the units beyond the limit that rework makes good; the others are scrapped [-]
+    rework: float = 0.0  # Reworking one unit [cost units]
+    scrap: float = 0.0  # Scrapping one unit, beyond what making it cost [cost units]
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -116,21 +98,12 @@ class UnitPrice:
 
 @dataclass(frozen=True, kw_only=True)
 class YieldLadder:
-    """Prices of a good unit over yield targets.
+    """Prices of a good unit over yield targets."""
 
-    Parameters
-    ----------
-    targets
-        Yield targets [-].
-    manufacturing
-        Cheapest unit made to each target; not a number where no design is shown to reach it [cost units].
-    prices
-        Price of a good unit [cost units].
-    """
-
-    targets: Float[np.ndarray, " step"]
+    targets: Float[np.ndarray, " step"]  # Yield targets [-]
+    # Cheapest unit made to each target; not a number where no design is shown to reach it [cost units]
     manufacturing: Float[np.ndarray, " step"]
-    prices: Float[np.ndarray, " step"]
+    prices: Float[np.ndarray, " step"]  # Price of a good unit [cost units]
 
     @property
     def best(self) -> float:

@@ -29,24 +29,15 @@ _PROBED = 1e-6
 class Checkpoint:
     """A file that keeps the answers of a search.
 
-    Parameters
-    ----------
-    path
-        The file, new or written by the same search before.
-    every
-        New answers after which it is written [-].
-    question
-        Text that tells what is asked from everything else that has the same names and bounds.
-
     Raises
     ------
     InputError
         The number is below 1, there is no folder to write to, or the file is no complete checkpoint of this question.
     """
 
-    path: Path
-    every: int
-    question: str = ""
+    path: Path  # The file, new or written by the same search before
+    every: int  # New answers after which it is written [-]
+    question: str = ""  # Text that tells what is asked from everything else that has the same names and bounds
 
     def __post_init__(self) -> None:
         if self.every < 1:

@@ -73,40 +73,21 @@ def spread_over(count: int, number: int) -> list[int]:
 
 @dataclass(frozen=True, kw_only=True)
 class LeastViolating:
-    """The design whose violations sum up to the least.
+    """The design whose violations sum up to the least."""
 
-    Parameters
-    ----------
-    design
-        Its genes [unit of the gene].
-    violation
-        Violation of every constraint, as a share of what it allows; 0 or below is kept [-].
-    blocking
-        The constraint that is violated most, none if all are kept.
-    """
-
-    design: Float[np.ndarray, " gene"]
+    design: Float[np.ndarray, " gene"]  # Its genes [unit of the gene]
+    # Violation of every constraint, as a share of what it allows; 0 or below is kept [-]
     violation: Float[np.ndarray, " constraint"]
-    blocking: str | None
+    blocking: str | None  # The constraint that is violated most, none if all are kept
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchedDesigns:
-    """Designs with their answers.
+    """Designs with their answers."""
 
-    Parameters
-    ----------
-    problem
-        What was searched.
-    designs
-        Genes [unit of the gene].
-    answers
-        Objectives and violations.
-    """
-
-    problem: ParetoProblem
-    designs: Float[np.ndarray, "design gene"]
-    answers: Objectives
+    problem: ParetoProblem  # What was searched
+    designs: Float[np.ndarray, "design gene"]  # Genes [unit of the gene]
+    answers: Objectives  # Objectives and violations
 
     @property
     def losses(self) -> Float[np.ndarray, "design objective"]:

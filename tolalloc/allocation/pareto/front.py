@@ -21,33 +21,15 @@ from tolalloc.surrogate.validation import FOLDS, Answers, answers_of, cross_vali
 
 @dataclass(frozen=True, kw_only=True)
 class Front:
-    """Designs of which none is better in every objective, smallest quantile first.
+    """Designs of which none is better in every objective, smallest quantile first."""
 
-    Parameters
-    ----------
-    designs
-        Scales [-] and clearances [µm].
-    cost
-        Cost [cost units].
-    quantile
-        Quantile of the peak-to-peak that the search was told [arcsec].
-    on_kernel
-        The same on the real kernel where it was run, NaN elsewhere [arcsec].
-    further
-        Further objectives [as their names state].
-    knee
-        Position of the design where the front bends most [-].
-    failed
-        Designs that failed on the kernel, in all rounds [-].
-    """
-
-    designs: Float[np.ndarray, "design variable"]
-    cost: Float[np.ndarray, " design"]
-    quantile: Float[np.ndarray, " design"]
-    on_kernel: Float[np.ndarray, " design"]
-    further: Float[np.ndarray, "design criterion"]
-    knee: int
-    failed: int
+    designs: Float[np.ndarray, "design variable"]  # Scales [-] and clearances [µm]
+    cost: Float[np.ndarray, " design"]  # Cost [cost units]
+    quantile: Float[np.ndarray, " design"]  # Quantile of the peak-to-peak that the search was told [arcsec]
+    on_kernel: Float[np.ndarray, " design"]  # The same on the real kernel where it was run, NaN elsewhere [arcsec]
+    further: Float[np.ndarray, "design criterion"]  # Further objectives [as their names state]
+    knee: int  # Position of the design where the front bends most [-]
+    failed: int  # Designs that failed on the kernel, in all rounds [-]
 
     @property
     def rms_error(self) -> float:

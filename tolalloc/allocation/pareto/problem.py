@@ -20,25 +20,17 @@ from tolalloc.models import Response
 class Genes:
     """What the search may change.
 
-    Parameters
-    ----------
-    names
-        Names of the genes.
-    lower, upper
-        Their bounds [unit of the gene].
-    integer
-        Which genes are positions on a ladder of choices, counted from 0 [-].
-
     Raises
     ------
     InputError
         Bounds that contradict each other.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Names of the genes
+    # Their bounds [unit of the gene]
     lower: Float[np.ndarray, " gene"]
     upper: Float[np.ndarray, " gene"]
-    integer: Bool[np.ndarray, " gene"]
+    integer: Bool[np.ndarray, " gene"]  # Which genes are positions on a ladder of choices, counted from 0 [-]
 
     def __post_init__(self) -> None:
         for name, lower, upper in zip(self.names, self.lower, self.upper, strict=True):
@@ -55,18 +47,10 @@ class Genes:
 
 @dataclass(frozen=True, kw_only=True)
 class Objective:
-    """One thing to be made small or large.
+    """One thing to be made small or large."""
 
-    Parameters
-    ----------
-    name
-        Its name with its unit.
-    better
-        Which end is the good one.
-    """
-
-    name: str
-    better: Literal["small", "large"] = "small"
+    name: str  # Its name with its unit
+    better: Literal["small", "large"] = "small"  # Which end is the good one
 
     @property
     def sign(self) -> float:
@@ -76,20 +60,12 @@ class Objective:
 
 @dataclass(frozen=True, kw_only=True)
 class Objectives:
-    """Answers of a problem.
+    """Answers of a problem."""
 
-    Parameters
-    ----------
-    values
-        Objectives [as their names state].
-    violation
-        By how much each constraint is violated, as a share of what it allows; 0 or below is kept [-].
-    status
-        0 for a good design; anything else is a failed one, whose numbers must not be used [-].
-    """
-
-    values: Float[np.ndarray, "design objective"]
+    values: Float[np.ndarray, "design objective"]  # Objectives [as their names state]
+    # By how much each constraint is violated, as a share of what it allows; 0 or below is kept [-]
     violation: Float[np.ndarray, "design constraint"]
+    # 0 for a good design; anything else is a failed one, whose numbers must not be used [-]
     status: UInt8[np.ndarray, " design"]
 
     @property
@@ -151,17 +127,10 @@ def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Fl
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """A further objective.
+    """A further objective."""
 
-    Parameters
-    ----------
-    objective
-        What is made small or large.
-    value
-        Its values at designs, NaN where it failed.
-    """
-
-    objective: Objective
+    objective: Objective  # What is made small or large
+    # Its values at designs, NaN where it failed
     value: Callable[[Float[np.ndarray, "design variable"]], Float[np.ndarray, " design"]]
 
 
@@ -174,19 +143,6 @@ def large(setting: str, column: int) -> Criterion:
 class DesignProblem:
     """Cost against the quantile of the leading output, and whatever else is asked for.
 
-    Parameters
-    ----------
-    space
-        The design variables.
-    quantile
-        Quantile of designs: the real kernel or what stands in for it.
-    ladders
-        Group → the scales that it may have, rising; other groups have every scale within their bounds [-].
-    further
-        Further objectives.
-    sides
-        Limited sides of other requirements, kept by their local models.
-
     Raises
     ------
     InputError
@@ -195,11 +151,12 @@ class DesignProblem:
         A ladder of no group.
     """
 
-    space: DesignSpace
-    quantile: Response
+    space: DesignSpace  # The design variables
+    quantile: Response  # Quantile of designs: the real kernel or what stands in for it
+    # Group → the scales that it may have, rising; other groups have every scale within their bounds [-]
     ladders: Ladders = field(default_factory=dict)
-    further: tuple[Criterion, ...] = ()
-    sides: tuple[Side, ...] = ()
+    further: tuple[Criterion, ...] = ()  # Further objectives
+    sides: tuple[Side, ...] = ()  # Limited sides of other requirements, kept by their local models
 
     def __post_init__(self) -> None:
         for group, ladder in self.ladders.items():

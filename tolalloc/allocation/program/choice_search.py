@@ -168,21 +168,11 @@ _SECTIONS = 4
 
 @dataclass(frozen=True, kw_only=True)
 class ProvenChoice:
-    """What is taken out of every group, with the proof.
+    """What is taken out of every group, with the proof."""
 
-    Parameters
-    ----------
-    taken
-        Position of the choice of every group [-].
-    cost
-        Its cost [cost units].
-    bound
-        Lower bound on the cost of every allowed choice [cost units].
-    """
-
-    taken: Int[np.ndarray, " group"]
-    cost: float
-    bound: float
+    taken: Int[np.ndarray, " group"]  # Position of the choice of every group [-]
+    cost: float  # Its cost [cost units]
+    bound: float  # Lower bound on the cost of every allowed choice [cost units]
 
 
 def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None:

@@ -24,24 +24,12 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """A zone that a feature may get, made by one of its processes.
+    """A zone that a feature may get, made by one of its processes."""
 
-    Parameters
-    ----------
-    process
-        Position of the process [-].
-    zone
-        The zone [unit of the zone].
-    label
-        Its name on the drawing.
-    cost
-        Its cost with the fixed part and the quality loss [cost units].
-    """
-
-    process: int
-    zone: float
-    label: str
-    cost: float
+    process: int  # Position of the process [-]
+    zone: float  # The zone [unit of the zone]
+    label: str  # Its name on the drawing
+    cost: float  # Its cost with the fixed part and the quality loss [cost units]
 
 
 def feature_options(
@@ -74,30 +62,15 @@ def feature_options(
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteSolution:
-    """One option of every feature and values of the shared variables, with what proves how good they are.
+    """One option of every feature and values of the shared variables, with what proves how good they are."""
 
-    Parameters
-    ----------
-    options
-        The chosen option of every feature.
-    shared
-        Values of the shared variables [unit of the variable].
-    cost
-        Cost [cost units].
-    bound
-        Lower bound on the cost of every allowed choice, infinite where none is allowed [cost units].
-    slack
-        Budget that every stack has left, below zero where it is broken [unit of the stack].
-    tightest
-        The stack with the least slack over its scale; where stacks are broken, the one that blocks most.
-    """
-
-    options: tuple[Option, ...]
-    shared: Float[np.ndarray, " shared"]
-    cost: float
-    bound: float
+    options: tuple[Option, ...]  # The chosen option of every feature
+    shared: Float[np.ndarray, " shared"]  # Values of the shared variables [unit of the variable]
+    cost: float  # Cost [cost units]
+    bound: float  # Lower bound on the cost of every allowed choice, infinite where none is allowed [cost units]
+    # Budget that every stack has left, below zero where it is broken [unit of the stack]
     slack: Float[np.ndarray, " stack"]
-    tightest: str
+    tightest: str  # The stack with the least slack over its scale; where stacks are broken, the one that blocks most
 
     @property
     def zones(self) -> Float[np.ndarray, " feature"]:
@@ -119,23 +92,15 @@ class DiscreteSolution:
 class DiscreteProblem:
     """An allocation problem in which every feature takes one of its options.
 
-    Parameters
-    ----------
-    problem
-        Features, stacks and shared variables.
-    options
-        Options of every feature; a locked one has a single option.
-    grids
-        Values that every shared variable may take; those outside its bounds are left out.
-
     Raises
     ------
     InputError
         A feature without an option, or a grid without a value inside the bounds.
     """
 
-    problem: AllocationProblem
-    options: tuple[tuple[Option, ...], ...]
+    problem: AllocationProblem  # Features, stacks and shared variables
+    options: tuple[tuple[Option, ...], ...]  # Options of every feature; a locked one has a single option
+    # Values that every shared variable may take; those outside its bounds are left out
     grids: tuple[Float[np.ndarray, " _value"], ...] = ()
 
     def __post_init__(self) -> None:

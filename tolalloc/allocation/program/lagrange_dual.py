@@ -20,29 +20,15 @@ _ROUNDS = 4
 
 @dataclass(frozen=True, kw_only=True)
 class PricedProcesses:
-    """The dual at one set of multipliers, for all processes of all features at once.
+    """The dual at one set of multipliers, for all processes of all features at once."""
 
-    Parameters
-    ----------
-    least
-        Lower bound on the cost of every process plus the price of its zone, over its whole range [cost units].
-    zones
-        Zone where that is reached [unit of the zone].
-    shared
-        Shared variables where their price is least [unit of the variable].
-    constant
-        What no process changes [cost units].
-    prices
-        Price of every stack's budget [cost units per unit of the stack].
-    planes
-        Direction whose supporting plane stands for the norm of every stack [-].
-    """
-
+    # Lower bound on the cost of every process plus the price of its zone, over its whole range [cost units]
     least: Float[np.ndarray, " process"]
-    zones: Float[np.ndarray, " process"]
-    shared: Float[np.ndarray, " shared"]
-    constant: float
-    prices: Float[np.ndarray, " stack"]
+    zones: Float[np.ndarray, " process"]  # Zone where that is reached [unit of the zone]
+    shared: Float[np.ndarray, " shared"]  # Shared variables where their price is least [unit of the variable]
+    constant: float  # What no process changes [cost units]
+    prices: Float[np.ndarray, " stack"]  # Price of every stack's budget [cost units per unit of the stack]
+    # Direction whose supporting plane stands for the norm of every stack [-]
     planes: Float[np.ndarray, "stack feature"]
 
 

@@ -30,25 +30,14 @@ class MultipleChoice:
     """Groups of choices, and what each adds to the stacks.
 
     With z one where a choice is taken and zero elsewhere, a stack reads Σ worst_case·z + √(Σ squares·z) ≤ budget.
-
-    Parameters
-    ----------
-    group
-        Group of every choice, ascending from 0 [-].
-    cost
-        Cost of every choice [cost units].
-    worst_case
-        What it adds to a stack, over the stack's scale [-].
-    squares
-        Square of what it adds in quadrature, 0 or above, over the square of that scale [-].
-    budget
-        Budget of every stack over its scale, which makes budgets and what is added of order one [-].
     """
 
-    group: Int[np.ndarray, " choice"]
-    cost: Float[np.ndarray, " choice"]
-    worst_case: Float[np.ndarray, "stack choice"]
+    group: Int[np.ndarray, " choice"]  # Group of every choice, ascending from 0 [-]
+    cost: Float[np.ndarray, " choice"]  # Cost of every choice [cost units]
+    worst_case: Float[np.ndarray, "stack choice"]  # What it adds to a stack, over the stack's scale [-]
+    # Square of what it adds in quadrature, 0 or above, over the square of that scale [-]
     squares: Float[np.ndarray, "stack choice"]
+    # Budget of every stack over its scale, which makes budgets and what is added of order one [-]
     budget: Float[np.ndarray, " stack"]
 
     @cached_property

@@ -21,24 +21,15 @@ _TIE = 1e-9
 class PricedFeature:
     """One zone to be chosen: of one callout, or of a group of callouts that change together.
 
-    Parameters
-    ----------
-    name
-        Name of the feature or group.
-    processes
-        Ways to make it, one of which is chosen.
-    loss
-        Quality loss per zone², 0 or above [cost units per unit²].
-
     Raises
     ------
     InputError
         There is no process, or the loss is negative.
     """
 
-    name: str
-    processes: tuple[Process, ...]
-    loss: float = 0.0
+    name: str  # Name of the feature or group
+    processes: tuple[Process, ...]  # Ways to make it, one of which is chosen
+    loss: float = 0.0  # Quality loss per zone², 0 or above [cost units per unit²]
 
     def __post_init__(self) -> None:
         if not self.processes:
@@ -51,29 +42,19 @@ class PricedFeature:
 class Stack:
     """A tolerance stack: worst_case·zones + ‖root_sum_square∘zones‖₂ + slopes·shared ≤ budget.
 
-    Parameters
-    ----------
-    name
-        What the stack keeps.
-    worst_case
-        What a feature adds per zone in the worst case, 0 or above [unit of the stack per unit of the zone].
-    root_sum_square
-        What a feature adds per zone in quadrature, 0 or above [unit of the stack per unit of the zone].
-    budget
-        Largest value allowed [unit of the stack].
-    slopes
-        Change with the shared variables [unit of the stack per unit of the variable].
-
     Raises
     ------
     InputError
         A zone would relieve the stack.
     """
 
-    name: str
+    name: str  # What the stack keeps
+    # What a feature adds per zone in the worst case, 0 or above [unit of the stack per unit of the zone]
     worst_case: Float[np.ndarray, " feature"]
+    # What a feature adds per zone in quadrature, 0 or above [unit of the stack per unit of the zone]
     root_sum_square: Float[np.ndarray, " feature"]
-    budget: float
+    budget: float  # Largest value allowed [unit of the stack]
+    # Change with the shared variables [unit of the stack per unit of the variable]
     slopes: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
@@ -91,38 +72,21 @@ class Stack:
 
 @dataclass(frozen=True, kw_only=True)
 class Shared:
-    """Variables that move all stacks at once and cost nothing, such as the two clearances of the modification.
+    """Variables that move all stacks at once and cost nothing, such as the two clearances of the modification."""
 
-    Parameters
-    ----------
-    names
-        Their names.
-    lower, upper
-        Their bounds, in a unit that makes them of order one [unit of the variable].
-    """
-
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  # Their names
+    # Their bounds, in a unit that makes them of order one [unit of the variable]
     lower: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
     upper: Float[np.ndarray, " shared"] = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class AllocationProblem:
-    """Features and stacks: least cost such that every stack stays within its budget.
+    """Features and stacks: least cost such that every stack stays within its budget."""
 
-    Parameters
-    ----------
-    features
-        What is chosen.
-    stacks
-        What must be kept.
-    shared
-        Variables that belong to no feature.
-    """
-
-    features: tuple[PricedFeature, ...]
-    stacks: tuple[Stack, ...]
-    shared: Shared = field(default_factory=Shared)
+    features: tuple[PricedFeature, ...]  # What is chosen
+    stacks: tuple[Stack, ...]  # What must be kept
+    shared: Shared = field(default_factory=Shared)  # Variables that belong to no feature
 
     @cached_property
     def losses(self) -> Float[np.ndarray, " feature"]:
@@ -154,33 +118,17 @@ class AllocationProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """Zones and processes, with what proves how good they are.
+    """Zones and processes, with what proves how good they are."""
 
-    Parameters
-    ----------
-    zones
-        Zone of every feature [unit of the zone].
-    processes
-        Position of the chosen process of every feature [-].
-    shared
-        Values of the shared variables [unit of the variable].
-    cost
-        Cost [cost units].
-    bound
-        Lower bound on the cost of every allowed choice, computed without the solver [cost units].
-    prices
-        Shadow price of every stack: cost saved per unit of budget [cost units per unit of the stack].
-    bound_prices
-        Shadow price of the smallest and the largest zone of every feature: cost saved by moving that bound outwards
-        [cost units per unit of the zone].
-    """
-
-    zones: Float[np.ndarray, " feature"]
-    processes: Int[np.ndarray, " feature"]
-    shared: Float[np.ndarray, " shared"]
-    cost: float
-    bound: float
+    zones: Float[np.ndarray, " feature"]  # Zone of every feature [unit of the zone]
+    processes: Int[np.ndarray, " feature"]  # Position of the chosen process of every feature [-]
+    shared: Float[np.ndarray, " shared"]  # Values of the shared variables [unit of the variable]
+    cost: float  # Cost [cost units]
+    bound: float  # Lower bound on the cost of every allowed choice, computed without the solver [cost units]
+    # Shadow price of every stack: cost saved per unit of budget [cost units per unit of the stack]
     prices: Float[np.ndarray, " stack"]
+    # Shadow price of the smallest and the largest zone of every feature: cost saved by moving that bound outwards [cost
+    # units per unit of the zone]
     bound_prices: Float[np.ndarray, "feature 2"]
 
     @property
@@ -191,27 +139,14 @@ class Solution:
 
 @dataclass(frozen=True, kw_only=True)
 class LeastInfeasible:
-    """The design whose largest violation is smallest.
+    """The design whose largest violation is smallest."""
 
-    Parameters
-    ----------
-    zones
-        Smallest zone of every feature [unit of the zone].
-    processes
-        Position of the process that holds it [-].
-    shared
-        Values of the shared variables [unit of the variable].
-    violations
-        By how much every stack exceeds its budget, over the stack's scale; negative where it is kept [-].
-    blocking
-        Names of the stacks with the largest violation.
-    """
-
-    zones: Float[np.ndarray, " feature"]
-    processes: Int[np.ndarray, " feature"]
-    shared: Float[np.ndarray, " shared"]
+    zones: Float[np.ndarray, " feature"]  # Smallest zone of every feature [unit of the zone]
+    processes: Int[np.ndarray, " feature"]  # Position of the process that holds it [-]
+    shared: Float[np.ndarray, " shared"]  # Values of the shared variables [unit of the variable]
+    # By how much every stack exceeds its budget, over the stack's scale; negative where it is kept [-]
     violations: Float[np.ndarray, " stack"]
-    blocking: tuple[str, ...]
+    blocking: tuple[str, ...]  # Names of the stacks with the largest violation
 
     @property
     def largest(self) -> float:

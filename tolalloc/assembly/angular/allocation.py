@@ -21,36 +21,18 @@ from tolalloc.units import ARCSECOND
 
 @dataclass(frozen=True, kw_only=True)
 class AngularAllocation:
-    """Cheapest tolerances for fixed gains of the adjustment.
+    """Cheapest tolerances for fixed gains of the adjustment."""
 
-    Parameters
-    ----------
-    gains
-        Gains of the adjustment, and what they leave of part errors and noise.
-    tolerances
-        Tolerance of every part about its own axes, ±, three standard deviations [rad].
-    cost
-        Cost of the tolerances [cost units].
-    effort_cost
-        Price of the expected effort [cost units].
-    bound
-        Lower bound on the total of all tolerances that keep the limits with these gains; no solver's word [cost units].
-    limits
-        What is limited.
-    spread
-        Three standard deviations of what is limited [rad].
-    prices
-        Cost saved by widening every limit [cost units/rad].
-    """
-
-    gains: Gains
+    gains: Gains  # Gains of the adjustment, and what they leave of part errors and noise
+    # Tolerance of every part about its own axes, ±, three standard deviations [rad]
     tolerances: Float[np.ndarray, "part 3"]
-    cost: float
-    effort_cost: float
+    cost: float  # Cost of the tolerances [cost units]
+    effort_cost: float  # Price of the expected effort [cost units]
+    # Lower bound on the total of all tolerances that keep the limits with these gains; no solver's word [cost units]
     bound: float
-    limits: AngularLimits
-    spread: Float[np.ndarray, " limit"]
-    prices: Float[np.ndarray, " limit"]
+    limits: AngularLimits  # What is limited
+    spread: Float[np.ndarray, " limit"]  # Three standard deviations of what is limited [rad]
+    prices: Float[np.ndarray, " limit"]  # Cost saved by widening every limit [cost units/rad]
 
     @property
     def total(self) -> float:
@@ -131,27 +113,13 @@ def _refusal(plan: AssemblyPlan, gains: Gains) -> InputError:
 
 @dataclass(frozen=True, kw_only=True)
 class AngularVerification:
-    """What a sample of assemblies shows of an allocation.
+    """What a sample of assemblies shows of an allocation."""
 
-    Parameters
-    ----------
-    assemblies
-        Number of assemblies [-].
-    spread
-        Three standard deviations of what is limited [rad].
-    standard_error
-        Standard error of the spread [rad].
-    shares
-        Share of the assemblies within each limit.
-    share
-        Share within all limits at once.
-    """
-
-    assemblies: int
-    spread: Float[np.ndarray, " limit"]
-    standard_error: Float[np.ndarray, " limit"]
-    shares: tuple[ShareInterval, ...]
-    share: ShareInterval
+    assemblies: int  # Number of assemblies [-]
+    spread: Float[np.ndarray, " limit"]  # Three standard deviations of what is limited [rad]
+    standard_error: Float[np.ndarray, " limit"]  # Standard error of the spread [rad]
+    shares: tuple[ShareInterval, ...]  # Share of the assemblies within each limit
+    share: ShareInterval  # Share within all limits at once
 
 
 def verify_angles(

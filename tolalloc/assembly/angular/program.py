@@ -19,20 +19,11 @@ from tolalloc.units import ARCSECOND
 
 @dataclass(frozen=True, kw_only=True)
 class AngularLimits:
-    """Limits of three standard deviations of the final angles.
+    """Limits of three standard deviations of the final angles."""
 
-    Parameters
-    ----------
-    names
-        What each limits, such as ``tilt of disc``.
-    values
-        The limits [rad].
-    counted
-        1 for the states whose variances add up to the limited one, 0 for the others [-].
-    """
-
-    names: tuple[str, ...]
-    values: Float[np.ndarray, " limit"]
+    names: tuple[str, ...]  # What each limits, such as ``tilt of disc``
+    values: Float[np.ndarray, " limit"]  # The limits [rad]
+    # 1 for the states whose variances add up to the limited one, 0 for the others [-]
     counted: Float[np.ndarray, "limit state"]
 
     def by_tolerance(self, errors: FinalErrors) -> Float[np.ndarray, "limit error"]:

@@ -22,18 +22,10 @@ _PRECISION_SETTLED = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class RetunedAllocation:
-    """Allocations with filters that expect the tolerances of the one before.
+    """Allocations with filters that expect the tolerances of the one before."""
 
-    Parameters
-    ----------
-    allocations
-        The allocations; the first filter expects the plan's own tolerances.
-    settled
-        Whether the last filter expects the tolerances that are allocated with it.
-    """
-
-    allocations: tuple[AngularAllocation, ...]
-    settled: bool
+    allocations: tuple[AngularAllocation, ...]  # The allocations; the first filter expects the plan's own tolerances
+    settled: bool  # Whether the last filter expects the tolerances that are allocated with it
 
     @property
     def best(self) -> AngularAllocation:
@@ -78,24 +70,13 @@ def retuned_allocation(
 
 @dataclass(frozen=True, kw_only=True)
 class PrecisionCost:
-    """Costs over the precision, and the allocation at the best one.
+    """Costs over the precision, and the allocation at the best one."""
 
-    Parameters
-    ----------
-    precisions
-        Q [-].
-    cost
-        Cost of the tolerances; not a number where none keep the limits [cost units].
-    effort_cost
-        Price of the expected effort; likewise [cost units].
-    best
-        Allocation at the best precision.
-    """
-
-    precisions: Float[np.ndarray, " precision"]
+    precisions: Float[np.ndarray, " precision"]  # Q [-]
+    # Cost of the tolerances; not a number where none keep the limits [cost units]
     cost: Float[np.ndarray, " precision"]
-    effort_cost: Float[np.ndarray, " precision"]
-    best: AngularAllocation
+    effort_cost: Float[np.ndarray, " precision"]  # Price of the expected effort; likewise [cost units]
+    best: AngularAllocation  # Allocation at the best precision
 
     @property
     def total(self) -> Float[np.ndarray, " precision"]:

@@ -25,35 +25,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustedParts:
-    """Parts whose errors are known, and what is turned.
+    """Parts whose errors are known, and what is turned."""
 
-    Parameters
-    ----------
-    name
-        Where the errors come from.
-    errors
-        Error of every part about its own axes [rad].
-    sequence
-        The assembly step by step.
-    unadjusted
-        Final state if nothing is turned [rad].
-    exact
-        The same by finite rotations [rad].
-    missed
-        Standard deviation of what the listed turns miss in the end [rad].
-    norms
-        Weighted norm of the final errors over the precisions of the sweep [rad].
-    keeping
-        Smallest precision tried at which they keep all limits; none if none of them does, or nothing is limited [-].
-    """
-
-    name: str
-    errors: Float[np.ndarray, "part 3"]
-    sequence: Trajectory
-    unadjusted: Float[np.ndarray, "part 3"]
-    exact: Float[np.ndarray, "part 3"]
-    missed: Float[np.ndarray, "part 3"]
-    norms: Float[np.ndarray, " precision"]
+    name: str  # Where the errors come from
+    errors: Float[np.ndarray, "part 3"]  # Error of every part about its own axes [rad]
+    sequence: Trajectory  # The assembly step by step
+    unadjusted: Float[np.ndarray, "part 3"]  # Final state if nothing is turned [rad]
+    exact: Float[np.ndarray, "part 3"]  # The same by finite rotations [rad]
+    missed: Float[np.ndarray, "part 3"]  # Standard deviation of what the listed turns miss in the end [rad]
+    norms: Float[np.ndarray, " precision"]  # Weighted norm of the final errors over the precisions of the sweep [rad]
+    # Smallest precision tried at which they keep all limits; none if none of them does, or nothing is limited [-]
     keeping: float | None
 
     @property
@@ -64,70 +45,34 @@ class AdjustedParts:
 
 @dataclass(frozen=True, kw_only=True)
 class AngularTolerances:
-    """Cheapest angular tolerances.
+    """Cheapest angular tolerances."""
 
-    Parameters
-    ----------
-    adjusted
-        At the plan's precision, with the filter that expects the plan's tolerances.
-    unadjusted
-        The same if nothing is turned, or why there are none.
-    retuned
-        With the filter tuned again to what was allocated.
-    verified
-        The cheapest of them: with priced effort that at the best precision.
-    verification
-        Assemblies at random with it.
-    by_precision
-        Costs over the precision, effort included.
-    """
-
-    adjusted: AngularAllocation
-    unadjusted: AngularAllocation | str
-    retuned: RetunedAllocation
-    verified: AngularAllocation
-    verification: AngularVerification
-    by_precision: PrecisionCost
+    adjusted: AngularAllocation  # At the plan's precision, with the filter that expects the plan's tolerances
+    unadjusted: AngularAllocation | str  # The same if nothing is turned, or why there are none
+    retuned: RetunedAllocation  # With the filter tuned again to what was allocated
+    verified: AngularAllocation  # The cheapest of them: with priced effort that at the best precision
+    verification: AngularVerification  # Assemblies at random with it
+    by_precision: PrecisionCost  # Costs over the precision, effort included
 
 
 @dataclass(frozen=True, kw_only=True)
 class AssemblyAnswer(Answer):
-    """One assembly: what is turned, what it leaves, what that does, and what angular tolerances cost.
-
-    Parameters
-    ----------
-    plan
-        What was asked.
-    gains
-        What is turned at every step, per angle, and what that leaves.
-    sweep
-        What is to be expected over the precision.
-    expected
-        Standard deviation of every angle after each step, step by step: with the part as mounted, and as adjusted
-        [rad].
-    fewer
-        Root of the sum of the variances of all final angles if every step turned the part that it mounts alone; none if
-        the plan does that [rad].
-    measured
-        Parts whose errors are known, if any are.
-    transmission
-        What it does to the transmission, if the chain names a reducer.
-    tolerances
-        Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep.
-    unreachable
-        Why there are none; empty unless limits are out of reach.
-    """
+    """One assembly: what is turned, what it leaves, what that does, and what angular tolerances cost."""
 
     kind: ClassVar[str] = "assembly"
-    plan: AssemblyPlan
-    gains: Gains
-    sweep: PrecisionSweep
+    plan: AssemblyPlan  # What was asked
+    gains: Gains  # What is turned at every step, per angle, and what that leaves
+    sweep: PrecisionSweep  # What is to be expected over the precision
+    # Standard deviation of every angle after each step, step by step: with the part as mounted, and as adjusted [rad]
     expected: Float[np.ndarray, "step 2 state"]
+    # Root of the sum of the variances of all final angles if every step turned the part that it mounts alone; none if
+    # the plan does that [rad]
     fewer: float | None
-    measured: AdjustedParts | None
-    transmission: TransmissionEffect | None
+    measured: AdjustedParts | None  # Parts whose errors are known, if any are
+    transmission: TransmissionEffect | None  # What it does to the transmission, if the chain names a reducer
+    # Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep
     tolerances: AngularTolerances | None
-    unreachable: str
+    unreachable: str  # Why there are none; empty unless limits are out of reach
 
     @property
     def title(self) -> str:

@@ -20,48 +20,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class MountingResult:
-    """The mounting that was found.
+    """The mounting that was found."""
 
-    Parameters
-    ----------
-    stock
-        The parts.
-    mountings
-        Part and turn at every place of every unit.
-    before, after
-        Peak-to-peak of every unit with its parts as they come, infinite where it failed, and as found [arcsec].
-    history
-        Mean over the units after each step that improved it, from the start that led to the answer [arcsec].
-    evaluations, failures
-        Units evaluated, and those of them without an answer [-].
-    """
-
-    stock: PartStock
-    mountings: Mountings
+    stock: PartStock  # The parts
+    mountings: Mountings  # Part and turn at every place of every unit
+    # Peak-to-peak of every unit with its parts as they come, infinite where it failed, and as found [arcsec]
     before: Float[np.ndarray, " unit"]
     after: Float[np.ndarray, " unit"]
+    # Mean over the units after each step that improved it, from the start that led to the answer [arcsec]
     history: tuple[float, ...]
+    # Units evaluated, and those of them without an answer [-]
     evaluations: int
     failures: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class RandomMountings:
-    """What the same parts do when nobody chooses.
+    """What the same parts do when nobody chooses."""
 
-    Parameters
-    ----------
-    peak_to_peaks
-        Peak-to-peak of every unit of every mounting, infinite where it failed [arcsec].
-    failures
-        Units without an answer [-].
-    every
-        Whether these are all mountings there are, each once.
-    """
-
+    # Peak-to-peak of every unit of every mounting, infinite where it failed [arcsec]
     peak_to_peaks: Float[np.ndarray, "mounting unit"]
-    failures: int
-    every: bool
+    failures: int  # Units without an answer [-]
+    every: bool  # Whether these are all mountings there are, each once
 
     @property
     def means(self) -> Float[np.ndarray, " mounting"]:
@@ -87,22 +67,12 @@ class RandomMountings:
 
 @dataclass(frozen=True, kw_only=True)
 class MountingAnswer(Answer):
-    """Mounted parts.
-
-    Parameters
-    ----------
-    torque
-        Torque on the carrier [N·m].
-    found
-        The mounting.
-    chance
-        What the same parts do when nobody chooses.
-    """
+    """Mounted parts."""
 
     kind: ClassVar[str] = "mounting"
-    torque: float
-    found: MountingResult
-    chance: RandomMountings
+    torque: float  # Torque on the carrier [N·m]
+    found: MountingResult  # The mounting
+    chance: RandomMountings  # What the same parts do when nobody chooses
 
     @property
     def title(self) -> str:

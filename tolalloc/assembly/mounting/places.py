@@ -46,24 +46,12 @@ _NONE = RingShift()
 
 @dataclass(frozen=True, kw_only=True)
 class PartTurn:
-    """How a part stands turned at its place against its own frame.
+    """How a part stands turned at its place against its own frame."""
 
-    Parameters
-    ----------
-    number
-        Bores, teeth or pins that the part is turned by, as the fitter counts them [-].
-    direction
-        Angle by which its vectors are turned [rad].
-    bores
-        What becomes of the numbers of its bores.
-    ring
-        What becomes of its teeth or pins, and of waves along them.
-    """
-
-    number: int = 0
-    direction: float = 0.0
-    bores: RingShift = _NONE
-    ring: RingShift = _NONE
+    number: int = 0  # Bores, teeth or pins that the part is turned by, as the fitter counts them [-]
+    direction: float = 0.0  # Angle by which its vectors are turned [rad]
+    bores: RingShift = _NONE  # What becomes of the numbers of its bores
+    ring: RingShift = _NONE  # What becomes of its teeth or pins, and of waves along them
 
     @property
     def back(self) -> PartTurn:
@@ -74,24 +62,12 @@ class PartTurn:
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
-    """Where one part of a unit goes.
+    """Where one part of a unit goes."""
 
-    Parameters
-    ----------
-    name
-        Place, such as ``disc2``.
-    kind
-        Parts that fit: all places of one kind take the same ones.
-    owned
-        Beginning of a column of the model, and of the own name of the error there.
-    turns
-        Ways to mount a part here that differ in what the unit does.
-    """
-
-    name: str
-    kind: str
-    owned: tuple[tuple[str, str], ...]
-    turns: tuple[PartTurn, ...]
+    name: str  # Place, such as ``disc2``
+    kind: str  # Parts that fit: all places of one kind take the same ones
+    owned: tuple[tuple[str, str], ...]  # Beginning of a column of the model, and of the own name of the error there
+    turns: tuple[PartTurn, ...]  # Ways to mount a part here that differ in what the unit does
 
 
 def housing_turn(reducer: Reducer, pins: int) -> PartTurn:

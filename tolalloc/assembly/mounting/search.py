@@ -126,20 +126,11 @@ Found = tuple[Mountings, Peaks, tuple[float, ...]]
 
 @dataclass(kw_only=True)
 class EvaluatedUnits:
-    """Units that were evaluated, and how many failed.
+    """Units that were evaluated, and how many failed."""
 
-    Parameters
-    ----------
-    stock
-        The parts.
-    response
-        What is to be small, first output, such as `tolalloc.rv.response.kernel.KernelResponse`.
-    evaluations, failures
-        Units evaluated, and those of them without an answer [-].
-    """
-
-    stock: PartStock
-    response: Response
+    stock: PartStock  # The parts
+    response: Response  # What is to be small, first output, such as `tolalloc.rv.response.kernel.KernelResponse`
+    # Units evaluated, and those of them without an answer [-]
     evaluations: int = 0
     failures: int = 0
     _known: dict[bytes, float] = field(default_factory=dict)

@@ -33,24 +33,15 @@ Mountings = Int[np.ndarray, "_unit _place 2"]
 class PartStock:
     """Parts that make whole units.
 
-    Parameters
-    ----------
-    reducer
-        Nominal design.
-    parts
-        The parts; the first of each kind make the first unit as it comes.
-    columns
-        Columns of the response.
-
     Raises
     ------
     InputError, UnknownNameError
         The parts make no whole units, or one has an error that the response does not take.
     """
 
-    reducer: Reducer
-    parts: tuple[MeasuredPart, ...]
-    columns: tuple[str, ...]
+    reducer: Reducer  # Nominal design
+    parts: tuple[MeasuredPart, ...]  # The parts; the first of each kind make the first unit as it comes
+    columns: tuple[str, ...]  # Columns of the response
 
     def __post_init__(self) -> None:
         count_units(self.parts, places_of(self.reducer), "parts")
@@ -149,15 +140,6 @@ LARGEST_ANGLE = 3600.0
 class MeasuredPart:
     """One part and its errors; an error that is not named is 0.
 
-    Parameters
-    ----------
-    name
-        What is written on the part.
-    kind
-        Kind of place that it fits, `tolalloc.assembly.mounting.places.Place.kind`.
-    errors
-        Error in the part's own name, such as ``runout.cos1`` of a disc → deviation in its own frame [m, angles rad].
-
     Notes
     -----
     A part's own frame is the one in which the model counts its errors when it stands unturned at the first place of its
@@ -166,8 +148,9 @@ class MeasuredPart:
     ``mesh.deviation``.
     """
 
-    name: str
-    kind: str
+    name: str  # What is written on the part
+    kind: str  # Kind of place that it fits, `tolalloc.assembly.mounting.places.Place.kind`
+    # Error in the part's own name, such as ``runout.cos1`` of a disc → deviation in its own frame [m, angles rad]
     errors: Mapping[str, float]
 
 

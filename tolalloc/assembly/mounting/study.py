@@ -22,27 +22,13 @@ MOST_STARTS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class MountingStudy:
-    """Which parts are to be mounted.
+    """Which parts are to be mounted."""
 
-    Parameters
-    ----------
-    name
-        Where the parts come from.
-    stock
-        The parts.
-    kernel
-        What is to be small.
-    starts
-        Mountings from which several units are improved [-].
-    seed
-        Seed of every random number [-].
-    """
-
-    name: str
-    stock: PartStock
-    kernel: KernelResponse
-    starts: int = 4
-    seed: int = 1
+    name: str  # Where the parts come from
+    stock: PartStock  # The parts
+    kernel: KernelResponse  # What is to be small
+    starts: int = 4  # Mountings from which several units are improved [-]
+    seed: int = 1  # Seed of every random number [-]
 
 
 def prepare_mounting(

@@ -22,30 +22,17 @@ _SAME_POINT = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class DesignPoint:
-    """Where a search for the nearest failing point ended.
+    """Where a search for the nearest failing point ended."""
 
-    Parameters
-    ----------
-    u
-        The point [-].
-    beta
-        Reliability index, negative if the origin itself fails [-].
-    converged
-        Whether the point lies on the limit and its gradient points back to the origin.
-    calls, failed, steps
-        Calls of the limit state, those of its gradient included, how many of them gave no usable answer, and steps
-        of the search [-].
-    status
-        One sentence for a person.
-    """
-
-    u: Float[np.ndarray, " variable"]
-    beta: float
-    converged: bool
+    u: Float[np.ndarray, " variable"]  # The point [-]
+    beta: float  # Reliability index, negative if the origin itself fails [-]
+    converged: bool  # Whether the point lies on the limit and its gradient points back to the origin
+    # Calls of the limit state, those of its gradient included, how many of them gave no usable answer, and steps of the
+    # search [-]
     calls: int
     failed: int
     steps: int
-    status: str
+    status: str  # One sentence for a person
 
     @property
     def probability(self) -> float:
@@ -55,18 +42,12 @@ class DesignPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignPoints:
-    """What several searches found.
+    """What several searches found."""
 
-    Parameters
-    ----------
-    points
-        Distinct converged points, the nearest first; if no search converged, where the first one ended.
-    calls, failed
-        Calls of the limit state by all searches, those that found nothing new included, and how many of them gave
-        no usable answer [-].
-    """
-
+    # Distinct converged points, the nearest first; if no search converged, where the first one ended
     points: tuple[DesignPoint, ...]
+    # Calls of the limit state by all searches, those that found nothing new included, and how many of them gave no
+    # usable answer [-]
     calls: int
     failed: int
 

@@ -28,21 +28,11 @@ _FEWEST_SAMPLES = 100
 
 @dataclass(frozen=True, kw_only=True)
 class _Mixture:
-    """Normal densities around the design points, and a wide one around the origin as the last component.
+    """Normal densities around the design points, and a wide one around the origin as the last component."""
 
-    Parameters
-    ----------
-    centres
-        Centre of every component [-].
-    widths
-        Standard deviation of every component [-].
-    counts
-        Samples of every component [-].
-    """
-
-    centres: Float[np.ndarray, "component variable"]
-    widths: Float[np.ndarray, " component"]
-    counts: Int[np.ndarray, " component"]
+    centres: Float[np.ndarray, "component variable"]  # Centre of every component [-]
+    widths: Float[np.ndarray, " component"]  # Standard deviation of every component [-]
+    counts: Int[np.ndarray, " component"]  # Samples of every component [-]
 
     def draw(self, generator: np.random.Generator) -> Float[np.ndarray, "sample variable"]:
         """Return the samples of all components, one component after the other."""

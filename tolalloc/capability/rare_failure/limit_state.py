@@ -18,17 +18,11 @@ _CALLS_TO_JUDGE = 100
 
 @dataclass(frozen=True, kw_only=True)
 class LimitValues:
-    """Answers of a limit state.
+    """Answers of a limit state."""
 
-    Parameters
-    ----------
-    values
-        Distance to the limit, negative where the product fails [unit of the limited output].
-    status
-        0 for a good sample; anything else is a failed one, whose value must not be used [-].
-    """
-
+    # Distance to the limit, negative where the product fails [unit of the limited output]
     values: Float[np.ndarray, " sample"]
+    # 0 for a good sample; anything else is a failed one, whose value must not be used [-]
     status: UInt8[np.ndarray, " sample"]
 
     @property
@@ -127,67 +121,34 @@ class CountedLimitState:
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
-    """One level of a subset simulation.
+    """One level of a subset simulation."""
 
-    Parameters
-    ----------
-    run
-        Which of the independent runs, from 0 [-].
-    threshold
-        Value of the limit state that bounds the next level, 0 at the last one [unit of the limited output].
-    share
-        Share of this level's samples beyond the threshold [-].
-    correlation
-        Factor γ by which correlated chains raise the variance of the share to (1 + γ) times [-].
-    accepted
-        Share of accepted chain steps, 1 at the first level, which has no chains [-].
-    coefficient_of_variation
-        Of the share [-].
-    """
-
-    run: int
+    run: int  # Which of the independent runs, from 0 [-]
+    # Value of the limit state that bounds the next level, 0 at the last one [unit of the limited output]
     threshold: float
-    share: float
-    correlation: float
-    accepted: float
-    coefficient_of_variation: float
+    share: float  # Share of this level's samples beyond the threshold [-]
+    correlation: float  # Factor γ by which correlated chains raise the variance of the share to (1 + γ) times [-]
+    accepted: float  # Share of accepted chain steps, 1 at the first level, which has no chains [-]
+    coefficient_of_variation: float  # Of the share [-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RareFailure:
-    """Probability of failure with its standard error and what it took.
+    """Probability of failure with its standard error and what it took."""
 
-    Parameters
-    ----------
-    probability
-        Estimate [-].
-    standard_error
-        Of the estimate; infinite if no sample failed, because then nothing is known about the spread [-].
-    calls, failed
-        Calls of the limit state, and how many of them gave no usable answer [-].
-    method
-        Name of the method.
-    cautions
-        Reasons not to rely on the estimate; empty if the method sees none.
-    effective_samples
-        Number of equally weighted failures that would know as much; 0 if no sample failed [-].
-    missed_share
-        Share of the probability that lies where no design point explains it; 0 for subset simulation [-].
-    levels
-        Levels of a subset simulation, run by run; empty for other methods.
-    failing
-        Failing states of every run of a subset simulation, not independent of each other; empty for other methods [-].
-    """
-
-    probability: float
+    probability: float  # Estimate [-]
+    # Of the estimate; infinite if no sample failed, because then nothing is known about the spread [-]
     standard_error: float
+    # Calls of the limit state, and how many of them gave no usable answer [-]
     calls: int
     failed: int
-    method: str
-    cautions: tuple[str, ...]
-    effective_samples: float
+    method: str  # Name of the method
+    cautions: tuple[str, ...]  # Reasons not to rely on the estimate; empty if the method sees none
+    effective_samples: float  # Number of equally weighted failures that would know as much; 0 if no sample failed [-]
+    # Share of the probability that lies where no design point explains it; 0 for subset simulation [-]
     missed_share: float = 0.0
-    levels: tuple[Level, ...] = ()
+    levels: tuple[Level, ...] = ()  # Levels of a subset simulation, run by run; empty for other methods
+    # Failing states of every run of a subset simulation, not independent of each other; empty for other methods [-]
     failing: tuple[Float[np.ndarray, "_state variable"], ...] = field(default=(), repr=False, compare=False)
 
     @property
@@ -232,18 +193,11 @@ class DifferentiableResponse(Response, ResponseWithDerivatives, Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseLimit:
-    """Distance of a response's first output from its upper limit, negative where a unit exceeds it.
+    """Distance of a response's first output from its upper limit, negative where a unit exceeds it."""
 
-    Parameters
-    ----------
-    experiment
-        Every column of its sources has a standard normal variable of its own, whatever its distribution.
-    limit
-        Largest output allowed [output].
-    """
-
+    # Every column of its sources has a standard normal variable of its own, whatever its distribution
     experiment: Experiment[Response]
-    limit: float
+    limit: float  # Largest output allowed [output]
 
     @property
     def variables(self) -> int:
