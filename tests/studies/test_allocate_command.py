@@ -167,7 +167,7 @@ def test_the_drawing_is_read_back_and_carries_grades(allocated):
     assert sources["disc1.pitch"].zone == sources["disc2.pitch"].zone
 
 
-@pytest.mark.parametrize("change", [0.0, 0.5])
+@pytest.mark.parametrize("change", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_the_cost_is_one_number_in_summary_drawing_and_table(tmp_path, change):
     """All are read back from the files; what is paid once, to leave today's process, is no cost of the next study."""
     script = script_with(
@@ -236,13 +236,14 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
             "peak-to-peak transmission error [arcsec]",
             "arcsec",
         ),
-        (
+        pytest.param(
             {
                 "others": f", {LOST}: ta.Limit(upper=0.01, show=MOST)",
                 "asked": "grades=True, unit_price=ta.UnitPrice(scrap=5.0)",
             },
             "lost motion [arcmin]",
             "arcmin",
+            marks=pytest.mark.slow,
         ),
     ],
 )

@@ -121,6 +121,7 @@ def test_measured_parts_are_listed_without_measuring_again(pump, tmp_path):
     assert "measure rotor" not in said
 
 
+@pytest.mark.slow
 def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
     chain = tmp_path / "tight.chain.toml"
     shipped = Path("tolalloc/assembly/data/bx40e.chain.toml").read_text(encoding="utf-8")
@@ -147,7 +148,7 @@ def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
         ("contact", ["[mm]"]),
         ("modify", ["[rad]"]),
         ("diagnose", ["[deg]", "[arcsec]"]),
-        ("allocate", ["[arcsec]"]),
+        ("te", ["[N·m]"]),
         ("costs", ["[unit]", "[cost units]"]),
     ],
 )

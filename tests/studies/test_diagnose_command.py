@@ -73,6 +73,7 @@ def test_a_bad_housing_is_named(bench, tmp_path):
     assert "a reading errs by 0.5″" in page and "unit7" in page
 
 
+@pytest.mark.slow
 def test_a_curve_that_no_such_errors_make_is_not_diagnosed(bench, tmp_path):
     frame = pd.read_csv(bench.curve)
     frame["transmission error [arcsec]"] = 30 * np.sin(np.radians(7 * frame["angle [deg]"]))

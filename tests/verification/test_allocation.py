@@ -313,6 +313,7 @@ def test_locked_clearances_stay(three, prepared):
     np.testing.assert_allclose(step[-2:], found.design[-2:], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_random_unit_is_worse_than_the_worst_case(prepared):
     requirement = Requirement(output=RADIAL, limits=Limits(lower=-20.0), guarantee=WorstCase())
     verifier = verifier_of(prepared, requirement)
@@ -326,6 +327,7 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
         assert (side.stack.worst_case > 0).any()
 
 
+@pytest.mark.slow
 def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
     verifier = verifier_of(prepared, limit=8.0)
     by_hand = scale_in_proportion(verifier, 2)
@@ -337,6 +339,7 @@ def test_an_unreachable_limit_is_a_result_that_says_what_blocks(prepared):
     assert found.gap >= -1e-9
 
 
+@pytest.mark.slow
 def test_the_bound_and_the_price_are_those_of_the_chosen_models(prepared):
     verifier = verifier_of(prepared)
     found = allocate(verifier, scale_in_proportion(verifier, 2), SearchEffort(steps=2))

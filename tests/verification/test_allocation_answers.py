@@ -98,6 +98,7 @@ def test_a_pair_without_a_cost_has_no_price_and_is_not_the_cheapest():
     assert np.isnan(trade_of([[np.nan]], (1,), (5,)).cheapest).all()
 
 
+@pytest.mark.slow
 def test_at_the_clearances_of_the_optimum_the_trade_finds_its_cost(allocation, response):
     """What the model misses so near the chosen design is worth a percent or two."""
     at = allocation.inside.shared
@@ -106,6 +107,7 @@ def test_at_the_clearances_of_the_optimum_the_trade_finds_its_cost(allocation, r
     assert trade.error < 0.05
 
 
+@pytest.mark.slow
 def test_far_from_the_chosen_clearances_the_kernel_has_the_last_word(prepared, allocation, response):
     trade = setting_trade(response, allocation, (np.array([1.0, 5.0]), np.array([5.0, 20.0])))
     assert trade.cost[0, 0] == trade.cost.min()
@@ -115,6 +117,7 @@ def test_far_from_the_chosen_clearances_the_kernel_has_the_last_word(prepared, a
     assert again.cost[0, 0] == pytest.approx(trade.cost[1, 1], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_limit(prepared, allocation, response):
     """Uniform scaling at the same clearances keeps the same quantile of the same units, so it cannot be cheaper."""
     clearances = np.array([1.0, 12.0])
@@ -132,12 +135,14 @@ def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_li
     assert trade.cost[0, 0] <= prepared.space.cost(designs[kept]).min() * 1.01
 
 
+@pytest.mark.slow
 def test_where_no_zones_keep_the_limit_the_trade_has_no_cost(unreachable, response):
     trade = setting_trade(response, unreachable, (np.array([1.0, 5.0]), np.array([5.0])))
     assert np.isnan(trade.cost).all()
     assert np.isnan(trade.error)
 
 
+@pytest.mark.slow
 def test_a_failed_unit_gives_no_cost(monkeypatch, allocation, response):
     answer = QuantileResponse.__call__
     monkeypatch.setattr(
@@ -158,6 +163,7 @@ def test_a_weighted_cost_is_the_cost_times_its_weight():
     )
 
 
+@pytest.mark.slow
 def test_costs_all_changed_alike_change_nothing(prepared, allocation):
     problem = prepared.space.problem(allocation.stacks)
     features = tuple(
@@ -176,6 +182,7 @@ def test_costs_all_changed_alike_change_nothing(prepared, allocation):
     assert found.bound == pytest.approx(1.7 * allocation.inside.bound, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_under_changed_costs_no_drawing_is_cheaper_than_the_one_made_for_them(prepared, allocation):
     found = robustness(verifier_of(prepared), allocation, (), SeedTree(1), 12)
     assert len(found.costs) == 12
@@ -188,6 +195,7 @@ def test_under_changed_costs_no_drawing_is_cheaper_than_the_one_made_for_them(pr
     np.testing.assert_allclose(found.optimum, allocation.inside.zones)
 
 
+@pytest.mark.slow
 def test_costs_are_changed_to_corners_and_what_is_lost_counts_locked_zones(monkeypatch, prepared, allocation):
     corners, made = [], module._with_costs
     monkeypatch.setattr(module, "_with_costs", lambda *given: corners.append(given[2]) or made(*given))
@@ -208,6 +216,7 @@ def uncertain_of(prepared) -> Verifier:
     return replace(verifier_of(prepared), model=model)
 
 
+@pytest.mark.slow
 def test_an_unchanged_kernel_changes_neither_what_is_kept_nor_the_cost(prepared, allocation):
     """The models come from other units than those of the optimum; their weights are uncertain by a few percent."""
     few = replace(uncertain_of(prepared), units=1110)  # so few show the yield only if not one is rejected
@@ -216,6 +225,7 @@ def test_an_unchanged_kernel_changes_neither_what_is_kept_nor_the_cost(prepared,
     assert found.uncertain[0].regret == pytest.approx(0.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_reducer_that_breaks_the_limit_is_counted(prepared, allocation):
     model = prepared.model
     kernel = replace(model.kernel, fixed={**model.kernel.fixed, "planet1.eccentricity.x": 80e-6})
@@ -226,6 +236,7 @@ def test_a_reducer_that_breaks_the_limit_is_counted(prepared, allocation):
     assert found[1].cost > found[0].cost
 
 
+@pytest.mark.slow
 def test_the_second_best_processes_are_other_ones_and_cost_more():
     prepared = baseline(drawing={"costs": "rv20e"})
     free, errors = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}, prepared.space.errors
@@ -264,21 +275,25 @@ def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth():
     assert nothing.ratios.shape == (0, 3)
 
 
+@pytest.mark.slow
 def test_the_yield_asked_for_costs_what_the_optimum_costs(prepared, allocation):
     cost = cost_at_yield(prepared.space, allocation, 0.9973)
     assert cost == pytest.approx(allocation.inside.cost + allocation.locked_cost, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_higher_yield_never_costs_less(prepared, allocation):
     costs = [cost_at_yield(prepared.space, allocation, target) for target in (0.9, 0.95, 0.98, 0.99, 0.995, 0.9973)]
     assert np.all(np.diff(costs) >= -1e-6)
     assert costs[0] < 0.9 * costs[-1]
 
 
+@pytest.mark.slow
 def test_a_yield_that_so_few_units_cannot_show_has_no_cost(prepared, allocation):
     assert np.isnan(cost_at_yield(prepared.space, allocation, 0.999))
 
 
+@pytest.mark.slow
 def test_an_unreachable_limit_has_no_cost_at_its_yield(prepared, unreachable):
     assert not unreachable.chosen.met
     assert np.isnan(cost_at_yield(prepared.space, unreachable, 0.9973))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
+from tests.seeds import seeds
 from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.program.certificate import cost_bound
@@ -134,7 +135,7 @@ def one_process(problem: AllocationProblem) -> AllocationProblem:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3, quick=1))
 def test_the_best_and_second_best_are_those_of_a_brute_force(kind, seed):
     problem = random_problem(seed, **KINDS[kind])
     known = sorted((least_by_scipy(problem, choice), choice) for choice in product(range(3), repeat=4))

@@ -18,6 +18,8 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.report.document import Section
 from tolalloc.rv.reducer.files import load_identified_stiffness
 
+pytestmark = pytest.mark.slow  # one allocation of all limits, in a minute or two, is what all read
+
 TARGET = 0.95
 KEPT = {"housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter"}
 SEARCH = QUICK_ALLOCATION.search
