@@ -281,6 +281,7 @@ def test_nearly_all_gauges_show_less_than_the_zone(prepared: Prepared) -> None:
         assert abs(outside - 0.0027) < 4 * np.sqrt(0.0027 / 4000), source.name  # four standard errors
 
 
+@pytest.mark.slow
 def test_the_dominant_source_is_named_and_the_set_is_small(
     diagnosis: Diagnosis, problem: CurveProblem, unit: np.ndarray
 ) -> None:
@@ -290,6 +291,7 @@ def test_the_dominant_source_is_named_and_the_set_is_small(
     assert diagnosis.dominant_probability.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_most_true_errors_lie_in_their_intervals(diagnosis: Diagnosis, prepared: Prepared, unit: np.ndarray) -> None:
     low, high = diagnosis.column_interval
     # One unit's 60 columns hang together as about 30 independent ones; 95 % less four standard errors.
@@ -298,6 +300,7 @@ def test_most_true_errors_lie_in_their_intervals(diagnosis: Diagnosis, prepared:
     assert np.median((high - low) / before) < 0.9  # the curve has told something
 
 
+@pytest.mark.slow
 def test_the_fit_explains_the_curve_and_its_twin_is_known(diagnosis: Diagnosis) -> None:
     fit = diagnosis.fit
     assert fit.explained
@@ -307,6 +310,7 @@ def test_the_fit_explains_the_curve_and_its_twin_is_known(diagnosis: Diagnosis) 
     assert diagnosis.failed == 0
 
 
+@pytest.mark.slow
 def test_a_curve_that_no_errors_make_is_not_diagnosed(prepared: Prepared, unit: np.ndarray) -> None:
     curve = curve_of(prepared, unit, SeedTree(5).child("readings").generator())
     foreign = curve.transmission_error + 10 * ARCSECOND * np.sin(17.0 * ANGLES)
@@ -327,6 +331,7 @@ def test_a_curve_that_no_errors_make_is_not_diagnosed(prepared: Prepared, unit: 
     assert sum(seen) == found.evaluations
 
 
+@pytest.mark.slow
 def test_one_seed_gives_one_diagnosis(prepared: Prepared, unit: np.ndarray) -> None:
     curve = curve_of(prepared, unit, SeedTree(5).child("readings").generator())
     errors = prepared.errors

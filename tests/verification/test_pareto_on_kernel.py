@@ -109,6 +109,7 @@ def kernel_front(prepared, quantile, **options):
     return pareto_front(quantile, rough, 1.0, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
 
 
+@pytest.mark.slow
 def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(prepared, quantile, tmp_path):
     whole, surrogate = kernel_front(prepared, quantile)
     checked = np.flatnonzero(~np.isnan(whole.on_kernel))

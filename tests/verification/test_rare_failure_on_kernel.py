@@ -255,6 +255,7 @@ def test_arguments_out_of_range():
             call()
 
 
+@pytest.mark.slow
 def test_kernel_agrees_with_random_units():
     """A share near 1 % by small subset simulations, within 3.5 standard errors of random units of another seed."""
     study = prepared(name="kernel")
