@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from tolalloc.report.answer import Answer
 from tolalloc.report.document import Document, joined
 from tolalloc.report.folder import claimed
 from tolalloc.study.prepared import Prepared
-from tolalloc.study.questions import Question
+from tolalloc.study.questions import Calculation, Question
 from tolalloc.study.study import Study
 
 
@@ -108,6 +108,8 @@ def _document(prepared: Prepared, answers: dict[str, Answer]) -> Document:
         "statuses": {kind: dict(answer.header.statuses) for kind, answer in answers.items()},
         "stages": {kind: dict(answer.header.stages) for kind, answer in answers.items()},
     }
+    if not set(answers) - {Calculation.kind}:
+        return replace(first.document, manifest=known)  # a calculation has a summary of its own, not one beside others
     title = first.title if len(answers) == 1 else f"{first.header.model}: {study.name}"
     return joined(
         title, first.subtitle, [(kind, answer.document) for kind, answer in answers.items()], **known, seed=study.seed
