@@ -82,6 +82,10 @@ __all__ = sorted(_WHERE)
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("tolalloc")
     place = _WHERE.get(name)
     if place is None:
         raise AttributeError(f"module 'tolalloc' has no attribute {name!r}")
@@ -90,4 +94,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return list(__all__)
+    return [*__all__, "__version__"]

@@ -35,7 +35,8 @@ class UnknownNameError(TolallocError):
         """Name the unknown, the kind of thing it should be, and the nearest known names."""
         names = sorted(known)
         near: Sequence[str] = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or names[:6]
-        return cls(f"{place}: {what} {name!r} is not known; the nearest known are {', '.join(near) or 'none'}.")
+        nearest = f"the nearest known {'is' if len(near) == 1 else 'are'} {', '.join(near)}" if near else "it has none"
+        return cls(f"{place}: {what} {name!r} is not known; {nearest}.")
 
 
 class RunFolderError(TolallocError):

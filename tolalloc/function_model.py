@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -61,6 +62,10 @@ class FunctionModel:
         for field_name, names in (("inputs", self.inputs), ("outputs", self.outputs)):
             if not names or len(set(names)) != len(names):
                 raise InputError.at(f"model {self.name}", field_name, names, "one name or more, each once")
+        for output in self.outputs:
+            if not re.fullmatch(r".*\S \[\S.*\]", output):
+                allowed = f"a name with its unit, such as '{output} [mm]', or [-] for a plain number"
+                raise InputError.at(f"model {self.name}", "outputs", output, allowed)
 
     def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
         """Return the model at the sources of a drawing.

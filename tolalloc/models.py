@@ -317,6 +317,11 @@ class Model(ABC):
 class ModelSource(Protocol):
     """What a study names as its model: it becomes a `Model` once the drawing says what varies."""
 
+    @property
+    def name(self) -> str:
+        """What a report calls the model."""
+        ...
+
     def bound(self, errors: ErrorModel, place: str) -> Model:
         """Return the model at the sources of a drawing; nothing is solved.
 

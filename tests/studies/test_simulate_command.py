@@ -123,7 +123,7 @@ def test_a_wrong_option_is_refused(options, words):
         ({"damping": -1.0}, "--damping is -1.0; allowed is 0 or a positive number"),
         ({"pin_stiffness": float("nan")}, "--pin-stiffness is nan"),
         ({"reducer": "rv41e"}, "'rv41e' is not known"),
-        ({"unit": "tabel4"}, "'tabel4' is not known; the nearest known are table4"),
+        ({"unit": "tabel4"}, "'tabel4' is not known; the nearest known is table4"),
     ],
 )
 def test_a_number_or_name_out_of_range_is_refused(option, words):

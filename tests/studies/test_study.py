@@ -50,17 +50,30 @@ def test_a_field_that_no_question_reads_is_refused_by_name(field, value):
     [
         (ta.Study, {"limit": LIMITS}, "limits"),
         (ta.Study, {"name": "mine", "drawin": None}, "drawing"),
-        (ta.Ranking, {"grades": True}, "none"),
+        (ta.Ranking, {"grades": True}, ""),
+        (ta.Limit, {"max": 60.0}, "lower, show, upper"),
         (ta.Allocation, {"grade": True}, "grades"),
         (ta.Allocation, {"fixedfirst": True}, "fixed_first"),
         (ta.Calculation, {"built": nothing}, "build"),
     ],
 )
 def test_an_unknown_field_is_refused_with_the_nearest_name(kind, given, nearest):
-    with pytest.raises(
-        UnknownNameError, match=rf"field '{[*given][-1]}' is not known; the nearest known are {nearest}"
-    ):
+    words = f"the nearest known (is|are) {nearest}" if nearest else "it has none"
+    with pytest.raises(UnknownNameError, match=rf"field '{[*given][-1]}' is not known; {words}"):
         kind(**given)
+
+
+def test_a_value_without_its_name_is_refused():
+    with pytest.raises(InputError, match=r"^limit: 60.0 stands without its name; write upper=\.\.\.\.$"):
+        ta.Limit(60.0)
+
+
+def test_a_study_a_reducer_and_a_drawing_say_in_a_line_what_they_are():
+    study = ta.Study(ta.reducer("rv20e", stiffness="rv20e_table6"), ta.drawing("rv20e_baseline"), limits=LIMITS)
+    assert repr(study).startswith("Study('study': RV-20E at rv20e_baseline; limits: peak-to-peak")
+    assert repr(study.model) == "<reducer RV-20E: 2 cranks, 2 discs, stiffness of liu2020, Table 6>"
+    assert repr(study.drawing) == "<drawing rv20e_baseline: 23 sources>"
+    assert ta.__version__
 
 
 @pytest.mark.parametrize(

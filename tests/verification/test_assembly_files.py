@@ -218,7 +218,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             'on = "column"',
             'on = "colunm"',
-            "FILE, datum flow chain, part head: on 'colunm' is not known; the nearest known are column.",
+            "FILE, datum flow chain, part head: on 'colunm' is not known; the nearest known is column.",
         ),
         (
             'name = "head"',
@@ -342,7 +342,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             "precision = 2",
             'precision = 2\nreducer = "bx40"',
-            "shipped reducer files: name 'bx40' is not known; the nearest known are bx40e.",
+            "shipped reducer files: name 'bx40' is not known; the nearest known is bx40e.",
         ),
         (
             "precision = 2",
@@ -476,7 +476,7 @@ def test_a_truncated_chain_file_is_refused(tmp_path):
     text = (DATA / "bx40e.chain.toml").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=r"not complete TOML; is the file truncated\?"):
         load(tmp_path, text=text[: len(text) // 3])
-    with pytest.raises(TolallocError, match=r"name 'bx40' is not known; the nearest known are bx40e\."):
+    with pytest.raises(TolallocError, match=r"name 'bx40' is not known; the nearest known is bx40e\."):
         load_plan("bx40")
 
 

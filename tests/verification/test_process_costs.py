@@ -215,7 +215,7 @@ def test_a_process_of_the_tolerance_table_needs_its_row(tmp_path):
 
 
 def test_unknown_and_missing_columns_are_refused(tmp_path):
-    with pytest.raises(TolallocError, match="column 'fix' is not known; the nearest known are fixed"):
+    with pytest.raises(TolallocError, match="column 'fix' is not known; the nearest known is fixed"):
         loaded(tmp_path, GOOD, header=HEADER.replace("fixed [", "fix ["))
     with pytest.raises(InputError, match="the column 'note' is missing; needed are sources, process, model, note"):
         loaded(tmp_path, "disc1.pitch,own,reciprocal", header="sources,process,model\n")

@@ -22,7 +22,7 @@ Costs = str | Path | Mapping[str, Any]
 """Process cost table by shipped name or path, or source → ways to make it; empty: what the table says, as 1/zone."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Drawing:
     """What is known of the parts before anything is computed."""
 
@@ -72,6 +72,9 @@ class Drawing:
         if not isinstance(correlations, Correlation):
             correlations = load_correlations(correlations, sources) if correlations else Correlation()
         return cls(name=place, errors=ErrorModel(sources, correlation=correlations), costs=_placed(costs))
+
+    def __repr__(self) -> str:
+        return f"<drawing {self.name}: {len(self.sources)} sources>"
 
     @property
     def sources(self) -> tuple[Source, ...]:

@@ -108,7 +108,7 @@ _FARTHEST = 50.0
 """Largest clearance that a modification may be asked to leave, either way [µm]."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class ReducerChoice:
     """A reducer as a study names it; it becomes a `tolalloc.rv.model.ReducerModel` with the study's drawing."""
 
@@ -123,6 +123,11 @@ class ReducerChoice:
     # Sources that a drawing may leave out, taken as zero; ``*`` stands for anything
     neglected: tuple[str, ...] = NEGLECTED
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
+
+    def __repr__(self) -> str:
+        stiffness = f", stiffness of {self.identified.source}" if self.identified else ""
+        cranks, discs = self.reducer.crank_count, self.reducer.disc_count
+        return f"<reducer {self.name}: {cranks} cranks, {discs} discs{stiffness}>"
 
     @property
     def name(self) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from tolalloc.exceptions import InputError
+from tolalloc.study.named_fields import NamedFields
 
 if TYPE_CHECKING:
     from tolalloc.allocation.guarantee import Guarantee
@@ -16,7 +17,7 @@ _YIELD = 0.9973
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limit:
+class Limit(NamedFields):
     """Limits of an output and what must be shown of them.
 
     Parameters
@@ -37,6 +38,8 @@ class Limit:
     >>> Limit(upper=60.0).upper
     60.0
     """
+
+    called: ClassVar[str] = "limit"
 
     upper: float | None = None
     lower: float | None = None

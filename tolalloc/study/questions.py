@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.study.named_fields import NamedFields
 
 if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Question(ABC):
+class Question(NamedFields, ABC):
     """A question of a study.
 
     A subclass names what it is called on the command line (``kind``), which fields of the study it reads (``reads``),
@@ -27,17 +28,10 @@ class Question(ABC):
     """
 
     kind: ClassVar[str]
+    called: ClassVar[str]
     reads: ClassVar[frozenset[str]] = frozenset(
         {"model", "drawing", "limits", "seed", "largest_failed_share", "effort"}
     )
-
-    def __new__(cls, *_: object, **given: object) -> Question:
-        """Refuse a field that the question does not have, by name and with the nearest one."""
-        known = [field.name for field in fields(cls)]
-        for name in given:
-            if name not in known:
-                raise UnknownNameError.among(f"question {cls.kind}", "field", name, known)
-        return super().__new__(cls)
 
     @abstractmethod
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
@@ -63,6 +57,7 @@ class Ranking(Question):
     """
 
     kind: ClassVar[str] = "ranking"
+    called: ClassVar[str] = "question ranking"
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
@@ -110,6 +105,7 @@ class Allocation(Question):
     """
 
     kind: ClassVar[str] = "allocation"
+    called: ClassVar[str] = "question allocation"
 
     grades: bool = False
     fixed_first: bool = True
@@ -163,6 +159,8 @@ class Calculation(Question):
     """
 
     kind: ClassVar[str] = "calculation"
+    called: ClassVar[str] = "question calculation"
+    by_position: ClassVar[int] = 1
     reads: ClassVar[frozenset[str]] = frozenset()
 
     build: Callable[[bool], Document]

@@ -6,10 +6,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.study.limit import Limit
+from tolalloc.study.named_fields import NamedFields
 from tolalloc.study.questions import Allocation, Question, Ranking, named
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ def _full() -> Effort:
     return Effort()
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(NamedFields):
     """A study: what is asked of a model at the zones of a drawing.
 
     Parameters
@@ -67,6 +68,9 @@ class Study:
     1
     """
 
+    called: ClassVar[str] = "study"
+    by_position: ClassVar[int] = 2
+
     model: ModelSource | None = None
     drawing: Drawing | None = None
     limits: Mapping[str, Limit] = field(default_factory=dict)
@@ -76,14 +80,6 @@ class Study:
     largest_failed_share: float = 0.01
     effort: Effort = field(default_factory=_full)
 
-    def __new__(cls, *_: object, **given: object) -> Study:
-        """Refuse a field that a study does not have, by name and with the nearest one."""
-        known = [own.name for own in fields(cls)]
-        for name in given:
-            if name not in known:
-                raise UnknownNameError.among(f"study {given.get('name', 'study')}", "field", name, known)
-        return super().__new__(cls)
-
     def __post_init__(self) -> None:
         place = f"study {self.name}"
         object.__setattr__(self, "questions", tuple(self.questions))
@@ -91,7 +87,7 @@ class Study:
             (
                 "name",
                 self.name,
-                re.fullmatch(r"[\w-][\w. -]*", str(self.name)),
+                re.fullmatch(_NAME, str(self.name)),
                 "letters, digits, '_', '-', '.', blanks",
             ),
             ("seed", self.seed, type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
@@ -121,6 +117,12 @@ class Study:
                     f"{place}: no question of it reads {own.name} (it asks: {kinds}); leave it out or "
                     "ask what reads it."
                 )
+
+    def __repr__(self) -> str:
+        asked = ", ".join(question.kind for question in self.questions)
+        limits = ", ".join(self.limits) or "none"
+        model, drawing = (own.name if own else "none" for own in (self.model, self.drawing))
+        return f"Study({self.name!r}: {model} at {drawing}; limits: {limits}; asks: {asked}; seed {self.seed})"
 
     @property
     def quick(self) -> bool:

@@ -1,0 +1,36 @@
+"""Records of a study whose fields are given by name; a wrong one is refused in one sentence."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, ClassVar, Self
+
+from tolalloc.exceptions import InputError, UnknownNameError
+
+
+class NamedFields:
+    """Base of frozen dataclasses that a study is written with.
+
+    A dataclass alone answers a wrong field with a bare TypeError.
+    """
+
+    called: ClassVar[str]
+    """What messages call the record."""
+    by_position: ClassVar[int] = 0
+    """How many of its first fields may be given without their names [-]."""
+
+    def __new__(cls, *given: object, **named: object) -> Self:
+        """Refuse a field that the record does not have, by name and with the nearest one."""
+        known = [own.name for own in fields(cls)]  # type: ignore[arg-type]  # every subclass is a dataclass
+        for name in named:
+            if name not in known:
+                raise UnknownNameError.among(cls._place(named), "field", name, known)
+        if len(given) > cls.by_position:
+            first = f"{known[cls.by_position]}=..." if len(known) > cls.by_position else "nothing"
+            raise InputError(f"{cls._place(named)}: {given[cls.by_position]!r} stands without its name; write {first}.")
+        return super().__new__(cls)
+
+    @classmethod
+    def _place(cls, named: dict[str, Any]) -> str:
+        """Return who is meant, for messages."""
+        return f"{cls.called} {named['name']}" if "name" in named else cls.called
