@@ -136,6 +136,12 @@ class BoundFunction(Model):
         return self.varied
 
     @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a reader must know: inputs that the drawing gives no nominal size."""
+        bare = [name for name, offset in zip(self.source.inputs, self.offsets, strict=True) if offset == 0.0]
+        return (f"no nominal size on the drawing, taken as deviations from 0: {', '.join(bare)}",) if bare else ()
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs with their units."""
         return self.asked or self.source.outputs

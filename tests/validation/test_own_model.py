@@ -179,3 +179,11 @@ def test_a_row_of_process_costs_has_five_entries(study):
     model = ta.model(lambda hub: hub, inputs=("hub",), outputs=("y [mm]",))
     with pytest.raises(ta.InputError, match="name, A, B, smallest t, largest t"):
         ta.Study(model, drawing, limits={"y [mm]": ta.Limit(upper=1.0)}).allocate("quick")
+
+
+def test_inputs_without_a_nominal_size_are_named():
+    row = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
+    gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
+    drawing = ta.Drawing.of_rows([{"id": "housing", "nominal": 20.0, **row}, {"id": "shaft", **row}])
+    (said,) = gap.bound(drawing.errors, "study").assumptions
+    assert said == "no nominal size on the drawing, taken as deviations from 0: shaft"
