@@ -16,13 +16,12 @@ from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Evaluation, Model, Observer, Setting, SettingDerivatives, unobserved
 from tolalloc.units import MILLIMETRE
+from tolalloc.user_function import UserFunction, identity
 
 _STEP = 1e-4
 """Step of a difference to either side, over the zone, for a function without noise [-]."""
 _STEP_OF_SIMULATION = 0.02
 """The same for a simulation, whose solver leaves noise [-]."""
-_FAILURES = (ArithmeticError, ValueError, OverflowError, FloatingPointError)
-"""What a function may raise for a sample that has no answer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +32,8 @@ class FunctionModel:
     ----------
     function
         Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is
-        the nominal plus the deviation [mm], of an angle the deviation [rad]; a function may take arrays of samples or
-        single numbers.
+        the nominal plus the deviation [mm], of an angle the deviation [rad]; a function may take arrays of samples,
+        each output then being a number or one number per sample, or single numbers.
     inputs
         Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``.
     outputs
@@ -159,9 +158,8 @@ class BoundFunction(Model):
     @property
     def content(self) -> Any:
         """Names, settings, and the function's code."""
-        code = getattr(self.source.function, "__code__", None)
-        known = (code.co_code, code.co_consts) if code else repr(self.source.function)
-        return (self.name, self.source.inputs, self.source.outputs, self.settings, known)
+        own = (identity(self.source.function), identity(self.source.jacobian))
+        return (self.name, self.source.inputs, self.source.outputs, self.settings, *own)
 
     def observed(self, observe: Observer) -> BoundFunction:
         """Return the model that tells someone the statuses of each call, those of differences among them."""
@@ -229,33 +227,9 @@ class BoundFunction(Model):
         """Return what a function says of every sample, NaN where it says nothing."""
         inputs = np.tile(self.offsets, (x.shape[0], 1))
         inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
-        arguments = [*(inputs * self._per_input).T, *self.values]
-        with np.errstate(all="ignore"):
-            try:
-                found = np.asarray(function(*arguments), float).reshape(count, x.shape[0])
-            except (TypeError, *_FAILURES):
-                rows = inputs * self._per_input
-                found = np.array([self._one(function, [*row, *self.values], count) for row in rows]).T
-        return np.ascontiguousarray(found.reshape(count, x.shape[0]).T)
-
-    def _one(self, function: Callable[..., Any], arguments: Sequence[float], count: int) -> Float[np.ndarray, " value"]:
-        """Return what a function says of one sample, NaN where it raises.
-
-        Raises
-        ------
-        InputError
-            A function that takes or returns another number of values.
-        """
-        try:
-            found = np.asarray(function(*arguments), float).ravel()
-        except _FAILURES:
-            return np.full(count, np.nan)
-        except TypeError as error:
-            given = f"{len(self.source.inputs)} inputs and {len(self.values)} settings"
-            raise InputError(f"model {self.name}: the function cannot be called with {given} ({error}).") from None
-        if found.size != count:
-            raise InputError(f"model {self.name}: the function returned {found.size} values; asked for are {count}.")
-        return found
+        settings = np.tile(self.values, (x.shape[0], 1))
+        asked = UserFunction(function=function, values=count, place=f"model {self.name}")
+        return asked(np.concatenate([inputs * self._per_input, settings], axis=1))
 
 
 def model(

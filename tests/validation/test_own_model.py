@@ -163,7 +163,7 @@ def test_what_a_function_takes_and_returns_is_checked(study):
     errors = study.drawing.errors
     inputs = study.model.inputs
     for function, words in (
-        (lambda hub: hub, "cannot be called with 4 inputs"),
+        (lambda hub: hub, "cannot be called with 4 values, inputs and settings"),
         (lambda *sizes: [1.0, 2.0, 3.0], "returned 3 values; asked for are 1"),
     ):
         model = ta.model(function, inputs=inputs, outputs=("y [mm]",)).bound(errors, "test")
