@@ -9,10 +9,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+
+from tolalloc.exceptions import InputError
+from tolalloc.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
     from tolalloc.drawings.correlation import CorrelatedSource
@@ -97,7 +100,7 @@ class ResponseWithDerivatives(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class Setting(NamedFields):
     """A quantity that the designer chooses beside the zones, such as a clearance that the tooth modification leaves.
 
     Parameters
@@ -112,11 +115,23 @@ class Setting:
         Step to either side of a difference by it [unit of the name].
     """
 
+    called: ClassVar[str] = "setting"
+
     name: str
     value: float
     lower: float
     upper: float
     step: float
+
+    def __post_init__(self) -> None:
+        place = f"setting {self.name}"
+        for own in ("value", "lower", "upper", "step"):
+            if not (is_number(getattr(self, own)) and abs(getattr(self, own)) < float("inf")):
+                raise InputError.at(place, own, getattr(self, own), "a finite number")
+        if self.lower > self.upper:
+            raise InputError.at(place, "lower", self.lower, f"at most upper = {self.upper:g}")
+        if self.step <= 0:
+            raise InputError.at(place, "step", self.step, "above 0")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,14 @@ import subprocess
 import sys
 from importlib import import_module
 
+import numpy as np
 import pytest
 
 import tolalloc as ta
 from tests.studies.command import ROOT, command, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.drawing import Drawing
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
 LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
@@ -156,3 +157,70 @@ def test_public_records_have_examples():
     finder = doctest.DocTestFinder()
     for own in (ta.Study, ta.Ranking, ta.Allocation, ta.Limit, ta.reducer, ta.drawing, ta.model, Drawing.of_rows):
         assert any(test.examples for test in finder.find(own)), own
+
+
+class Own(ta.Question):
+    kind = "own"
+
+    def answer(self, prepared, record, checkpoint):
+        raise NotImplementedError
+
+
+MODEL = ta.model(lambda a: a, inputs=("a",), outputs=("y [mm]",))
+SETTING = {"name": "h [mm]", "value": 2, "lower": 1, "upper": 3, "step": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: ta.Study("rv20e"), "model is 'rv20e'; allowed is ta.reducer"),
+        (lambda: ta.Study(MODEL, "rv20e_baseline"), "drawing is 'rv20e_baseline'; allowed is ta.drawing"),
+        (lambda: ta.Study(ta.drawing("rv20e_baseline"), MODEL), "model is <drawing rv20e_baseline: 23 sources>"),
+        (lambda: ta.Study(limits=[60]), "limits is .60.; allowed is a dictionary"),
+        (lambda: ta.Study(limits={"y [mm]": 60}), r"limits\['y \[mm\]'\] is 60; allowed is ta.Limit"),
+        (lambda: ta.Study(questions=[ta.Ranking]), "questions is .*; allowed is ta.Ranking"),
+        (lambda: ta.Study(questions=()), "questions is"),
+        (lambda: ta.Study(questions=[ta.Allocation(), ta.Allocation(grades=True)]), "asks allocation 2 times"),
+        (lambda: ta.Study(effort=None), "effort is None; allowed is 'quick', 'full' or"),
+        (lambda: ta.Study(effort="fast"), "effort 'fast' is not known; the nearest known are full, quick"),
+        (lambda: ta.Study(largest_failed_share="1"), "largest_failed_share is '1'; allowed is 0 to 0.5"),
+        (lambda: ta.Study(seed=True), "seed is True"),
+        (lambda: ta.Limit(upper=True), "upper is True; allowed is a finite number"),
+        (lambda: ta.Limit(upper="60"), "upper is '60'"),
+        (lambda: ta.Limit(upper=60, show=ta.WorstCase), "show is .*WorstCase.*; allowed is AtYield"),
+        (lambda: ta.AtYield(99.73), "guarantee AtYield: target is 99.73; allowed is a share .* such as 0.9973"),
+        (lambda: ta.AtYield(value=0.9973), "field 'value' is not known; the nearest known is target"),
+        (lambda: ta.AtCpk(), "guarantee AtCpk: target is missing; write target="),
+        (
+            lambda: ta.Setting(**{**SETTING, "value": "5"}),
+            r"setting h \[mm\]: value is '5'; allowed is a finite number",
+        ),
+        (lambda: ta.Setting(**{**SETTING, "lower": 6}), "lower is 6; allowed is at most upper = 3"),
+        (lambda: ta.Setting(**{**SETTING, "step": 0}), "step is 0; allowed is above 0"),
+        (lambda: ta.QualityLoss(60.0), "quality loss: at_limit is missing"),
+        (lambda: ta.UnitPrice(scrapp=3.0), "price of a unit: field 'scrapp' is not known; the nearest known is scrap"),
+        (lambda: ta.reducer("rv20e", flank_clearance=5), "flank_clearance is 5; allowed is two numbers"),
+        (lambda: ta.reducer("rv20e", torque=0.0), "reducer rv20e: torque is 0.0; allowed is -1670 to 1670"),
+    ],
+)
+def test_a_slip_is_one_sentence_of_the_project(made, words):
+    with pytest.raises(TolallocError, match=words) as caught:
+        made()
+    assert str(caught.value).endswith(".")
+
+
+def test_numbers_of_numpy_are_numbers_and_one_question_needs_no_list():
+    assert ta.Limit(upper=np.int64(3)).upper == ta.Limit(upper=np.float32(3)).upper == 3.0
+    assert ta.Study(questions=ta.Ranking()).questions == (ta.Ranking(),)
+    assert ta.Study(effort="quick").quick
+    assert not ta.Study(effort="full").quick
+
+
+def test_a_question_of_ones_own_and_a_model_without_a_name_are_shown():
+    class Source:
+        def bound(self, errors, place):
+            raise NotImplementedError
+
+    assert repr(ta.Study(Source(), questions=[Own()])).startswith("Study('study': Source at none")
+    with pytest.raises(UnknownNameError, match="question own: field 'units' is not known; it has none"):
+        Own(units=3)

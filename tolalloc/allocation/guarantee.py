@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +13,7 @@ from tolalloc.allocation.program.problem import Stack
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import NamedFields, is_number
 
 _MISSED = 0.005
 """Share of a worst case by which an ascent may have missed it [-]."""
@@ -79,7 +80,7 @@ class Guarantee(Protocol):
 
 
 @dataclass(frozen=True)
-class AtYield:
+class AtYield(NamedFields):
     """So many units lie within all limits of the output, shown with one-sided 95 % confidence.
 
     Parameters
@@ -94,11 +95,15 @@ class AtYield:
     bound of the yield reaches the target.
     """
 
+    called: ClassVar[str] = "guarantee AtYield"
+    by_position: ClassVar[int] = 1
+
     target: float
 
     def __post_init__(self) -> None:
-        if not 0.5 <= self.target < 1:
-            raise InputError.at("requirement", "yield", self.target, "0.5 up to but not 1")
+        if not (is_number(self.target) and 0.5 <= self.target < 1):
+            share = self.target / 100 if is_number(self.target) and 50 <= self.target < 100 else 0.9973
+            raise InputError.at(self.called, "target", self.target, f"a share from 0.5 to below 1, such as {share:g}")
 
     @property
     def words(self) -> str:
@@ -138,7 +143,7 @@ class AtYield:
 
 
 @dataclass(frozen=True)
-class AtCpk:
+class AtCpk(NamedFields):
     """The capability index of the output reaches a target, shown with one-sided 95 % confidence.
 
     Parameters
@@ -158,11 +163,14 @@ class AtCpk:
     Bissell 1990, Appl. Statist. 39, 331–340; the delta method for other distributions.
     """
 
+    called: ClassVar[str] = "guarantee AtCpk"
+    by_position: ClassVar[int] = 1
+
     target: float
 
     def __post_init__(self) -> None:
-        if not 0 < self.target <= 10:
-            raise InputError.at("requirement", "Cpk", self.target, "above 0 up to 10")
+        if not (is_number(self.target) and 0 < self.target <= 10):
+            raise InputError.at(self.called, "target", self.target, "a Cpk above 0 up to 10")
 
     @property
     def words(self) -> str:

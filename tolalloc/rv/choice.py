@@ -198,9 +198,13 @@ def reducer(
     2
     """
     for field, own in (("flank_clearance", flank_clearance), ("radial_clearance", radial_clearance)):
-        if own is not None and not (len(own) == 2 and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST):
+        if own is not None and not (
+            isinstance(own, Sequence) and len(own) == 2 and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
+        ):
             raise InputError.at(f"reducer {name}", field, own, "two numbers from -50 to 50 µm, the smaller one first")
     chosen = load_reducer(name)
+    if torque is not None:
+        chosen.torque_on_carrier(torque, f"reducer {name}")
     identified = load_identified_stiffness(stiffness) if stiffness else None
     return ReducerChoice(
         reducer=with_stiffness(chosen, identified) if identified else chosen,

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from tolalloc.allocation.effort import QUICK_ALLOCATION, AllocationEffort
+from tolalloc.named_fields import NamedFields
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
+class Effort(NamedFields):
     """How much a study may compute.
 
     Parameters
@@ -21,6 +23,8 @@ class Effort:
     is_quick
         Whether reports shall say that the run is a quick one.
     """
+
+    called: ClassVar[str] = "effort"
 
     ranking: RankingEffort = field(default_factory=RankingEffort)
     allocation: AllocationEffort = field(default_factory=AllocationEffort)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from tolalloc.exceptions import InputError
-from tolalloc.study.named_fields import NamedFields
+from tolalloc.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
     from tolalloc.allocation.guarantee import Guarantee
@@ -48,13 +48,13 @@ class Limit(NamedFields):
     def __post_init__(self) -> None:
         from tolalloc.allocation.guarantee import Guarantee
 
-        if self.show is not None and not isinstance(self.show, Guarantee):
+        if isinstance(self.show, type) or not (self.show is None or isinstance(self.show, Guarantee)):
             raise InputError.at("limit", "show", self.show, "AtYield(...), AtCpk(...), WorstCase() or RootSumSquare()")
         for name in ("upper", "lower"):
             side = getattr(self, name)
             if side is None:
                 continue
-            if not (isinstance(side, int | float) and abs(side) < float("inf")):
+            if not (is_number(side) and abs(side) < float("inf")):
                 raise InputError.at("limit", name, side, "a finite number; an open side is None")
             object.__setattr__(self, name, float(side))  # a study asks the same with 60 and with 60.0
         _ = self.limits

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.study.named_fields import NamedFields
+from tolalloc.named_fields import NamedFields
 
 if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
@@ -28,10 +28,12 @@ class Question(NamedFields, ABC):
     """
 
     kind: ClassVar[str]
-    called: ClassVar[str]
     reads: ClassVar[frozenset[str]] = frozenset(
         {"model", "drawing", "limits", "seed", "largest_failed_share", "effort"}
     )
+
+    def __init_subclass__(cls) -> None:
+        cls.called = f"question {getattr(cls, 'kind', cls.__name__)}"
 
     @abstractmethod
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
@@ -57,7 +59,6 @@ class Ranking(Question):
     """
 
     kind: ClassVar[str] = "ranking"
-    called: ClassVar[str] = "question ranking"
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
@@ -105,7 +106,6 @@ class Allocation(Question):
     """
 
     kind: ClassVar[str] = "allocation"
-    called: ClassVar[str] = "question allocation"
 
     grades: bool = False
     fixed_first: bool = True
@@ -159,7 +159,6 @@ class Calculation(Question):
     """
 
     kind: ClassVar[str] = "calculation"
-    called: ClassVar[str] = "question calculation"
     by_position: ClassVar[int] = 1
     reads: ClassVar[frozenset[str]] = frozenset()
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.named_fields import NamedFields, is_number
 from tolalloc.study.limit import Limit
-from tolalloc.study.named_fields import NamedFields
 from tolalloc.study.questions import Allocation, Question, Ranking, named
 
 if TYPE_CHECKING:
@@ -31,6 +31,29 @@ def _full() -> Effort:
     from tolalloc.study.effort import Effort
 
     return Effort()
+
+
+def _effort(name: str, own: Effort | str, place: str) -> Effort:
+    """Return the effort of a name: ``quick``, or the study's own where that is one, else the full one."""
+    from tolalloc.study.effort import QUICK
+
+    if name not in ("quick", "full"):
+        raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
+    if name == "quick":
+        return QUICK
+    return _full() if isinstance(own, str) else own
+
+
+def _is_source(model: object) -> bool:
+    return hasattr(model, "bound") and not isinstance(model, type)
+
+
+def _is_share(value: object) -> bool:
+    return is_number(value) and 0 <= cast("float", value) < 0.5
+
+
+def _are_questions(given: object) -> bool:
+    return isinstance(given, Sequence) and bool(given) and all(isinstance(one, Question) for one in given)
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,25 +105,27 @@ class Study(NamedFields):
 
     def __post_init__(self) -> None:
         place = f"study {self.name}"
-        object.__setattr__(self, "questions", tuple(self.questions))
-        for name, value, good, allowed in (
-            (
-                "name",
-                self.name,
-                re.fullmatch(_NAME, str(self.name)),
-                "letters, digits, '_', '-', '.', blanks",
-            ),
-            ("seed", self.seed, type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
-            ("largest_failed_share", self.largest_failed_share, 0 <= self.largest_failed_share < 0.5, "0 to 0.5"),
-            (
-                "questions",
-                self.questions,
-                self.questions and all(isinstance(q, Question) for q in self.questions),
-                "ta.Ranking(...), ta.Allocation(...) and other questions",
-            ),
+        if isinstance(self.questions, Question):
+            object.__setattr__(self, "questions", (self.questions,))
+        if isinstance(self.effort, str):
+            object.__setattr__(self, "effort", _effort(self.effort, self.effort, place))
+        for name, good, allowed in (
+            ("name", re.fullmatch(_NAME, str(self.name)), "letters, digits, '_', '-', '.', blanks"),
+            ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
+            ("drawing", self.drawing is None or hasattr(self.drawing, "errors"), "ta.drawing(...)"),
+            ("limits", isinstance(self.limits, Mapping), "a dictionary of outputs and their ta.Limit(...)"),
+            ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
+            ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
+            ("questions", _are_questions(self.questions), "ta.Ranking(...), ta.Allocation(...) and other questions"),
+            ("effort", hasattr(self.effort, "is_quick"), "'quick', 'full' or ta.Effort(...)"),
         ):
             if not good:
-                raise InputError.at(place, name, value, allowed)
+                raise InputError.at(place, name, getattr(self, name), allowed)
+        object.__setattr__(self, "questions", tuple(self.questions))
+        kinds = [question.kind for question in self.questions]
+        for kind in kinds:
+            if kinds.count(kind) > 1:
+                raise InputError(f"{place}: it asks {kind} {kinds.count(kind)} times; a study asks each question once.")
         for output, limit in self.limits.items():
             if not isinstance(limit, Limit):
                 raise InputError.at(place, f"limits[{output!r}]", limit, "ta.Limit(...)")
@@ -121,7 +146,9 @@ class Study(NamedFields):
     def __repr__(self) -> str:
         asked = ", ".join(question.kind for question in self.questions)
         limits = ", ".join(self.limits) or "none"
-        model, drawing = (own.name if own else "none" for own in (self.model, self.drawing))
+        model, drawing = (
+            getattr(own, "name", type(own).__name__) if own else "none" for own in (self.model, self.drawing)
+        )
         return f"Study({self.name!r}: {model} at {drawing}; limits: {limits}; asks: {asked}; seed {self.seed})"
 
     @property
@@ -131,13 +158,8 @@ class Study(NamedFields):
 
     def with_effort(self, effort: Literal["quick", "full"] | Effort) -> Study:
         """Return the study at another effort."""
-        from tolalloc.study.effort import QUICK
-
-        if isinstance(effort, str):
-            if effort not in ("quick", "full"):
-                raise UnknownNameError.among(f"study {self.name}", "effort", effort, ("quick", "full"))
-            return replace(self, effort=QUICK) if effort == "quick" else self
-        return replace(self, effort=effort)
+        chosen = _effort(effort, self.effort, f"study {self.name}") if isinstance(effort, str) else effort
+        return replace(self, effort=chosen)
 
     def ask(
         self,

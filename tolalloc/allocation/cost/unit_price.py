@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import NamedFields, is_number
 
 
 @dataclass(frozen=True, kw_only=True)
-class QualityLoss:
+class QualityLoss(NamedFields):
     """What a unit costs its user although it is within its limit, growing with the square of the deviation.
 
     Raises
@@ -26,13 +28,16 @@ class QualityLoss:
     G. Taguchi, E. A. Elsayed, T. C. Hsiang, Quality Engineering in Production Systems, McGraw-Hill (1989).
     """
 
+    called: ClassVar[str] = "quality loss"
+    by_position: ClassVar[int] = 2
+
     limit: float  # Deviation from the best value at which the loss is `at_limit` [unit of the output]
     at_limit: float  # Loss of a unit at the limit, such as its repair [cost units]
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.limit) and self.limit > 0):
+        if not (is_number(self.limit) and isfinite(self.limit) and self.limit > 0):
             raise InputError.at("quality loss", "limit", self.limit, "a finite number above 0")
-        if not (isfinite(self.at_limit) and self.at_limit >= 0):
+        if not (is_number(self.at_limit) and isfinite(self.at_limit) and self.at_limit >= 0):
             raise InputError.at("quality loss", "at_limit", self.at_limit, "a finite number, 0 or above")
 
     def nominal_is_best(self, offset: float, deviation: float) -> float:
@@ -48,7 +53,7 @@ class QualityLoss:
 
 
 @dataclass(frozen=True, kw_only=True)
-class UnitPrice:
+class UnitPrice(NamedFields):
     """What becomes of units beyond the limit, and so what a good unit costs.
 
     Raises
@@ -56,6 +61,9 @@ class UnitPrice:
     InputError
         A cost below 0 or a share outside 0 to 1.
     """
+
+    called: ClassVar[str] = "price of a unit"
+    by_position: ClassVar[int] = 4
 
     inspection: float = 0.0  # Inspecting one unit [cost units]
     rework_share: float = 0.0  # Share of the units beyond the limit that rework makes good; the others are scrapped [-]
@@ -65,7 +73,7 @@ class UnitPrice:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             largest = 1.0 if name == "rework_share" else np.inf
-            if not (isfinite(value) and 0 <= value <= largest):
+            if not (is_number(value) and isfinite(value) and 0 <= value <= largest):
                 allowed = "a number from 0 to 1" if name == "rework_share" else "a finite number, 0 or above"
                 raise InputError.at("price of a unit", name, value, allowed)
 

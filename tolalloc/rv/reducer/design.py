@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import cos, sqrt
 
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import is_number
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 
 
@@ -185,7 +186,7 @@ class Reducer:
             Zero, where the play leaves the equilibrium undetermined, or beyond ten times the rated torque.
         """
         torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
-        if not 0 < abs(torque) <= largest:
+        if not (is_number(torque) and 0 < abs(torque) <= largest):
             raise InputError.at(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
         return torque
 

@@ -1,15 +1,16 @@
-"""Records of a study whose fields are given by name; a wrong one is refused in one sentence."""
+"""Records that users write, whose fields are given by name; a wrong one is refused in one sentence."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import MISSING, fields
+from numbers import Real
 from typing import Any, ClassVar, Self
 
 from tolalloc.exceptions import InputError, UnknownNameError
 
 
 class NamedFields:
-    """Base of frozen dataclasses that a study is written with.
+    """Base of frozen dataclasses that a user writes.
 
     A dataclass alone answers a wrong field with a bare TypeError.
     """
@@ -25,6 +26,13 @@ class NamedFields:
         for name in named:
             if name not in known:
                 raise UnknownNameError.among(cls._place(named), "field", name, known)
+        missing = [
+            own.name
+            for own in fields(cls)[len(given) :]  # type: ignore[arg-type]
+            if own.default is MISSING and own.default_factory is MISSING and own.name not in named
+        ]
+        if missing:
+            raise InputError(f"{cls._place(named)}: {missing[0]} is missing; write {missing[0]}=....")
         if len(given) > cls.by_position:
             first = f"{known[cls.by_position]}=..." if len(known) > cls.by_position else "nothing"
             raise InputError(f"{cls._place(named)}: {given[cls.by_position]!r} stands without its name; write {first}.")
@@ -34,3 +42,8 @@ class NamedFields:
     def _place(cls, named: dict[str, Any]) -> str:
         """Return who is meant, for messages."""
         return f"{cls.called} {named['name']}" if "name" in named else cls.called
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a number of any kind, NumPy's too; True and False are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
