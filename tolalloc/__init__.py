@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
     from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
+    from tolalloc.allocation.effort import AllocationEffort as AllocationEffort
     from tolalloc.allocation.guarantee import AtCpk as AtCpk
     from tolalloc.allocation.guarantee import AtYield as AtYield
     from tolalloc.allocation.guarantee import RootSumSquare as RootSumSquare
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
+    from tolalloc.drawings.seeds import SeedTree as SeedTree
     from tolalloc.exceptions import InputError as InputError
     from tolalloc.exceptions import RunFolderError as RunFolderError
     from tolalloc.exceptions import SolveError as SolveError
@@ -29,13 +31,18 @@ if TYPE_CHECKING:
     from tolalloc.exceptions import UnknownNameError as UnknownNameError
     from tolalloc.function_model import from_fmu as from_fmu
     from tolalloc.function_model import model as model
+    from tolalloc.models import Evaluation as Evaluation
+    from tolalloc.models import Model as Model
     from tolalloc.models import Setting as Setting
+    from tolalloc.report.answer import Answer as Answer
+    from tolalloc.report.document import Section as Section
     from tolalloc.rv import BACKLASH as BACKLASH
     from tolalloc.rv import LOST_MOTION as LOST_MOTION
     from tolalloc.rv import PEAK_TO_PEAK as PEAK_TO_PEAK
     from tolalloc.rv import RADIAL_CLEARANCE as RADIAL_CLEARANCE
     from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.rv.choice import reducer as reducer
+    from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.study.effort import Effort as Effort
     from tolalloc.study.limit import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -46,22 +53,29 @@ if TYPE_CHECKING:
 
 _WHERE = {
     "Allocation": "study.questions",
+    "AllocationEffort": "allocation.effort",
+    "Answer": "report.answer",
     "AtCpk": "allocation.guarantee",
     "AtYield": "allocation.guarantee",
     "BACKLASH": "rv",
     "Calculation": "study.questions",
     "Drawing": "drawings.drawing",
     "Effort": "study.effort",
+    "Evaluation": "models",
     "InputError": "exceptions",
     "LOST_MOTION": "rv",
     "Limit": "study.limit",
+    "Model": "models",
     "PEAK_TO_PEAK": "rv",
     "QualityLoss": "allocation.cost.unit_price",
     "Question": "study.questions",
     "RADIAL_CLEARANCE": "rv",
     "Ranking": "study.questions",
+    "RankingEffort": "sensitivity.effort",
     "RootSumSquare": "allocation.guarantee",
     "RunFolderError": "exceptions",
+    "Section": "report.document",
+    "SeedTree": "drawings.seeds",
     "Setting": "models",
     "SolveError": "exceptions",
     "Study": "study.study",

@@ -83,6 +83,9 @@ class Answer(ABC):
     shown: ClassVar[tuple[str, ...]] = ()
     """Columns of the first table that a terminal shows; the first six unless an answer says otherwise."""
 
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Answer.__repr__  # type: ignore[method-assign]  # else a dataclass would print all its numbers
+
     @property
     @abstractmethod
     def title(self) -> str:
@@ -184,6 +187,10 @@ class Answer(ABC):
             write_document(self.document, path)
             self.add_files(path)
         return path
+
+    def __repr__(self) -> str:
+        """Return kind, study and model; the numbers behind an answer fill pages."""
+        return f"<{self.kind} answer: {self.header.name}, {self.header.model}>"
 
     def __str__(self) -> str:
         """Return title, sentences and warnings."""

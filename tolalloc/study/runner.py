@@ -33,6 +33,10 @@ class Run:
     folder: Path | None
     document: Document
 
+    def __repr__(self) -> str:
+        """Return what was answered and where it stands."""
+        return f"<run of {', '.join(self.answers)}: {self.folder or 'nothing written'}>"
+
     def __getitem__(self, kind: str) -> Answer:
         return self.answers[kind]
 

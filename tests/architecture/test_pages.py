@@ -1,0 +1,49 @@
+"""The Python on the pages works as it stands, and the page of public names lists all of them."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import tolalloc as ta
+
+ROOT = Path(__file__).parents[2]
+PAGES = ("README.md", "docs/first-study.md", "docs/own-model.md", "docs/extending.md")
+
+
+def blocks(page: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES)
+def test_the_python_on_a_page_works(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    module = ModuleType("page_of_the_documents")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    assert blocks(page)
+    for block in blocks(page):
+        exec(compile(block, page, "exec", dont_inherit=True), vars(module))
+        shown = [repr(made) for made in vars(module).values() if isinstance(made, ta.Study | ta.Answer)]
+        assert all(len(line) < 300 for line in shown)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_import_public_names_alone(page):
+    for block in blocks(page):
+        if "SpringGroup" not in block:  # a new file of the package itself
+            assert not re.search(r"from tolalloc|import tolalloc\.", block)
+
+
+def test_the_page_of_public_names_lists_each_with_its_first_line():
+    page = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    for name in ta.__all__:
+        found = getattr(ta, name)
+        said = f'"{found}"' if isinstance(found, str) else (inspect.getdoc(found) or "").splitlines()[0]
+        assert f"| `{name}` | {said} |" in page
+    assert page.count("| `") == len(ta.__all__)
