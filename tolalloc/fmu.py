@@ -1,4 +1,4 @@
-"""Functional Mock-up Units, simulated by FMPy: an optional extra (``pip install tolalloc[fmu]``)."""
+"""Functional Mock-up Units, simulated by FMPy: an optional extra (``pip install -e '.[fmu]'``)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def simulated(path: str, parameters: tuple[str, ...], variables: tuple[str, ...]
     try:
         import fmpy
     except ImportError:
-        raise InputError("Functional Mock-up Units need the optional extra: pip install tolalloc[fmu].") from None
+        raise InputError("Functional Mock-up Units need the optional extra: pip install -e '.[fmu]'.") from None
     if not Path(path).is_file():
         raise InputError(f"{path}: no such Functional Mock-up Unit.")
     return SimulatedUnit(Path(path), parameters, variables, stop_time, fmpy)

@@ -91,6 +91,11 @@ def test_the_command_line_says_what_a_study_does_not_know_in_one_sentence(tmp_pa
     assert len(result.stderr.strip().splitlines()) == 1
 
 
+def test_the_command_line_says_its_version():
+    result = tolalloc("--version")
+    assert (result.returncode, result.stdout.strip()) == (0, f"tolalloc {ta.__version__}")
+
+
 def test_a_whole_number_is_a_limit_like_any_other():
     assert ta.Limit(upper=60, lower=-1) == ta.Limit(upper=60.0, lower=-1.0)
     assert repr(ta.Limit(upper=60)) == repr(ta.Limit(upper=60.0))

@@ -140,7 +140,7 @@ def test_a_mock_up_unit_is_a_function_of_its_parameters(monkeypatch, tmp_path):
 
 def test_without_the_extra_a_mock_up_unit_is_refused_in_one_sentence(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    with pytest.raises(ta.InputError, match=r"need the optional extra: pip install tolalloc\[fmu\]"):
+    with pytest.raises(ta.InputError, match=r"need the optional extra: pip install -e '\.\[fmu\]'"):
         ta.from_fmu(str(tmp_path / "gap.fmu"), inputs={"a": "a"}, outputs={"b [mm]": "b"})
 
 

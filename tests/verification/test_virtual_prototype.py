@@ -268,7 +268,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(rigid, monkeypatch)
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr(door, "import_module", missing)
-    with pytest.raises(InputError, match=r"optional extra: pip install tolalloc\[multibody\]\.$"):
+    with pytest.raises(InputError, match=r"optional extra: pip install -e '\.\[multibody\]'\.$"):
         brief_run(rigid, -1.0)
 
 

@@ -27,7 +27,7 @@ def engine() -> Any:
         return import_module("exudyn")
     except ImportError as missing:
         raise InputError(
-            "virtual prototype: the multibody engine needs the optional extra: pip install tolalloc[multibody]."
+            "virtual prototype: the multibody engine needs the optional extra: pip install -e '.[multibody]'."
         ) from missing
 
 
