@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import log_ndtr, ndtr
 
-from tolalloc.capability.rare_failure.limit_state import LimitValues
 from tolalloc.exceptions import InputError
 
 
@@ -144,9 +143,9 @@ class LimitOfInputs:
         """Return the inputs of points of standard normal space [units of the inputs]."""
         return np.column_stack([item.value(column) for item, column in zip(self.marginals, u.T, strict=True)])
 
-    def __call__(self, u: Float[np.ndarray, "sample variable"]) -> LimitValues:
+    def __call__(self, u: Float[np.ndarray, "sample variable"]) -> np.ndarray:
         """Return the distance of every sample from the limit."""
-        return LimitValues(values=self.margin(self.inputs(u)), status=np.zeros(u.shape[0], np.uint8))
+        return self.margin(self.inputs(u))
 
 
 def _require_positive(owner: object, field: str, value: float) -> None:

@@ -16,9 +16,8 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
+from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
-from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
-from tolalloc.capability.rare_failure.importance import importance_sampling
 from tolalloc.capability.rare_failure.limit_state import RareFailure
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.drawings.seeds import SeedTree
@@ -149,7 +148,7 @@ def test_first_order_probability_of_the_shaft_differs_from_the_published_one():
     """The point found lies on the limit, so the distance to the failure is no larger than its own."""
     point = design_point(problem("RP14"))
     assert point.converged
-    assert problem("RP14")(point.u[np.newaxis]).values[0] == pytest.approx(0.0, abs=1e-4)
+    assert problem("RP14")(point.u[np.newaxis])[0] == pytest.approx(0.0, abs=1e-4)
     assert point.probability == pytest.approx(7.0e-4, rel=0.01)
     assert point.probability > 500 * 7.007e-7
 
@@ -158,8 +157,8 @@ def test_first_order_probability_of_the_shaft_differs_from_the_published_one():
 def test_design_point_is_that_of_another_method(name):
     """Sequential quadratic programming on the same problem ends at the same distance."""
     limit, point = problem(name), design_point(problem(name))
-    scale = limit(np.zeros((1, limit.variables))).values[0]
-    constraint = {"type": "eq", "fun": lambda u: limit(u[np.newaxis]).values[0] / scale}
+    scale = limit(np.zeros((1, limit.variables)))[0]
+    constraint = {"type": "eq", "fun": lambda u: limit(u[np.newaxis])[0] / scale}
     start = np.full(limit.variables, 0.1)
     other = minimize(lambda u: 0.5 * u @ u, start, jac=lambda u: u, constraints=constraint, options={"maxiter": 500})
     assert other.success

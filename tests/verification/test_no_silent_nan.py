@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from tests.first_order import DesignPoints, design_point, design_points
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
-from tolalloc.capability.rare_failure.importance import importance_sampling, widened_sampling
+from tolalloc.capability.rare_failure.importance import widened_sampling
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit

@@ -9,10 +9,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import gumbel_r, kstest, lognorm, norm, uniform
 
+from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
-from tolalloc.capability.rare_failure.form import DesignPoints, design_point, design_points
-from tolalloc.capability.rare_failure.importance import importance_sampling
-from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, LimitValues
+from tolalloc.capability.rare_failure.limit_state import CountedLimitState
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -28,18 +27,12 @@ class Flat:
     both_sides: bool = False
     seen: list[int] = field(default_factory=list)
 
-    def __call__(self, u: np.ndarray) -> LimitValues:
+    def __call__(self, u: np.ndarray) -> np.ndarray:
         self.seen.append(u.shape[0])
         along = u.sum(axis=1) / np.sqrt(self.variables)
         along = np.abs(along) if self.both_sides else along
         status = (np.abs(u[:, -1]) > self.blind_beyond).astype(np.uint8)
-        return LimitValues(values=np.where(status, np.nan, self.beta - along), status=status)
-
-
-@dataclass(frozen=True)
-class FlatWithGradient(Flat):
-    def gradient(self, u: np.ndarray) -> np.ndarray:
-        return np.full(u.shape, -1 / np.sqrt(self.variables))
+        return np.where(status, np.nan, self.beta - along)
 
 
 @dataclass(frozen=True)
@@ -50,9 +43,8 @@ class Bent:
     bend: float
     variables: int = 2
 
-    def __call__(self, u: np.ndarray) -> LimitValues:
-        values = self.beta + self.bend / 2 * u[:, 1] ** 2 - u[:, 0]
-        return LimitValues(values=values, status=np.zeros(u.shape[0], np.uint8))
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        return self.beta + self.bend / 2 * u[:, 1] ** 2 - u[:, 0]
 
     @property
     def exact(self) -> float:
@@ -66,8 +58,8 @@ class Step:
     bound: float
     variables: int = 2
 
-    def __call__(self, u: np.ndarray) -> LimitValues:
-        return LimitValues(values=np.where(u[:, 0] < self.bound, 1.0, -1.0), status=np.zeros(u.shape[0], np.uint8))
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        return np.where(u[:, 0] < self.bound, 1.0, -1.0)
 
 
 def test_failures_of_one_in_ten_million_take_few_calls():
@@ -164,19 +156,12 @@ def test_a_value_that_is_not_finite_is_a_failed_sample():
     class Holed:
         variables = 1
 
-        def __call__(self, u: np.ndarray) -> LimitValues:
-            return LimitValues(values=np.where(u[:, 0] > 0, -np.inf, 1.0), status=np.zeros(u.shape[0], np.uint8))
+        def __call__(self, u: np.ndarray) -> np.ndarray:
+            return np.where(u[:, 0] > 0, -np.inf, 1.0)
 
     counted = CountedLimitState(Holed())
     np.testing.assert_array_equal(counted.values(np.array([[1.0], [-1.0]])), [np.inf, 1.0])
     assert (counted.calls, counted.failed) == (2, 1)
-
-
-def test_given_gradient_saves_calls():
-    plain, given = design_point(Flat(beta=3.0, variables=20)), design_point(FlatWithGradient(beta=3.0, variables=20))
-    np.testing.assert_allclose(plain.u, given.u, atol=1e-6)
-    assert given.calls < plain.calls / 10
-    assert isinstance(FlatWithGradient(beta=3.0), LimitState)
 
 
 def test_origin_in_the_failure_has_a_negative_index():
@@ -235,9 +220,8 @@ def test_steps_to_failed_samples_are_shortened():
     class Steep:
         variables = 2
 
-        def __call__(self, u: np.ndarray) -> LimitValues:
-            status = (u[:, 0] > 8.0).astype(np.uint8)
-            return LimitValues(values=1 - np.exp(np.minimum(u[:, 0], 8.0) - 3), status=status)
+        def __call__(self, u: np.ndarray) -> np.ndarray:
+            return np.where(u[:, 0] > 8.0, np.nan, 1 - np.exp(np.minimum(u[:, 0], 8.0) - 3))
 
     point = design_point(Steep())
     assert point.converged
@@ -287,4 +271,4 @@ def test_marginals_have_their_distributions(generator):
     assert np.isfinite(LargestValue(mean=0.0, deviation=1.0).value(np.array([-50.0, 50.0]))).all()
     assert LogNormal(mean=1.0, deviation=1.0).value(np.array([5000.0]))[0] == np.inf
     both = LimitOfInputs(marginals=(Normal(mean=1.0, deviation=2.0),) * 2, margin=lambda x: x.sum(axis=1))
-    np.testing.assert_array_equal(both(np.ones((3, 2))).values, [6.0] * 3)
+    np.testing.assert_array_equal(both(np.ones((3, 2))), [6.0] * 3)

@@ -12,15 +12,11 @@ from scipy.stats import chi2, norm
 from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
-from tolalloc.capability.rare_failure.form import design_point
 from tolalloc.capability.rare_failure.importance import widened_sampling
 from tolalloc.capability.rare_failure.limit_state import (
     Level,
-    LimitState,
-    LimitStateWithGradient,
     RareFailure,
     ResponseLimit,
-    ResponseLimitWithGradient,
 )
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
 from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
@@ -31,7 +27,6 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation
-from tolalloc.rv.response.kernel import WithDerivatives
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:
@@ -73,26 +68,6 @@ class Radius(Sum):
         return Evaluation(values=values, status=np.zeros(x.shape[0], np.uint8))
 
 
-@dataclass(frozen=True)
-class Bent(Sum):
-    """A smooth mixture of all columns, with its derivatives."""
-
-    def __call__(self, x: np.ndarray) -> Evaluation:
-        return self.with_derivatives(x).evaluation
-
-    def with_derivatives(self, x: np.ndarray) -> WithDerivatives:
-        weights = np.arange(1.0, x.shape[1] + 1)
-        along = x @ weights
-        return WithDerivatives(
-            evaluation=Evaluation(
-                values=(np.sin(along) + x[:, 0] ** 2)[:, np.newaxis], status=(x[:, 0] > 4).astype(np.uint8)
-            ),
-            by_column=np.cos(along)[:, np.newaxis] * weights + 2 * x[:, :1] * np.eye(x.shape[1])[0],
-            by_modification=np.zeros((x.shape[0], 2)),
-            by_stiffness={},
-        )
-
-
 def limited(kind: type[Sum], errors: ErrorModel, limit: float, seed: int = 0) -> ResponseLimit:
     return ResponseLimit(experiment=Experiment.of(kind(errors.columns), errors, SeedTree(seed)), limit=limit)
 
@@ -114,27 +89,12 @@ MIXED = ErrorModel(
 
 
 def test_deviations_have_the_distributions_of_the_error_model(generator):
-    limit = ResponseLimit(experiment=Experiment.of(Bent(MIXED.columns), MIXED, SeedTree(0)), limit=1.0)
+    limit = ResponseLimit(experiment=Experiment.of(Sum(MIXED.columns), MIXED, SeedTree(0)), limit=1.0)
     u = generator.standard_normal((50, limit.variables))
     expected = MIXED.deviations(MIXED.standard_values(ndtr(u)), MIXED.zones)
     np.testing.assert_array_equal(limit.deviations(u), expected)
     assert np.isfinite(limit.deviations(np.full((1, limit.variables), 40.0))).all()
     assert np.isfinite(limit.deviations(np.full((1, limit.variables), -35.0))).all()
-
-
-def test_gradient_agrees_with_differences_where_columns_mix(generator):
-    limit = ResponseLimitWithGradient(experiment=Experiment.of(Bent(MIXED.columns), MIXED, SeedTree(0)), limit=1.0)
-    assert isinstance(limit, LimitStateWithGradient)
-    assert not isinstance(limited(Sum, MIXED, 1.0), LimitStateWithGradient)
-    assert isinstance(limited(Sum, MIXED, 1.0), LimitState)
-    u = 0.5 * generator.standard_normal((20, limit.variables))
-    found, step = limit.gradient(u), 1e-5
-    for variable, shift in enumerate(step * np.eye(limit.variables)):
-        differences = (limit(u + shift).values - limit(u - shift).values) / (2 * step)
-        np.testing.assert_allclose(found[:, variable], differences, atol=2e-4 * np.abs(found).max())
-    lost = np.zeros((1, limit.variables))
-    lost[0, 0] = 5.0
-    assert np.isnan(limit.gradient(lost)).all()
 
 
 def test_share_that_is_not_rare_is_left_to_random_units():
@@ -260,12 +220,10 @@ def test_kernel_agrees_with_random_units():
     """A share near 1 % by small subset simulations, within 3.5 standard errors of random units of another seed."""
     study = prepared(name="kernel")
     errors, kernel = study.errors, study.model.kernel
-    limit = ResponseLimitWithGradient(experiment=Experiment.of(kernel, errors, SeedTree(0)), limit=80.0)
+    limit = ResponseLimit(experiment=Experiment.of(kernel, errors, SeedTree(0)), limit=80.0)
     units = monte_carlo(Experiment.of(kernel, errors, SeedTree(1, ("units",))), 3000)
     share = 1 - units.within(80.0).estimate
     found = subset_simulation(limit, SeedTree(0), samples=1000, runs=2)
     error = np.hypot(found.standard_error, np.sqrt(share / 3000))
     assert abs(found.probability - share) <= 3.5 * error
     assert found.trustworthy
-    assert limit.gradient(np.zeros((1, limit.variables))).shape == (1, 60)
-    assert design_point(limit, largest_steps=2).failed == 0

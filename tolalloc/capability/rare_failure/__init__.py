@@ -1,1 +1,1 @@
-"""Rare failures: the design point, subset simulation and importance sampling in standard normal space."""
+"""Rare failures: subset simulation and widened sampling in standard normal space."""
