@@ -15,7 +15,7 @@ from tolalloc.models import Evaluation, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
-from tolalloc.surrogate.choice import Gate, choose
+from tolalloc.surrogate.choice import choose, shortfalls
 from tolalloc.surrogate.regression import (
     RegressionCandidate,
     fit_surrogate,
@@ -150,7 +150,7 @@ def test_the_quantile_compared_is_the_one_asked_for_and_is_named():
     assert choice.table["error of the 90 % quantile [arcsec]"] == [found[0.9].quantile_error]
     assert replace(choice.scores[0], target=0.99995).quantile_name == "99.995 % quantile"
     off = replace(GOOD, quantile_error=3.0)
-    assert Gate().shortfalls(off) == ("its 99.73 % quantile is off by 6.0%, more than 2.0%",)
+    assert shortfalls(off) == ("its 99.73 % quantile is off by 6.0%, more than 2.0%",)
     with pytest.raises(InputError, match="quantile"):
         cross_validate(Fixed(Exact()), answers, 1.0)
 
@@ -175,7 +175,7 @@ def test_a_memory_of_answers_is_worth_nothing_on_noise():
 def test_the_best_of_those_that_pass_is_fitted_to_all_answers():
     x, slow = samples(200), Exact()
     rough, best = Fixed(Exact(noise=0.1), "rough"), Fixed(Exact(), "best")
-    choice = choose(slow, (rough, best, regression()), x, SeedTree(0), Gate(quantile_error=0.1))
+    choice = choose(slow, (rough, best, regression()), x, SeedTree(0))
     assert choice.scores[choice.best].name == "best"
     assert choice.chosen is best.response
     assert best.shown[-1].shape[0] == 200
@@ -199,8 +199,8 @@ def test_below_the_gate_nothing_stands_in():
     ],
 )
 def test_the_gate_asks_for_every_one_of_its_numbers(change, phrase):
-    assert Gate().shortfalls(GOOD) == ()
-    (shortfall,) = Gate().shortfalls(replace(GOOD, **change))
+    assert shortfalls(GOOD) == ()
+    (shortfall,) = shortfalls(replace(GOOD, **change))
     assert phrase in shortfall
 
 
@@ -218,7 +218,7 @@ def test_failed_predictions_are_counted_and_close_the_gate():
     score = cross_validate(Fixed(Exact(fail=(0,))), answers)
     assert score.failed == 5
     assert score.q2 == 1.0
-    assert any("fail" in phrase for phrase in Gate().shortfalls(score))
+    assert any("fail" in phrase for phrase in shortfalls(score))
     with pytest.raises(SolveError, match="every prediction of fixed failed"):
         cross_validate(Fixed(Exact(fail=tuple(range(40)))), answers)
 

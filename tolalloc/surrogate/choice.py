@@ -15,26 +15,27 @@ from tolalloc.surrogate.regression import NEEDED_Q2
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
 
 
-@dataclass(frozen=True, kw_only=True)
-class Gate:
-    """What a surrogate must reach on answers that it has not seen."""
+LARGEST_QUANTILE_ERROR = 0.02
+"""Largest error of the quantile over the quantile with which a surrogate is used [-]."""
+LARGEST_FAILED_SHARE = 0.01
+"""Largest share of failed predictions with which a surrogate is used [-]."""
 
-    q2: float = NEEDED_Q2  # Smallest predictivity [-]
-    quantile_error: float = 0.02  # Largest error of the quantile over the quantile [-]
-    failed_share: float = 0.01  # Largest share of failed predictions [-]
 
-    def shortfalls(self, score: Score) -> tuple[str, ...]:
-        """Return what a candidate fails in, one phrase each; nothing if it has earned its place."""
-        quantile_error, failed = abs(score.quantile_share), score.failed / score.held_out
-        checks = (
-            (score.q2 >= self.q2, f"Q² = {score.q2:.3f} is below {self.q2:g}"),
-            (
-                quantile_error <= self.quantile_error,
-                f"its {score.quantile_name} is off by {quantile_error:.1%}, more than {self.quantile_error:.1%}",
-            ),
-            (failed <= self.failed_share, f"{failed:.1%} of its predictions fail, more than {self.failed_share:.1%}"),
-        )
-        return tuple(phrase for passed, phrase in checks if not passed)
+def shortfalls(score: Score) -> tuple[str, ...]:
+    """Return what a candidate fails in, one phrase each; nothing if it has earned its place."""
+    quantile_error, failed = abs(score.quantile_share), score.failed / score.held_out
+    checks = (
+        (score.q2 >= NEEDED_Q2, f"Q² = {score.q2:.3f} is below {NEEDED_Q2:g}"),
+        (
+            quantile_error <= LARGEST_QUANTILE_ERROR,
+            f"its {score.quantile_name} is off by {quantile_error:.1%}, more than {LARGEST_QUANTILE_ERROR:.1%}",
+        ),
+        (
+            failed <= LARGEST_FAILED_SHARE,
+            f"{failed:.1%} of its predictions fail, more than {LARGEST_FAILED_SHARE:.1%}",
+        ),
+    )
+    return tuple(phrase for passed, phrase in checks if not passed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +44,6 @@ class Choice:
 
     output: str  # What is predicted, with its unit of measurement
     scores: tuple[Score, ...]  # One per candidate
-    gate: Gate  # What they had to reach
     failed: int  # Answers to learn from that failed and were left out [-]
     best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
     chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
@@ -53,10 +53,7 @@ class Choice:
         """Sentence that says why."""
         score = self.scores[self.best]
         if self.chosen is None:
-            return (
-                f"No surrogate is used; the best, {score.name}, does not pass: "
-                f"{'; '.join(self.gate.shortfalls(score))}."
-            )
+            return f"No surrogate is used; the best, {score.name}, does not pass: {'; '.join(shortfalls(score))}."
         return (
             f"The surrogate is {score.name}: Q² = {score.q2:.3f} on {score.held_out} answers that it had not seen, its "
             f"{score.quantile_name} off by {abs(score.quantile_share):.1%}."
@@ -77,7 +74,7 @@ class Choice:
             "trained on [-]": [score.trained for score in self.scores],
             "held out [-]": [score.held_out for score in self.scores],
             "failed [-]": [score.failed for score in self.scores],
-            "falls short": ["; ".join(self.gate.shortfalls(score)) or "nowhere" for score in self.scores],
+            "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in self.scores],
         }
 
 
@@ -86,7 +83,6 @@ def choose(
     candidates: Sequence[Candidate],
     x: Float[np.ndarray, "sample column"],
     seeds: SeedTree,
-    gate: Gate = Gate(),
     quantile: float = 0.9973,
     largest_failed_share: float = 0.01,
 ) -> Choice:
@@ -102,8 +98,6 @@ def choose(
         Columns of random samples to learn from and to be judged on, in five folds [m, angles rad].
     seeds
         Node of the seed tree.
-    gate
-        What must be reached.
     quantile
         Share of the units below the quantile that is compared, the yield that the surrogate is asked about [-].
     largest_failed_share
@@ -125,12 +119,11 @@ def choose(
         raise InputError.at("surrogate", "candidates", tuple(candidates), "one or more")
     answers = answers_of(response, x, seeds, largest_failed_share=largest_failed_share)
     scores = tuple(cross_validate(candidate, answers, quantile) for candidate in candidates)
-    passed = [at for at, score in enumerate(scores) if not gate.shortfalls(score)]
+    passed = [at for at, score in enumerate(scores) if not shortfalls(score)]
     best = max(passed or range(len(scores)), key=lambda at: scores[at].q2)
     return Choice(
         output=response.outputs[0],
         scores=scores,
-        gate=gate,
         failed=answers.failed,
         best=best,
         chosen=candidates[best].fit(answers.x, answers.y) if passed else None,
