@@ -21,7 +21,7 @@ from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.surrogate.regression import Surrogate
+from tolalloc.surrogate.validation import Score
 
 _SPAN = 2.5
 """Factor around the scales of a design within which the surrogate learns [-]."""
@@ -106,8 +106,8 @@ def searched_front(
     ladders: Ladders | None = None,
     further: tuple[Criterion, ...] = (),
     checkpoint: Checkpoint | None = None,
-) -> tuple[Front, Surrogate]:
-    """Return the front of cost against the quantile of the peak-to-peak around a verified design, and its surrogate.
+) -> tuple[Front, Score]:
+    """Return the front of cost against the quantile of the peak-to-peak around a verified design, and its surrogate's worth.
 
     Parameters
     ----------
@@ -160,11 +160,11 @@ class Fronts:
         The front of NSGA-II on the corrected model, cost against quantile, with runs of the real model along it.
     with_setting
         The front of NSGA-III with the last setting as a third objective, to be large; none without settings.
-    surrogate
-        What the searches ran on, with its Q².
+    score
+        What the surrogate is worth that the searches ran on if its Q² is high enough.
     """
 
     exact: ConvexFront
     searched: Front
     with_setting: Front | None
-    surrogate: Surrogate
+    score: Score

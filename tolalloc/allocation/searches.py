@@ -189,7 +189,7 @@ class DrawingQuestion:
             for own in further
         ]
         third = searched[1][0] if len(searched) > 1 else None
-        return Fronts(exact=exact, searched=searched[0][0], with_setting=third, surrogate=searched[0][1])
+        return Fronts(exact=exact, searched=searched[0][0], with_setting=third, score=searched[0][1])
 
     def robustness(self, free: ZoneAllocation) -> Robustness:
         """Return the answers under changed assumptions."""

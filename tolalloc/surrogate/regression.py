@@ -174,33 +174,6 @@ class Regression:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surrogate(Regression):
-    """A regression with its error on answers that it has not seen.
-
-    Parameters
-    ----------
-    columns, outputs, estimator, baseline
-        As in `Regression`.
-    q2
-        Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) on held-out answers [-].
-    rms_error
-        Root-mean-square error on held-out answers [output].
-    trained, held_out
-        Numbers of answers [-].
-    """
-
-    q2: float
-    rms_error: float
-    trained: int
-    held_out: int
-
-    @property
-    def earns_its_place(self) -> bool:
-        """Whether Q² is high enough for the surrogate to be used."""
-        return self.q2 >= NEEDED_Q2
-
-
-@dataclass(frozen=True, kw_only=True)
 class RegressionCandidate:
     """A regression that may stand in for a response with one output."""
 
@@ -209,10 +182,12 @@ class RegressionCandidate:
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
     estimator: Callable[[], Any]  # Makes the unfitted scikit-learn regressor
+    baseline: Baseline = _no_baseline  # A rough positive answer; the regressor learns the ratio to it
 
     def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
         """Return the regression through answers."""
-        return Regression(columns=self.columns, outputs=self.outputs, estimator=fitted(self.estimator(), x, y))
+        estimator = fitted(self.estimator(), x, y / self.baseline(x))
+        return Regression(columns=self.columns, outputs=self.outputs, estimator=estimator, baseline=self.baseline)
 
 
 def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
@@ -266,43 +241,3 @@ def gaussian_process(columns: int) -> Any:
     kernel = ConstantKernel(10.0) * RBF(np.full(columns, 3.0), (0.3, 1e3)) + WhiteKernel(1e-3, (1e-8, 1.0))
     process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=1))
     return TransformedTargetRegressor(process, func=np.log, inverse_func=np.exp)
-
-
-def fit_surrogate(
-    estimator: Any,
-    columns: tuple[str, ...],
-    output: str,
-    x: Float[np.ndarray, "sample column"],
-    y: Float[np.ndarray, " sample"],
-    held_out: int,
-    baseline: Baseline = _no_baseline,
-) -> Surrogate:
-    """Return the estimator fitted to all but the last answers, judged on those.
-
-    Parameters
-    ----------
-    estimator
-        An unfitted scikit-learn regressor.
-    columns, output
-        Names of the inputs and of the output.
-    x, y
-        Inputs and answers in random order.
-    held_out
-        Number of last answers that the fit must not see [-].
-    baseline
-        A rough positive answer; the estimator learns the ratio to it.
-    """
-    seen = slice(0, y.size - held_out)
-    unseen = slice(y.size - held_out, y.size)
-    fitted(estimator, x[seen], y[seen] / baseline(x[seen]))
-    error = np.asarray(estimator.predict(x[unseen]) * baseline(x[unseen])) - y[unseen]
-    return Surrogate(
-        columns=columns,
-        outputs=(output,),
-        estimator=estimator,
-        baseline=baseline,
-        q2=float(1 - (error**2).sum() / ((y[unseen] - y[seen].mean()) ** 2).sum()),
-        rms_error=float(np.sqrt((error**2).mean())),
-        trained=y.size - held_out,
-        held_out=held_out,
-    )

@@ -9,6 +9,7 @@ from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.wording import short, unit_of, with_unit
+from tolalloc.surrogate.regression import NEEDED_Q2
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
@@ -226,7 +227,7 @@ def _fronts(answer: AllocationAnswer) -> list[str]:
     if answer.fronts is None:
         return []
     found, lost = [], answer.fronts.searched.failed
-    if not answer.fronts.surrogate.earns_its_place:
+    if not answer.fronts.score.q2 >= NEEDED_Q2:
         found.append("The corrected model of the front has not earned its place; its search ran on the kernel, short.")
     if lost:
         found.append(

@@ -15,8 +15,8 @@ from tolalloc.allocation.pareto.problem import Criterion, DesignProblem, Ladders
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.surrogate.regression import Baseline, Regression, Surrogate, fitted, gaussian_process
-from tolalloc.surrogate.validation import FOLDS, Answers, answers_of, cross_validate
+from tolalloc.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
+from tolalloc.surrogate.validation import FOLDS, Score, answers_of, cross_validate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,8 @@ def pareto_front(
     sides: tuple[Side, ...] = (),
     checkpoint: Checkpoint | None = None,
     largest_failed_share: float = 0.05,
-) -> tuple[Front, Surrogate]:
-    """Return the front and the surrogate it was found on, improved by kernel runs along the front.
+) -> tuple[Front, Score]:
+    """Return the front, improved by kernel runs along it, and what the surrogate that it was found on is worth.
 
     Parameters
     ----------
@@ -113,13 +113,21 @@ def pareto_front(
     problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further, sides=sides)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
-    candidate = _Corrected(columns=response.columns, outputs=response.outputs, baseline=baseline, floor=floor)
+    candidate = RegressionCandidate(
+        name="corrected convex model",
+        columns=response.columns,
+        outputs=response.outputs,
+        estimator=lambda: gaussian_process(len(response.columns)),
+        # Far from its design the convex model may fall below zero.
+        baseline=lambda x: np.maximum(baseline(x), floor),
+    )
     for number in range(effort.rounds):
         own = seeds.child(str(number))
-        surrogate = candidate.judged(answers_of(kernel, asked, own.child("surrogate"), FOLDS, largest_failed_share))
-        trusted = surrogate.earns_its_place
+        answers = answers_of(kernel, asked, own.child("surrogate"), FOLDS, largest_failed_share)
+        score = cross_validate(candidate, answers)
+        trusted = score.q2 >= NEEDED_Q2
         found = search(
-            replace(problem, quantile=surrogate) if trusted else problem,
+            replace(problem, quantile=candidate.fit(answers.x, answers.y)) if trusted else problem,
             known,
             own,
             effort.population if trusted else effort.population_on_kernel,
@@ -132,38 +140,4 @@ def pareto_front(
         asked = np.concatenate([asked, front.designs[picked]])
         known = np.concatenate([known, problem.genes_of(front.designs[picked])])
     kernel.answers.write()
-    return replace(front, failed=int(np.count_nonzero(~kernel(asked).good))), surrogate
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Corrected:
-    """The convex model corrected by a Gaussian process of their ratio."""
-
-    columns: tuple[str, ...]
-    outputs: tuple[str, ...]
-    baseline: Baseline
-    floor: float
-    name: str = "corrected convex model"
-
-    def rough(self, x: Float[np.ndarray, "design variable"]) -> Float[np.ndarray, " design"]:
-        """Return the convex model, which may fall below zero far from its design, above zero [unit of the output]."""
-        return np.maximum(self.baseline(x), self.floor)
-
-    def fit(self, x: Float[np.ndarray, "design variable"], y: Float[np.ndarray, " design"]) -> Regression:
-        """Return the correction through answers."""
-        estimator = fitted(gaussian_process(len(self.columns)), x, y / self.rough(x))
-        return Regression(columns=self.columns, outputs=self.outputs, estimator=estimator, baseline=self.rough)
-
-    def judged(self, answers: Answers) -> Surrogate:
-        """Return the correction through all answers, judged on each by a fit that has not seen it."""
-        score, whole = cross_validate(self, answers), self.fit(answers.x, answers.y)
-        return Surrogate(
-            columns=self.columns,
-            outputs=self.outputs,
-            estimator=whole.estimator,
-            baseline=self.rough,
-            q2=score.q2,
-            rms_error=score.rms_error,
-            trained=answers.y.size,
-            held_out=score.held_out,
-        )
+    return replace(front, failed=int(np.count_nonzero(~kernel(asked).good))), score
