@@ -14,7 +14,6 @@ from tolalloc.models import Response
 from tolalloc.surrogate.regression import NEEDED_Q2
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
 
-
 LARGEST_QUANTILE_ERROR = 0.02
 """Largest error of the quantile over the quantile with which a surrogate is used [-]."""
 LARGEST_FAILED_SHARE = 0.01
