@@ -107,7 +107,7 @@ def searched_front(
     further: tuple[Criterion, ...] = (),
     checkpoint: Checkpoint | None = None,
 ) -> tuple[Front, Score]:
-    """Return the front of cost against the quantile of the peak-to-peak around a verified design, and its surrogate's worth.
+    """Return the front of cost against the quantile of the output around a verified design, and its surrogate's score.
 
     Parameters
     ----------
