@@ -18,7 +18,7 @@ from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.convex import front
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
-from tolalloc.allocation.quantile import LocalQuantile, QuantileResponse
+from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.surrogate.validation import Score
@@ -135,7 +135,7 @@ def searched_front(
     sides = tuple(replace(side, stack=replace(own, budget=own.budget + 1e-9 * side.scale)) for side, own in others)
     return pareto_front(
         replace(response, spread=best.spread),
-        LocalQuantile(side=best.sides[0]),
+        best.sides[0].predicted_value,
         best.sides[0].limit / 60,
         _designs_around(response.space, best.design, effort.designs, seeds.child("designs")),
         np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.local_model import Side
 from tolalloc.models import Evaluation, Model
 
 
@@ -61,20 +60,3 @@ class QuantileResponse:
             values[at, 0] = units.mean() + self.spread * units.std(ddof=1) if units.size > 1 else np.nan
             status[at] = evaluation.status.max()
         return Evaluation(values=values, status=status)
-
-
-@dataclass(frozen=True, kw_only=True)
-class LocalQuantile:
-    """The quantile that the convex model around a verified design predicts for other designs.
-
-    Parameters
-    ----------
-    side
-        The limited side of the output at the verified design, with its model.
-    """
-
-    side: Side
-
-    def __call__(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
-        """Return the model's quantile [unit of the output]."""
-        return self.side.limit + self.side.sign * self.side.predicted(designs)
