@@ -15,7 +15,7 @@ from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.found import nondominated
 from tolalloc.allocation.pareto.front import pareto_front
-from tolalloc.allocation.pareto.problem import DesignProblem, large
+from tolalloc.allocation.pareto.problem import DesignProblem
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
@@ -24,7 +24,6 @@ from tolalloc.rv.model import RADIAL
 from tolalloc.surrogate.regression import NEEDED_Q2
 
 POPULATION = 80
-WIDE = large(RADIAL, -1)
 
 
 def digest(found) -> str:
@@ -85,7 +84,7 @@ def test_other_requirements_are_violated_by_what_their_models_say(prepared, quan
         slopes=np.array([0.0, 0.1]),
     )
     side = Side(sign=1, limit=0.5, value=0.4, standard_error=0.01, scale=0.5, stack=stack)
-    problem = DesignProblem(space=space, quantile=quantile, further=(WIDE,), sides=(side,))
+    problem = DesignProblem(space=space, quantile=quantile, large=(RADIAL,), sides=(side,))
     answers = problem(problem.genes_of(design[np.newaxis]))
     assert problem.constraints == ("lost motion",)
     assert answers.values[0, 0] == pytest.approx(space.cost(design[np.newaxis])[0])
@@ -144,7 +143,7 @@ def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(
 def test_on_the_kernel_ladders_and_a_third_objective_hold(prepared, quantile):
     space = prepared.space
     ladders = {group: ladder_of(space, group) for group in space.groups[:2]}
-    front, _ = kernel_front(prepared, quantile, ladders=ladders, further=(WIDE,))
+    front, _ = kernel_front(prepared, quantile, ladders=ladders, large=(RADIAL,))
     np.testing.assert_array_equal(front.further[:, 0], front.designs[:, -1])
     for at, ladder in enumerate(ladders.values()):
         assert np.isclose(front.designs[:, at, np.newaxis], ladder, rtol=1e-12).any(axis=1).all()

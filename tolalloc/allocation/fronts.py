@@ -13,7 +13,7 @@ from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.pareto import Front, from_genes, pareto_front, to_genes
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.pareto.found import spread_over
-from tolalloc.allocation.pareto.problem import Criterion, Ladders
+from tolalloc.allocation.pareto.problem import Ladders
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.convex import front
 from tolalloc.allocation.program.problem import Solution, Stack
@@ -104,7 +104,7 @@ def searched_front(
     seeds: SeedTree,
     effort: FrontEffort,
     ladders: Ladders | None = None,
-    further: tuple[Criterion, ...] = (),
+    large: tuple[str, ...] = (),
     checkpoint: Checkpoint | None = None,
 ) -> tuple[Front, Score]:
     """Return the front of cost against the quantile of the output around a verified design, and its surrogate's score.
@@ -125,8 +125,8 @@ def searched_front(
         How much may be spent.
     ladders
         Group → the scales that it may have, rising [-].
-    further
-        Further objectives.
+    large
+        Settings that shall be large, further objectives.
     checkpoint
         Where the kernel's answers are kept.
     """
@@ -142,7 +142,7 @@ def searched_front(
         seeds.child("pareto"),
         effort,
         ladders=ladders,
-        further=further,
+        large=large,
         sides=sides,
         checkpoint=checkpoint,
     )

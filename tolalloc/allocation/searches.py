@@ -15,7 +15,6 @@ from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
 from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.pareto.answers import Checkpoint
-from tolalloc.allocation.pareto.problem import large
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement
@@ -183,7 +182,7 @@ class DrawingQuestion:
         stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
         exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
         response = replace(self.quantile(drawn.spread), space=space)
-        further = [()] if not space.settings else [(), (large(space.settings[-1].name, -1),)]
+        further = [()] if not space.settings else [(), (space.settings[-1].name,)]
         searched = [
             searched_front(response, drawn, stacks, exact, self.seeds("front"), effort, ladders, own, checkpoint)
             for own in further

@@ -11,7 +11,7 @@ from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.pareto.found import SearchedDesigns, knee, spread_over
-from tolalloc.allocation.pareto.problem import Criterion, DesignProblem, Ladders
+from tolalloc.allocation.pareto.problem import DesignProblem, Ladders
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
@@ -68,7 +68,7 @@ def pareto_front(
     seeds: SeedTree,
     effort: FrontEffort,
     ladders: Ladders | None = None,
-    further: tuple[Criterion, ...] = (),
+    large: tuple[str, ...] = (),
     sides: tuple[Side, ...] = (),
     checkpoint: Checkpoint | None = None,
     largest_failed_share: float = 0.05,
@@ -93,8 +93,8 @@ def pareto_front(
         How much may be spent.
     ladders
         Group → the scales that it may have, rising [-].
-    further
-        Further objectives.
+    large
+        Settings that shall be large, further objectives.
     sides
         Limited sides of other requirements, kept by their local models.
     checkpoint
@@ -110,7 +110,7 @@ def pareto_front(
     from tolalloc.allocation.pareto.genetic import search
 
     kernel = RememberedResponse(response, checkpoint)
-    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, further=further, sides=sides)
+    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, large=large, sides=sides)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
     candidate = RegressionCandidate(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol, runtime_checkable
@@ -126,20 +126,6 @@ def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Fl
 
 
 @dataclass(frozen=True, kw_only=True)
-class Criterion:
-    """A further objective."""
-
-    objective: Objective  # What is made small or large
-    # Its values at designs, NaN where it failed
-    value: Callable[[Float[np.ndarray, "design variable"]], Float[np.ndarray, " design"]]
-
-
-def large(setting: str, column: int) -> Criterion:
-    """Return the criterion that a setting, whose value stands in a column of the designs, shall be large."""
-    return Criterion(objective=Objective(name=setting, better="large"), value=lambda designs: designs[:, column])
-
-
-@dataclass(frozen=True, kw_only=True)
 class DesignProblem:
     """Cost against the quantile of the leading output, and whatever else is asked for.
 
@@ -155,7 +141,7 @@ class DesignProblem:
     quantile: Response  # Quantile of designs: the real kernel or what stands in for it
     # Group → the scales that it may have, rising; other groups have every scale within their bounds [-]
     ladders: Ladders = field(default_factory=dict)
-    further: tuple[Criterion, ...] = ()  # Further objectives
+    large: tuple[str, ...] = ()  # Settings that shall be large, further objectives
     sides: tuple[Side, ...] = ()  # Limited sides of other requirements, kept by their local models
 
     def __post_init__(self) -> None:
@@ -172,7 +158,8 @@ class DesignProblem:
     @cached_property
     def objectives(self) -> tuple[Objective, ...]:
         """What is traded off."""
-        return (COST, Objective(name=self.quantile.outputs[0]), *(criterion.objective for criterion in self.further))
+        large = (Objective(name=setting, better="large") for setting in self.large)
+        return (COST, Objective(name=self.quantile.outputs[0]), *large)
 
     @property
     def constraints(self) -> tuple[str, ...]:
@@ -212,7 +199,7 @@ class DesignProblem:
         """Return the objectives of every design."""
         designs = self.designs_of(designs)
         evaluation = self.quantile(designs)
-        others = [criterion.value(designs) for criterion in self.further]
-        values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *others])
+        settings = [designs[:, self.space.columns.index(setting)] for setting in self.large]
+        values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *settings])
         violation = np.array([side.predicted(designs) / side.scale for side in self.sides]).T
         return Objectives(values=values, violation=violation.reshape(len(designs), -1), status=evaluation.status)
