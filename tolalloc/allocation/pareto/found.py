@@ -72,16 +72,6 @@ def spread_over(count: int, number: int) -> list[int]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeastViolating:
-    """The design whose violations sum up to the least."""
-
-    design: Float[np.ndarray, " gene"]  # Its genes [unit of the gene]
-    # Violation of every constraint, as a share of what it allows; 0 or below is kept [-]
-    violation: Float[np.ndarray, " constraint"]
-    blocking: str | None  # The constraint that is violated most, none if all are kept
-
-
-@dataclass(frozen=True, kw_only=True)
 class SearchedDesigns:
     """Designs with their answers."""
 
@@ -109,24 +99,13 @@ class SearchedDesigns:
         few = front._at(thinned(front.losses, number))
         return few._at(np.argsort(few.losses[:, 0], kind="stable"))
 
-    def least_violating(self) -> LeastViolating:
-        """Return the design that comes nearest to keeping every constraint, and what blocks it.
-
-        Raises
-        ------
-        SolveError
-            Every design failed.
-        """
+    @property
+    def least_violating(self) -> int:
+        """Position of the design whose violations sum up to the least; where every design failed, a `SolveError`."""
         at = int(np.argmin(self.answers.total_violation))
         if not self.answers.good[at]:
             raise SolveError(f"Pareto search: all of {len(self.designs)} designs failed.")
-        violation = self.answers.violation[at]
-        blocked = bool((violation > 0).any())
-        return LeastViolating(
-            design=self.designs[at],
-            violation=violation,
-            blocking=self.problem.constraints[int(np.argmax(violation))] if blocked else None,
-        )
+        return at
 
     def _at(self, which: Int[np.ndarray, " kept"]) -> SearchedDesigns:
         answers = self.answers

@@ -41,10 +41,10 @@ def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front
     """Return the front of a search, not yet judged by the kernel."""
     front = found.front(number)
     if not len(front.designs):
-        nearest = found.least_violating()
+        violation = found.answers.violation[found.least_violating]
         raise SolveError(
-            f"Pareto search: no design keeps every limit; the nearest one exceeds {nearest.blocking} by "
-            f"{nearest.violation.max():.3g} of it."
+            "Pareto search: no design keeps every limit; the nearest one exceeds "
+            f"{problem.constraints[int(np.argmax(violation))]} by {violation.max():.3g} of it."
         )
     order = np.argsort(front.answers.values[:, 1], kind="stable")
     values = front.answers.values[order]
