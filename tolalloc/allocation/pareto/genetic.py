@@ -12,7 +12,6 @@ from pymoo.algorithms.moo.nsga3 import NSGA3
 from pymoo.core.algorithm import Algorithm
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
-from pymoo.core.repair import Repair
 from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
 from pymoo.optimize import minimize
@@ -63,17 +62,6 @@ class _Searched(Problem):  # type: ignore[misc]
         self.asked.append(x)
         answers = self.answers(x)
         out["F"], out["G"] = answers.values * self.signs, answers.total_violation[:, np.newaxis]
-
-
-class _Rounded(Repair):  # type: ignore[misc]
-    """Integer genes stay whole numbers."""
-
-    def __init__(self, genes: Genes) -> None:
-        super().__init__()
-        self.genes = genes
-
-    def _do(self, _: Problem, x: Float[np.ndarray, "design gene"], **__: object) -> Float[np.ndarray, "design gene"]:
-        return self.genes.rounded(x)
 
 
 def _less_violating(
@@ -164,13 +152,17 @@ def search(
             "Pareto search", "population and generations", (population, generations), f"{count + 1} and 1, or more"
         )
     searched = _Searched(problem, checkpoint)
+
+    def rounded(_: Problem, designs: Population, **__: object) -> Population:
+        return designs.set("X", problem.genes.rounded(np.array([design.X for design in designs])))
+
     minimize(
         searched,
         _algorithm(
             count,
             population,
             sampling=_first_population(problem.genes, known, population, seeds.child("fill")),
-            repair=_Rounded(problem.genes),
+            repair=rounded,
         ),
         ("n_gen", generations),
         seed=seeds.child("genetic").integer(),
