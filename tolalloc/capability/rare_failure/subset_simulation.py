@@ -36,27 +36,6 @@ class _Chains:
     scale: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Run:
-    """One run: its levels, its failing states, the variance of its lineages, why it stopped if not at the limit."""
-
-    levels: tuple[Level, ...]
-    failing: Float[np.ndarray, "state variable"]
-    lineage_variance: float
-    caution: str
-
-    @property
-    def probability(self) -> float:
-        return float(np.prod([level.share for level in self.levels]))
-
-    @property
-    def standard_error(self) -> float:
-        if self.probability == 0:
-            return float("inf")
-        squares = sum(level.coefficient_of_variation**2 for level in self.levels)
-        return self.probability * float(np.sqrt(max(squares, self.lineage_variance)))
-
-
 def subset_simulation(
     limit_state: LimitState, seeds: SeedTree, samples: int = 2000, runs: int = 1, largest_failed_share: float = 0.01
 ) -> RareFailure:
@@ -97,13 +76,16 @@ def subset_simulation(
     if runs < 1:
         raise InputError.at(METHOD, "runs", runs, "a whole number of at least 1")
     counted = CountedLimitState(limit_state, largest_failed_share)
-    all_runs = [_one_run(counted, seeds.child(f"run {run}").generator(), samples, run) for run in range(runs)]
-    probabilities = np.array([run.probability for run in all_runs])
+    found = [_one_run(counted, seeds.child(f"run {run}").generator(), samples, run) for run in range(runs)]
+    probabilities = np.array([_probability(levels) for levels, _, _ in found])
     probability = float(probabilities.mean())
-    error = float(np.sqrt(sum(run.standard_error**2 for run in all_runs if run.probability > 0))) / runs
+    squares = sum(
+        _standard_error(levels, chains, samples) ** 2 for levels, chains, _ in found if _probability(levels) > 0
+    )
+    error = float(np.sqrt(squares)) / runs
     if runs > 1:
         error = max(error, float(probabilities.std(ddof=1) / np.sqrt(runs)))
-    stopped = tuple(dict.fromkeys(run.caution for run in all_runs if run.caution))
+    stopped = tuple(dict.fromkeys(caution for _, _, caution in found if caution))
     return RareFailure(
         probability=probability,
         standard_error=error if probability > 0 else float("inf"),
@@ -112,13 +94,20 @@ def subset_simulation(
         method=METHOD,
         cautions=stopped + counted.cautions,
         effective_samples=(probability / error) ** 2 if probability > 0 else 0.0,
-        levels=tuple(level for run in all_runs for level in run.levels),
-        failing=tuple(run.failing for run in all_runs),
+        levels=tuple(level for levels, _, _ in found for level in levels),
+        failing=tuple(chains.u[chains.values < 0] for _, chains, _ in found),
     )
 
 
-def _one_run(counted: CountedLimitState, generator: np.random.Generator, samples: int, run: int) -> _Run:
-    """Return the levels of one run, the last of which counts the failures."""
+def _probability(levels: list[Level]) -> float:
+    """Return the probability that the levels of a run give."""
+    return float(np.prod([level.share for level in levels]))
+
+
+def _one_run(
+    counted: CountedLimitState, generator: np.random.Generator, samples: int, run: int
+) -> tuple[list[Level], _Chains, str]:
+    """Return the levels of one run, the last of which counts the failures, its chains, and why it stopped short."""
     u = generator.standard_normal((samples, counted.variables))
     chains = _Chains(
         u=u[:, np.newaxis],
@@ -153,12 +142,7 @@ def _one_run(counted: CountedLimitState, generator: np.random.Generator, samples
         )
         chains = _next_chains(counted, generator, starts, threshold)
     levels.append(_level(chains, 0.0, chains.values < 0, run))
-    return _Run(
-        levels=tuple(levels),
-        failing=chains.u[chains.values < 0],
-        lineage_variance=_lineage_variance(chains, samples, len(levels)),
-        caution=caution,
-    )
+    return levels, chains, caution
 
 
 def _next_chains(
@@ -194,17 +178,17 @@ def _next_chains(
     )
 
 
-def _lineage_variance(chains: _Chains, samples: int, levels: int) -> float:
-    """Return the squared coefficient of variation that the failures' descent from the first level shows.
+def _standard_error(levels: list[Level], chains: _Chains, samples: int) -> float:
+    """Return the standard error of the probability of a run that has reached the limit.
 
     Notes
     -----
     Failures of few lineages know little, however weakly the states of each chain are correlated.
     """
     failures = np.bincount(chains.ancestors, weights=(chains.values < 0).sum(axis=1))
-    if not failures.any():
-        return 0.0
-    return float(np.sum((failures / failures.sum()) ** 2)) - levels / samples
+    lineages = float(np.sum((failures / failures.sum()) ** 2)) - len(levels) / samples
+    squares = sum(level.coefficient_of_variation**2 for level in levels)
+    return _probability(levels) * float(np.sqrt(max(squares, lineages)))
 
 
 def _level(chains: _Chains, threshold: float, inside: Bool[np.ndarray, "chain state"], run: int) -> Level:
