@@ -33,56 +33,8 @@ class WorstUnit:
     ends: Float[np.ndarray, " start"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Units:
-    """Units, one of every start, as deviations per unit of zone, their values, and the mean gradients by column."""
-
-    values: Float[np.ndarray, " start"]
-    units: Float[np.ndarray, "start column"]
-    gradients: Float[np.ndarray, "start column"]
-
-    def or_worse(self, other: _Units) -> _Units:
-        """Return for every start the worse of both."""
-        worse = (other.values > self.values)[:, np.newaxis]
-        return _Units(
-            values=np.maximum(self.values, other.values),
-            units=np.where(worse, other.units, self.units),
-            gradients=np.where(worse, other.gradients, self.gradients),
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Ascent:
-    """What is climbed: the output, with the sign that makes larger worse."""
-
-    experiment: Experiment[ResponseWithDerivatives]
-    sense: int
-
-    def first(self, uniform: Float[np.ndarray, "start column"]) -> _Units:
-        """Return units at the limits of all zones, at random phases, before they are solved."""
-        errors = self.experiment.errors
-        parts = zip(errors.active, errors.columns_of_source, strict=True)
-        units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
-        return _Units(values=np.full(units.shape[0], -np.inf), units=units, gradients=np.zeros_like(units))
-
-    def solved(self, at: _Units, weight: float) -> _Units:
-        """Return the values of the units, minus infinity where one has none, and gradients averaged with the given."""
-        found = self.experiment.response.with_derivatives(self.experiment.deviations(at.units))
-        good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
-        newest = np.where(good[:, np.newaxis], self.sense * found.by_column, at.gradients)
-        return _Units(
-            values=np.where(good, self.sense * found.evaluation.values[:, 0], -np.inf),
-            units=at.units,
-            gradients=at.gradients + weight * (newest - at.gradients),
-        )
-
-    def moved(self, at: _Units, part: float) -> _Units:
-        """Return units a part of the way to the extremes of the zones along the gradients."""
-        units, errors = np.empty_like(at.units), self.experiment.errors
-        for source, own in zip(errors.active, errors.columns_of_source, strict=True):
-            extremes = extreme_in_zone(source, at.units[:, own], at.gradients[:, own])
-            units[:, own] = moved_towards(source, at.units[:, own], extremes, part)
-        return _Units(values=at.values, units=units, gradients=at.gradients)
+_Units = tuple[Float[np.ndarray, " start"], Float[np.ndarray, "start column"], Float[np.ndarray, "start column"]]
+"""Values of units, one of every start, the units as deviations per unit of zone, and mean gradients by column."""
 
 
 def worst_unit(
@@ -128,35 +80,72 @@ def worst_unit(
         raise InputError.at("worst case", "joint sources", errors.joint[0].name, "none, because they have no zone")
     if min(starts, steps) < 1:
         raise InputError.at("worst case", "starts and steps", (starts, steps), "1 or more")
-    ascent = _Ascent(experiment=experiment, sense=sense)
-    at = worst = ascent.first(experiment.uniform(starts))
-    failed = 0
-    for step in range(steps):
-        at = ascent.solved(at, max(_WEIGHT, 1.0 / (step + 1)))
-        failed += int(np.isinf(at.values).sum())
-        worst = worst.or_worse(at)
-        at = ascent.moved(at, 2.0 / (step + 2))
-    # Steps only come ever closer to the corners of the zones, where a convex output is largest.
-    corner = ascent.solved(ascent.moved(worst, 1.0), 0.0)
-    failed += int(np.isinf(corner.values).sum())
-    worst = worst.or_worse(corner)
-    if failed > allowed * starts * (steps + 1) or np.isinf(worst.values).all():
+    uniform, parts = experiment.uniform(starts), tuple(zip(errors.active, errors.columns_of_source, strict=True))
+    units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
+    gradients, failed = np.zeros_like(units), 0
+    worst: _Units = (np.full(starts, -np.inf), units, gradients)
+    # Steps only come ever closer to the corners of the zones, where a convex output is largest; so the last goes to them.
+    for step in range(steps + 1):
+        weight = max(_WEIGHT, 1.0 / (step + 1))
+        if step == steps:
+            units, gradients, weight = _moved(experiment, worst[1], worst[2], 1.0), worst[2], 0.0
+        elif step:
+            units = _moved(experiment, units, gradients, 2.0 / (step + 1))
+        values, gradients = _solved(experiment, sense, units, gradients, weight)
+        failed += int(np.isinf(values).sum())
+        worse = (values > worst[0])[:, np.newaxis]
+        worst = (
+            np.maximum(worst[0], values),
+            np.where(worse, units, worst[1]),
+            np.where(worse, gradients, worst[2]),
+        )
+    if failed > allowed * starts * (steps + 1) or np.isinf(worst[0]).all():
         raise SolveError(
             f"Worst case: {failed} of {starts * (steps + 1)} units have no usable answer; allowed is a share of "
             f"{allowed:.4g}."
         )
-    return _result(ascent, worst)
+    return _result(experiment, sense, worst)
 
 
-def _result(ascent: _Ascent, worst: _Units) -> WorstUnit:
+def _solved(
+    experiment: Experiment[ResponseWithDerivatives],
+    sense: int,
+    units: Float[np.ndarray, "start column"],
+    gradients: Float[np.ndarray, "start column"],
+    weight: float,
+) -> tuple[Float[np.ndarray, " start"], Float[np.ndarray, "start column"]]:
+    """Return the values of the units, minus infinity where one has none, and gradients averaged with the given."""
+    found = experiment.response.with_derivatives(experiment.deviations(units))
+    good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
+    newest = np.where(good[:, np.newaxis], sense * found.by_column, gradients)
+    values = np.where(good, sense * found.evaluation.values[:, 0], -np.inf)
+    return values, gradients + weight * (newest - gradients)
+
+
+def _moved(
+    experiment: Experiment[ResponseWithDerivatives],
+    units: Float[np.ndarray, "start column"],
+    gradients: Float[np.ndarray, "start column"],
+    part: float,
+) -> Float[np.ndarray, "start column"]:
+    """Return units a part of the way to the extremes of the zones along the gradients."""
+    moved, errors = np.empty_like(units), experiment.errors
+    for source, own in zip(errors.active, errors.columns_of_source, strict=True):
+        extremes = extreme_in_zone(source, units[:, own], gradients[:, own])
+        moved[:, own] = moved_towards(source, units[:, own], extremes, part)
+    return moved
+
+
+def _result(experiment: Experiment[ResponseWithDerivatives], sense: int, worst: _Units) -> WorstUnit:
     """Return the worst of all starts with the signs of the output."""
-    most, errors, sense = int(worst.values.argmax()), ascent.experiment.errors, ascent.sense
-    by_column = sense * worst.gradients[most] * worst.units[most]
+    values, units, gradients = worst
+    most = int(values.argmax())
+    by_column = sense * gradients[most] * units[most]
     return WorstUnit(
-        value=sense * float(worst.values[most]),
-        x=ascent.experiment.deviations(worst.units[[most]])[0],
-        by_zone=np.array([by_column[own].sum() for own in errors.columns_of_source]),
-        ends=np.where(np.isinf(worst.values), np.nan, sense * worst.values),
+        value=sense * float(values[most]),
+        x=experiment.deviations(units[[most]])[0],
+        by_zone=np.array([by_column[own].sum() for own in experiment.errors.columns_of_source]),
+        ends=np.where(np.isinf(values), np.nan, sense * values),
     )
 
 
