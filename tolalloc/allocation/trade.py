@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from tolalloc.allocation.program import process_choice
-from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.search import ZoneAllocation
@@ -81,59 +80,50 @@ def setting_trade(
     found design, and the budget of the leading output is corrected by what the local model missed; then again, until it
     misses little. Every choice has processes of its own. Other requirements keep their models.
     """
-    search = _CheapestAt(response, allocation)
-    found = [search.cheapest(np.array(choice)) for choice in product(*values)]
+    programs = Programs(response.space, len(allocation.asked_stacks))
+    known = float(response(allocation.chosen.design[np.newaxis]).values[0, 0])
+    found = [_cheapest(response, allocation, programs, known, np.array(choice)) for choice in product(*values)]
     cost, missed = np.array(found).T
-    known = missed[np.isfinite(missed)]
+    left = missed[np.isfinite(missed)]
     return SettingTrade(
         names=response.space.shared.names,
         values=values,
         cost=cost.reshape([own.size for own in values]) + response.space.locked_cost,
-        error=float(np.sqrt(np.mean(known**2))) if known.size else np.nan,
+        error=float(np.sqrt(np.mean(left**2))) if left.size else np.nan,
     )
 
 
-class _CheapestAt:
-    """The cheapest zones at given settings, by the models of an allocation, corrected on the real model."""
-
-    def __init__(self, response: QuantileResponse, allocation: ZoneAllocation) -> None:
-        self.response, self.space, self.chosen = response, response.space, allocation.chosen
-        self.stacks = allocation.asked_stacks
-        self.programs = Programs(self.space, len(self.stacks))
-        self.known = float(response(self.chosen.design[np.newaxis]).values[0, 0])
-
-    def cheapest(self, settings: Float[np.ndarray, " setting"]) -> tuple[float, float]:
-        """Return the least cost at given settings, and what the model last missed there [unit of the output]."""
-        first, model, missed, cost, error = self.stacks[0], self.chosen.sides[0], 0.0, np.nan, np.inf
-        processes = self.space.process_positions(self.chosen.design)
-        for number in range(_CORRECTIONS):
-            corrected = (replace(first, budget=first.budget - missed), *self.stacks[1:])
-            if number % _CHOSEN_AGAIN == 0:
-                processes = self._processes(corrected, settings, processes)
-            program, bounds = self.programs.of(processes), {"shared_lower": settings, "shared_upper": settings}
-            solution = program.solve(corrected, **bounds)
-            # Where the model lets nothing keep the limits, it may still be the model that is wrong.
-            found = solution or program.least_infeasible(corrected, **bounds)
-            design = np.concatenate([found.zones, found.shared])
-            answered = self.response(design[np.newaxis])
-            if not answered.good[0]:
-                return np.nan, np.nan
-            rise = float(model.predicted(design) - model.predicted(self.chosen.design))
-            cost, before = solution.cost if solution else np.nan, error
-            error = model.sign * (float(answered.values[0, 0]) - self.known) - rise - missed
-            if abs(error) > _SETTLED * model.scale:
-                missed += error / (1 - min(error / before, 0.0))  # the secant where corrections swing to and fro
-            elif number >= _CHOSEN_AGAIN or not self.space.has_choices:
-                break
-            else:
-                error = np.inf  # the next processes are another curve
-        return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)
-
-    def _processes(
-        self, stacks: tuple[Stack, ...], settings: Float[np.ndarray, " setting"], present: Int[np.ndarray, " group"]
-    ) -> Int[np.ndarray, " group"]:
-        """Return the cheapest processes at given settings."""
-        if not self.space.has_choices:
-            return present
-        held = replace(self.space.shared, lower=settings, upper=settings)
-        return process_choice.allocate(replace(self.space.problem(stacks), shared=held)).processes
+def _cheapest(
+    response: QuantileResponse,
+    allocation: ZoneAllocation,
+    programs: Programs,
+    known: float,
+    settings: Float[np.ndarray, " setting"],
+) -> tuple[float, float]:
+    """Return the least cost at given settings, and what the model last missed there [unit of the output]."""
+    space, chosen, (first, *others) = response.space, allocation.chosen, allocation.asked_stacks
+    model, missed, cost, error = chosen.sides[0], 0.0, np.nan, np.inf
+    processes = space.process_positions(chosen.design)
+    for number in range(_CORRECTIONS):
+        corrected = (replace(first, budget=first.budget - missed), *others)
+        if number % _CHOSEN_AGAIN == 0 and space.has_choices:
+            held = replace(space.shared, lower=settings, upper=settings)
+            processes = process_choice.allocate(replace(space.problem(corrected), shared=held)).processes
+        program, bounds = programs.of(processes), {"shared_lower": settings, "shared_upper": settings}
+        solution = program.solve(corrected, **bounds)
+        # Where the model lets nothing keep the limits, it may still be the model that is wrong.
+        found = solution or program.least_infeasible(corrected, **bounds)
+        design = np.concatenate([found.zones, found.shared])
+        answered = response(design[np.newaxis])
+        if not answered.good[0]:
+            return np.nan, np.nan
+        rise = float(model.predicted(design) - model.predicted(chosen.design))
+        cost, before = solution.cost if solution else np.nan, error
+        error = model.sign * (float(answered.values[0, 0]) - known) - rise - missed
+        if abs(error) > _SETTLED * model.scale:
+            missed += error / (1 - min(error / before, 0.0))  # the secant where corrections swing to and fro
+        elif number >= _CHOSEN_AGAIN or not space.has_choices:
+            break
+        else:
+            error = np.inf  # the next processes are another curve
+    return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)
