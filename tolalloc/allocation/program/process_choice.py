@@ -66,7 +66,7 @@ class _BranchAndBound:
     """Best-first branch and bound; every multiplier ever tried bounds every node."""
 
     def __init__(self, problem: AllocationProblem) -> None:
-        self.problem, self.dual, self._alike = problem, LagrangeDual(problem), _AlikeFeatures(problem)
+        self.problem, self.dual, self._alike = problem, LagrangeDual(problem), _alike_features(problem)
         self._tried: list[PricedProcesses] = []
         self._solved: dict[tuple[int, ...], Solution | None] = {}
         self._best: Solution | None = None
@@ -84,7 +84,7 @@ class _BranchAndBound:
         count, closed = len(open_nodes), [np.inf]
         while open_nodes and open_nodes[0][0] < self._enough and most_nodes > 0:
             most_nodes -= 1
-            allowed = self._alike.ordered(heapq.heappop(open_nodes)[2])
+            allowed = _ordered(self._alike, heapq.heappop(open_nodes)[2])
             if not self._possible(allowed):
                 continue
             bound, children = self._opened(allowed)
@@ -105,7 +105,7 @@ class _BranchAndBound:
         choice = self.dual.choice(top, allowed)
         alone = np.zeros_like(allowed)
         alone[choice] = True
-        solution = self._try(choice - self.dual.starts) if np.array_equal(self._alike.ordered(alone), alone) else None
+        solution = self._try(choice - self.dual.starts) if np.array_equal(_ordered(self._alike, alone), alone) else None
         if np.array_equal(alone, allowed):
             return (np.inf if solution is None else max(bound, solution.bound)), []
         return bound, self._children(top, allowed)
@@ -166,32 +166,31 @@ class _BranchAndBound:
         return least_infeasible(replace(self.problem, features=features)).feasible
 
 
-class _AlikeFeatures:
-    """Groups of features with the same processes, loss and place in every stack, bit by bit.
+def _alike_features(problem: AllocationProblem) -> list[list[slice]]:
+    """Return where the processes of features stand that have the same processes, loss and loads, bit by bit.
 
     Who of them takes which process makes no difference.
     """
+    groups: dict[bytes, list[slice]] = defaultdict(list)
+    start = 0
+    for at, feature in enumerate(problem.features):
+        made = [(own.cost, own.minimum, own.maximum, own.change) for own in feature.processes]
+        loads = [(float(stack.worst_case[at]), float(stack.root_sum_square[at])) for stack in problem.stacks]
+        groups[pickle.dumps((made, loads, feature.loss))].append(slice(start, start + len(made)))
+        start += len(made)
+    return [group for group in groups.values() if len(group) > 1]
 
-    def __init__(self, problem: AllocationProblem) -> None:
-        groups: dict[bytes, list[slice]] = defaultdict(list)
-        start = 0
-        for at, feature in enumerate(problem.features):
-            made = [(own.cost, own.minimum, own.maximum, own.change) for own in feature.processes]
-            loads = [(float(stack.worst_case[at]), float(stack.root_sum_square[at])) for stack in problem.stacks]
-            groups[pickle.dumps((made, loads, feature.loss))].append(slice(start, start + len(made)))
-            start += len(made)
-        self._groups = [group for group in groups.values() if len(group) > 1]
 
-    def ordered(self, allowed: Bool[np.ndarray, " process"]) -> Bool[np.ndarray, " process"]:
-        """Return the allowed processes less those that no choice in ascending order within the groups contains."""
-        left = allowed.copy()
-        for group in self._groups:
-            first = 0
-            for own in group:
-                left[own][:first] = False
-                first = int(np.argmax(left[own]))
-            last = left[group[-1]].size
-            for own in reversed(group):
-                left[own][last:] = False
-                last = left[own].size - int(np.argmax(left[own][::-1]))
-        return left
+def _ordered(groups: list[list[slice]], allowed: Allowed) -> Allowed:
+    """Return the allowed processes less those that no choice in ascending order within the groups contains."""
+    left = allowed.copy()
+    for group in groups:
+        first = 0
+        for own in group:
+            left[own][:first] = False
+            first = int(np.argmax(left[own]))
+        last = left[group[-1]].size
+        for own in reversed(group):
+            left[own][last:] = False
+            last = left[own].size - int(np.argmax(left[own][::-1]))
+    return left
