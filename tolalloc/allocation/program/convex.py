@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -37,13 +37,9 @@ _ENOUGH = 1e-10
 """Gap below which the certificate is not polished further [-]."""
 
 
-class _StackParameters(NamedTuple):
-    """One stack, divided by its scale, over zones divided by their units: parameters of cvxpy."""
-
-    worst_case: Any
-    root_sum_square: Any
-    slopes: Any
-    budget: Any
+_StackParameters = tuple[Any, Any, Any, Any]
+"""Worst case, root sum square, slopes and budget of a stack over its scale, zones over their units, as cvxpy has them.
+"""
 
 
 class ConvexProgram:
@@ -88,10 +84,8 @@ class ConvexProgram:
         count, shares = len(self.features), len(shared.names)
         self._zones, self._shared = cp.Variable(count, pos=True), cp.Variable(shares)
         self._bounds = [cp.Parameter(count) for _ in range(2)] + [cp.Parameter(shares) for _ in range(2)]
-        self._stacks = [
-            _StackParameters(
-                cp.Parameter(count, nonneg=True), cp.Parameter(count, nonneg=True), cp.Parameter(shares), cp.Parameter()
-            )
+        self._stacks: list[_StackParameters] = [
+            (cp.Parameter(count, nonneg=True), cp.Parameter(count, nonneg=True), cp.Parameter(shares), cp.Parameter())
             for _ in range(stacks)
         ]
         made = [
@@ -100,15 +94,15 @@ class ConvexProgram:
         ]
         cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
         self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
-        self._kept = [self._load(stack) <= stack.budget for stack in self._stacks]
+        self._kept = [self._load(stack) <= stack[-1] for stack in self._stacks]
         around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]
         self._problem = cp.Problem(cp.Minimize(cost), [*self._keeping, *self._kept, *around])
 
     def _load(self, stack: _StackParameters) -> Expression:
         import cvxpy as cp
 
-        spread = cp.norm2(cp.multiply(stack.root_sum_square, self._zones))
-        return stack.worst_case @ self._zones + spread + stack.slopes @ self._shared
+        worst_case, root_sum_square, slopes, _ = stack
+        return worst_case @ self._zones + cp.norm2(cp.multiply(root_sum_square, self._zones)) + slopes @ self._shared
 
     def solve(
         self,
@@ -146,12 +140,14 @@ class ConvexProgram:
         for parameter, value in zip(self._bounds, (low / units, high / units, *around), strict=True):
             parameter.value = value
         for parameters, stack, scale in zip(self._stacks, stacks, scales, strict=True):
-            parameters.worst_case.value, parameters.root_sum_square.value = (
+            values = (
                 stack.worst_case * units / scale,
                 stack.root_sum_square * units / scale,
+                np.where(still, 0.0, stack.slopes) / scale,
+                (stack.budget - stack.slopes @ held) / scale,
             )
-            parameters.slopes.value = np.where(still, 0.0, stack.slopes) / scale
-            parameters.budget.value = (stack.budget - stack.slopes @ held) / scale
+            for parameter, value in zip(parameters, values, strict=True):
+                parameter.value = value
         self._run()
         return self._solution(problem, low, high)
 
