@@ -23,7 +23,7 @@ The relaxation of the zeros and ones to 0 ≤ z ≤ 1 is made of linear rows, al
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -166,13 +166,8 @@ _SECTIONS = 4
 """Sections of the range of a root sum of squares."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProvenChoice:
-    """What is taken out of every group, with the proof."""
-
-    taken: Int[np.ndarray, " group"]  # Position of the choice of every group [-]
-    cost: float  # Its cost [cost units]
-    bound: float  # Lower bound on the cost of every allowed choice [cost units]
+ProvenChoice = tuple[Int[np.ndarray, " group"], float, float]
+"""What is taken out of every group, its cost, and a lower bound on the cost of every allowed choice [cost units]."""
 
 
 def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None:
@@ -189,7 +184,7 @@ def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None
     if np.unique(program.group[kept]).size < program.starts.size:
         return None
     found = _ChoiceSearch(program.restricted(kept), most_nodes).run()
-    return found and replace(found, taken=np.flatnonzero(kept)[found.taken])
+    return found and (np.flatnonzero(kept)[found[0]], *found[1:])
 
 
 class _ChoiceSearch:
@@ -223,7 +218,7 @@ class _ChoiceSearch:
         if self.best is None:
             return None
         cost = float(self.program.cost[self.best].sum())
-        return ProvenChoice(taken=self.best, cost=cost, bound=min(self.bound / self.rows.scale, cost))
+        return self.best, cost, min(self.bound / self.rows.scale, cost)
 
     def _offer(self, taken: Int[np.ndarray, " any_group"]) -> bool:
         """Keep a choice if it is allowed and the cheapest so far; return whether it is allowed."""

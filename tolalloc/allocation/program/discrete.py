@@ -187,22 +187,23 @@ class DiscreteProblem:
             (np.array([*taken, at]) for at in grid), key=lambda own: float(program.violation(own).max(initial=-1))
         )
         cost = float(program.cost[best].sum())
-        found = self._solution(ProvenChoice(taken=best, cost=cost, bound=cost if program.allows(best) else np.inf))
+        found = self._solution((best, cost, cost if program.allows(best) else np.inf))
         assert found
         return found
 
     def _solution(self, choice: ProvenChoice | None) -> DiscreteSolution | None:
         if choice is None:
             return None
-        options = tuple(self._flat[at] for at in choice.taken[:-1])
-        shared = self._points[choice.taken[-1] - len(self._flat)]
+        taken, cost, bound = choice
+        options = tuple(self._flat[at] for at in taken[:-1])
+        shared = self._points[taken[-1] - len(self._flat)]
         violation = self.problem.violation(np.array([option.zone for option in options]), shared)
         names = [stack.name for stack in self._stacks]
         return DiscreteSolution(
             options=options,
             shared=shared,
-            cost=choice.cost,
-            bound=choice.bound,
+            cost=cost,
+            bound=bound,
             slack=-violation,
             tightest=names[int((violation / self._scales).argmax())] if names else "",
         )
