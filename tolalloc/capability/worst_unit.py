@@ -84,7 +84,7 @@ def worst_unit(
     units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
     gradients, failed = np.zeros_like(units), 0
     worst: _Units = (np.full(starts, -np.inf), units, gradients)
-    # Steps only come ever closer to the corners of the zones, where a convex output is largest; so the last goes to them.
+    # Steps only come ever closer to the corners of the zones, where a convex output is largest: the last goes to them.
     for step in range(steps + 1):
         weight = max(_WEIGHT, 1.0 / (step + 1))
         if step == steps:
