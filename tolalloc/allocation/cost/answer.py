@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.allocation.cost.closed_forms import ClosedForm
-from tolalloc.allocation.cost.fit import CostFit, best_fit, fits
+from tolalloc.allocation.cost.fit import best_fit, fits
 from tolalloc.allocation.cost.points import Points, ShopPoints
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
@@ -21,35 +21,6 @@ if TYPE_CHECKING:
 
 _DRAWN = 80
 """Points of a drawn curve [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FittedProcess:
-    """The points of one process and the forms through them."""
-
-    name: str  # Process, and the kind of callout if the points are for one kind alone
-    points: Points  # Zones [µm] and costs
-    forms: tuple[CostFit, ...]  # All forms that the points suffice for
-    best: CostFit  # The form that a process cost table would take
-
-
-def fitted_processes(shop: ShopPoints) -> tuple[FittedProcess, ...]:
-    """Return the fits of every process of a file of shop data.
-
-    Raises
-    ------
-    InputError
-        Too few points, or costs that do not fall with the zone.
-    """
-    return tuple(
-        FittedProcess(
-            name=process if feature is None else f"{process}, {feature}",
-            points=points,
-            forms=fits(points),
-            best=best_fit(points),
-        )
-        for (process, feature), points in shop.items()
-    )
 
 
 def formula(model: ClosedForm) -> str:
@@ -65,12 +36,18 @@ class CostFitsAnswer(Answer):
     """What the zones of a shop's processes cost."""
 
     kind: ClassVar[str] = "costs"
-    processes: tuple[FittedProcess, ...]  # The fits
+    processes: Mapping[str, Points]  # Process, and the kind of callout if they are for one alone → zones [µm] and costs
 
     @classmethod
     def of(cls, shop: ShopPoints, place: str) -> CostFitsAnswer:
         """Return the answer for the points of a file; what `fits` refuses is an InputError."""
-        return cls(header=Header(name=place, model="closed forms"), processes=fitted_processes(shop))
+        named = {
+            process if feature is None else f"{process}, {feature}": points
+            for (process, feature), points in shop.items()
+        }
+        for points in named.values():
+            best_fit(points)
+        return cls(header=Header(name=place, model="closed forms"), processes=named)
 
     @property
     def title(self) -> str:
@@ -86,9 +63,9 @@ class CostFitsAnswer(Answer):
     def sentences(self) -> tuple[str, ...]:
         """The taken form of every process."""
         return tuple(
-            f"{process.name}: {formula(process.best.model)}, valid from {process.best.smallest:g} to "
-            f"{process.best.largest:g} µm; {process.best.leave_one_out:.2%} off at points left out."
-            for process in self.processes
+            f"{name}: {formula(best.model)}, valid from {best.smallest:g} to {best.largest:g} µm; "
+            f"{best.leave_one_out:.2%} off at points left out."
+            for name, best in ((name, best_fit(points)) for name, points in self.processes.items())
         )
 
     @property
@@ -114,18 +91,18 @@ class CostFitsAnswer(Answer):
         return pd.DataFrame(
             [
                 {
-                    "process": process.name,
+                    "process": name,
                     "form, t in µm [cost units]": formula(fit.model),
                     "rms error [%]": fit.rms * 100,
                     "largest error [%]": fit.largest_error * 100,
                     "error at points left out [%]": fit.leave_one_out * 100,
                     "valid from [µm]": fit.smallest,
                     "valid to [µm]": fit.largest,
-                    "points [-]": len(process.points.zones),
-                    "taken": "yes" if type(fit.model) is type(process.best.model) else "no",
+                    "points [-]": len(points.zones),
+                    "taken": "yes" if type(fit.model) is type(best_fit(points).model) else "no",
                 }
-                for process in self.processes
-                for fit in process.forms
+                for name, points in self.processes.items()
+                for fit in fits(points)
             ]
         )
 
@@ -137,14 +114,14 @@ class CostFitsAnswer(Answer):
             title="What a zone costs: the shop's points and the forms through them",
             x_label="zone [µm]",
             y_label="cost [cost units]",
-            series=tuple(series for process in self.processes for series in _curves(process)),
+            series=tuple(series for name, points in self.processes.items() for series in _curves(name, points)),
         )
 
 
-def _curves(process: FittedProcess) -> Iterable[Series]:
+def _curves(name: str, points: Points) -> Iterable[Series]:
     """Return the points of a process and its taken curve."""
-    best, points = process.best, process.points
+    best = best_fit(points)
     zones = np.geomspace(best.smallest, best.largest, _DRAWN)
-    yield Series(label=process.name, kind="points", x=list(points.zones), y=list(points.costs))
-    label = f"{process.name}: {formula(best.model)}"
+    yield Series(label=name, kind="points", x=list(points.zones), y=list(points.costs))
+    label = f"{name}: {formula(best.model)}"
     yield Series(label=label, kind="line", x=list(zones), y=list(best.model.value(zones)))
