@@ -8,23 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Response
-
-
-@dataclass(frozen=True, kw_only=True)
-class Differences:
-    """Answers with derivatives from central differences.
-
-    Parameters
-    ----------
-    evaluation
-        Output of every sample; its status is the worst one of the sample and of its neighbours.
-    by_column
-        Derivatives, NaN where a neighbour failed [output per unit of the column].
-    """
-
-    evaluation: Evaluation
-    by_column: Float[np.ndarray, "sample column"]
+from tolalloc.models import Evaluation, Response, SettingDerivatives
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,15 +61,17 @@ class DifferencedResponse:
         at = self.response.outputs.index(self.output)
         return Evaluation(values=found.values[:, [at]], status=found.status)
 
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Differences:
-        """Return the output of every sample and its derivatives, all neighbours in one call."""
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the output of every sample and its derivatives, NaN by neighbours that failed, all in one call."""
         columns = len(self.columns)
         shifts = np.concatenate([np.zeros((1, columns)), np.diag(self.steps), -np.diag(self.steps)])
         found = self((x[:, np.newaxis] + shifts).reshape(-1, columns))
         values, status = found.values.reshape(-1, shifts.shape[0]), found.status.reshape(-1, shifts.shape[0])
         slopes = (values[:, 1 : columns + 1] - values[:, columns + 1 :]) / (2 * self.steps)
         good = found.good.reshape(status.shape)[:, 1:].reshape(-1, 2, columns).all(axis=1)
-        return Differences(
+        return SettingDerivatives(
+            # The status is the worst one of the sample and of its neighbours.
             evaluation=Evaluation(values=values[:, :1], status=status.max(axis=1)),
             by_column=np.where(good, slopes, np.nan),
+            by_setting=np.empty((x.shape[0], 0)),
         )
