@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.search import allocate
+from tolalloc.allocation.trial import OutputTrial
 from tolalloc.allocation.trust_region import aimed
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
@@ -48,13 +49,13 @@ def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int =
     )
 
 
-@dataclass(frozen=True)
-class KnownTrial:
-    values: np.ndarray
-    failed: int = 0
-    output: str = "x [mm]"
-    design: np.ndarray = field(default_factory=lambda: np.array([1.0, 2.0, 3.0, 4.0]))
-    groups: int = 2
+class KnownTrial(OutputTrial):
+    """A trial whose values are known."""
+
+    design, groups, failed = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0
+
+    def __init__(self, values, failed=0):
+        vars(self).update(values=values, failed=failed, output="x [mm]")
 
     def derived(self):
         return self.values, np.outer(self.values, [1.0, 0.0, 0.0, 0.0]) / self.design[0]

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.local_model import Side, root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.program.problem import Stack
+from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.exceptions import InputError
@@ -17,48 +18,6 @@ from tolalloc.named_fields import NamedFields, is_number
 
 _MISSED = 0.005
 """Share of a worst case by which an ascent may have missed it [-]."""
-
-
-@runtime_checkable
-class Trial(Protocol):
-    """What is known of one output at one design."""
-
-    @property
-    def output(self) -> str:
-        """Name of the output with its unit."""
-        ...
-
-    @property
-    def design(self) -> Float[np.ndarray, " variable"]:
-        """Scales [-] and settings."""
-        ...
-
-    @property
-    def groups(self) -> int:
-        """Number of scales; what follows them in a design are the settings [-]."""
-        ...
-
-    @property
-    def values(self) -> Float[np.ndarray, " unit"]:
-        """The output of the fresh units that have one [unit of the output]."""
-        ...
-
-    @property
-    def failed(self) -> int:
-        """Number of fresh units without a usable answer [-]."""
-        ...
-
-    def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
-        """Return the output of some units and its derivative by every variable [unit of the output]."""
-        ...
-
-    def worst(self, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
-        """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""
-        ...
-
-    def linear(self) -> tuple[float, float, Float[np.ndarray, " group"], Float[np.ndarray, " setting"]]:
-        """Return the nominal output, what locked zones and each group add in quadrature, and its change by settings."""
-        ...
 
 
 @runtime_checkable
@@ -70,7 +29,7 @@ class Guarantee(Protocol):
         """What must be shown, in words."""
         ...
 
-    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side; the requirement is met if no value lies beyond its limit."""
         ...
 
@@ -122,14 +81,14 @@ class AtYield(NamedFields):
             needed = int(np.ceil(np.log(1 - CONFIDENCE) / np.log(self.target)))
             raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
 
-    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
         units = trial.values.size + trial.failed
         allowed = allowed_rejections(units, self.target) - trial.failed
         left_out = _shared_out(np.sort(trial.values), limits, max(allowed, 0))
         return tuple(self._side(trial, sign, limit, left_out[sign], allowed >= 0) for sign, limit in _turned(limits))
 
-    def _side(self, trial: Trial, sign: int, limit: float, left_out: int, enough: bool) -> Side:
+    def _side(self, trial: OutputTrial, sign: int, limit: float, left_out: int, enough: bool) -> Side:
         turned = np.sort(sign * trial.values)
         value = float(turned[-1 - left_out])
         return Side(
@@ -188,11 +147,11 @@ class AtCpk(NamedFields):
         if units < 100:
             raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
 
-    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
         return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
 
-    def _side(self, trial: Trial, sign: int, limit: float) -> Side:
+    def _side(self, trial: OutputTrial, sign: int, limit: float) -> Side:
         turned = sign * trial.values
         needed, error = self._needed(turned)
         deviation = float(turned.std(ddof=1))
@@ -230,11 +189,11 @@ class WorstCase:
     def require_enough(self, units: int) -> None:
         """Accept every number of units; none is asked."""
 
-    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
         return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
 
-    def _side(self, trial: Trial, sign: Literal[1, -1], limit: float) -> Side:
+    def _side(self, trial: OutputTrial, sign: Literal[1, -1], limit: float) -> Side:
         value, gradient = trial.worst(sign)
         stack = worst_case_stack(
             _name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
@@ -268,7 +227,7 @@ class RootSumSquare:
     def require_enough(self, units: int) -> None:
         """Accept every number of units; none is asked."""
 
-    def judge(self, trial: Trial, limits: Limits) -> tuple[Side, ...]:
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side.
 
         Raises
@@ -311,12 +270,12 @@ def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
     return (*upper, *lower)
 
 
-def _scale(trial: Trial, limit: float) -> float:
+def _scale(trial: OutputTrial, limit: float) -> float:
     """Return what an excess is compared with; a limit of zero says nothing of its size [unit of the output]."""
     return max(abs(limit), float(trial.values.std())) or 1.0
 
 
-def _name(trial: Trial, sign: int) -> str:
+def _name(trial: OutputTrial, sign: int) -> str:
     return f"{trial.output}, {'upper' if sign > 0 else 'lower'} limit"
 
 
@@ -341,7 +300,7 @@ def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> fl
     return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
 
 
-def _root_sum_square(trial: Trial, sign: int, limit: float, value: float) -> Stack:
+def _root_sum_square(trial: OutputTrial, sign: int, limit: float, value: float) -> Stack:
     """Return the local model of mean + spread·σ, which is the turned value; theory page, equation (24)."""
     turned, (known, derivative) = sign * trial.values, trial.derived()
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tolalloc.allocation.guarantee import Guarantee, Trial
+from tolalloc.allocation.guarantee import Guarantee
 from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
 
 
@@ -34,7 +35,7 @@ class Requirement:
         said = " and ".join(f"{word} {end:g}" for word, end in ends.items() if end is not None)
         return f"{self.output}: {said}, shown for {self.guarantee.words}"
 
-    def check(self, trial: Trial) -> Check:
+    def check(self, trial: OutputTrial) -> Check:
         """Return how a design stands against the requirement."""
         return Check(requirement=self, sides=self.guarantee.judge(trial, self.limits))
 

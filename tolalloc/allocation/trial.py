@@ -192,7 +192,7 @@ class FreshUnits:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputTrial:
-    """What fresh units of a design say of one output; a `tolalloc.allocation.guarantee.Trial`.
+    """What fresh units of a design say of one output, which guarantees judge.
 
     Parameters
     ----------
