@@ -25,16 +25,6 @@ _ROUNDING = 1e-9
 class DesignSpace:
     """Design variables: the scale of each group's zones and the settings of the model.
 
-    Parameters
-    ----------
-    errors
-        The sources at their zones in the tolerance table; a scale of 1 is that zone.
-    settings
-        What the designer chooses beside the zones, with bounds; none if the model has none.
-    processes
-        Source → ways to make it, zones in [m]; without an entry it costs what the tolerance table says at its zone,
-        and that falls as 1/zone.
-
     Raises
     ------
     InputError
@@ -45,8 +35,11 @@ class DesignSpace:
     A design is a vector: the scale of every group [-], then every setting [unit of its name].
     """
 
-    errors: ErrorModel
+    errors: ErrorModel  # The sources at their zones in the tolerance table; a scale of 1 is that zone
+    # What the designer chooses beside the zones, with bounds; none if the model has none
     settings: tuple[Setting, ...] = ()
+    # Source → ways to make it, zones in [m]; without an entry it costs what the tolerance table says at its zone, and
+    # that falls as 1/zone
     processes: Mapping[str, tuple[Process, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

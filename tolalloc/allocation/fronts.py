@@ -29,20 +29,11 @@ _SPAN = 2.5
 
 @dataclass(frozen=True, kw_only=True)
 class ConvexFront:
-    """The cheapest designs for several limits of the peak-to-peak, by the convex models around one design.
+    """The cheapest designs for several limits of the peak-to-peak, by the convex models around one design."""
 
-    Parameters
-    ----------
-    limits
-        The limits that can be kept [arcsec].
-    designs
-        Scales [-] and settings.
-    cost, bound
-        Cost, and a lower bound on it over all processes that takes no solver's word [cost units].
-    """
-
-    limits: Float[np.ndarray, " limit"]
-    designs: Float[np.ndarray, "limit variable"]
+    limits: Float[np.ndarray, " limit"]  # The limits that can be kept [arcsec]
+    designs: Float[np.ndarray, "limit variable"]  # Scales [-] and settings
+    # Cost, and a lower bound on it over all processes that takes no solver's word [cost units]
     cost: Float[np.ndarray, " limit"]
     bound: Float[np.ndarray, " limit"]
 
@@ -150,21 +141,11 @@ def searched_front(
 
 @dataclass(frozen=True, kw_only=True)
 class Fronts:
-    """What can be had at which cost.
+    """What can be had at which cost."""
 
-    Parameters
-    ----------
-    exact
-        The convex program's front around the chosen design, with its certificate.
-    searched
-        The front of NSGA-II on the corrected model, cost against quantile, with runs of the real model along it.
-    with_setting
-        The front of NSGA-III with the last setting as a third objective, to be large; none without settings.
-    score
-        What the surrogate is worth that the searches ran on if its Q² is high enough.
-    """
-
-    exact: ConvexFront
+    exact: ConvexFront  # The convex program's front around the chosen design, with its certificate
+    # The front of NSGA-II on the corrected model, cost against quantile, with runs of the real model along it
     searched: Front
+    # The front of NSGA-III with the last setting as a third objective, to be large; none without settings
     with_setting: Front | None
-    score: Score
+    score: Score  # What the surrogate is worth that the searches ran on if its Q² is high enough

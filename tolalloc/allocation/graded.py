@@ -27,27 +27,14 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class GradedAllocation:
-    """The cheapest design on the ladders.
+    """The cheapest design on the ladders."""
 
-    Parameters
-    ----------
-    space
-        Design variables of groups whose members share one zone.
-    chosen
-        The cheapest verified design, or the least violating one.
-    tried
-        All verified designs, the free one in this space first.
-    labels
-        Name of the zone of every group on the drawing.
-    solution
-        Cheapest choice that the chosen design's local models let keep the limits, with its proven bound; without
-        locked zones.
-    """
-
-    space: DesignSpace
-    chosen: VerifiedDesign
-    tried: tuple[VerifiedDesign, ...]
-    labels: tuple[str, ...]
+    space: DesignSpace  # Design variables of groups whose members share one zone
+    chosen: VerifiedDesign  # The cheapest verified design, or the least violating one
+    tried: tuple[VerifiedDesign, ...]  # All verified designs, the free one in this space first
+    labels: tuple[str, ...]  # Name of the zone of every group on the drawing
+    # Cheapest choice that the chosen design's local models let keep the limits, with its proven bound; without locked
+    # zones
     solution: DiscreteSolution
 
     @property

@@ -12,31 +12,16 @@ from tolalloc.allocation.program.problem import Stack
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One limited side of a requirement at a verified design.
+    """One limited side of a requirement at a verified design."""
 
-    Parameters
-    ----------
-    sign
-        1 for an upper limit, −1 for a lower one [-].
-    limit
-        The limit [unit of the output].
-    value
-        What the guarantee compares with the limit [unit of the output].
-    standard_error
-        Standard error of the value, the margin that the next step keeps [unit of the output].
-    scale
-        What makes requirements comparable: the limit, or the deviation of the units where that is larger
-        [unit of the output].
-    stack
-        Convex model around the design; its load less its budget is the predicted `excess`.
-    """
-
-    sign: int
-    limit: float
-    value: float
-    standard_error: float
+    sign: int  # 1 for an upper limit, −1 for a lower one [-]
+    limit: float  # The limit [unit of the output]
+    value: float  # What the guarantee compares with the limit [unit of the output]
+    standard_error: float  # Standard error of the value, the margin that the next step keeps [unit of the output]
+    # What makes requirements comparable: the limit, or the deviation of the units where that is larger [unit of the
+    # output]
     scale: float
-    stack: Stack
+    stack: Stack  # Convex model around the design; its load less its budget is the predicted `excess`
 
     @property
     def excess(self) -> float:

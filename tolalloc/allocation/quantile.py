@@ -15,30 +15,17 @@ from tolalloc.models import Evaluation, Model
 class QuantileResponse:
     """Quantile of an output of a design, on the real model with common random numbers.
 
-    Parameters
-    ----------
-    space
-        The design variables.
-    model
-        What answers for single units.
-    output
-        Name of the output with its unit.
-    standard
-        Standard values of the units that all designs share [-].
-    spread
-        Quantile's distance from the mean over the standard deviation [-].
-
     Notes
     -----
     Mean + spread·σ of a few hundred shared units varies smoothly from design to design; the empirical quantile of
     so few would not. The spread is calibrated on large samples, and every design that counts is verified on one.
     """
 
-    space: DesignSpace
-    model: Model
-    output: str
-    standard: Float[np.ndarray, "unit column"]
-    spread: float
+    space: DesignSpace  # The design variables
+    model: Model  # What answers for single units
+    output: str  # Name of the output with its unit
+    standard: Float[np.ndarray, "unit column"]  # Standard values of the units that all designs share [-]
+    spread: float  # Quantile's distance from the mean over the standard deviation [-]
 
     @property
     def columns(self) -> tuple[str, ...]:

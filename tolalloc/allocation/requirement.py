@@ -12,21 +12,11 @@ from tolalloc.capability.indices import Limits
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """Limits of an output and what must be shown of them.
+    """Limits of an output and what must be shown of them."""
 
-    Parameters
-    ----------
-    output
-        Name of the output with its unit.
-    limits
-        One or two limits [unit of the output].
-    guarantee
-        What must be shown.
-    """
-
-    output: str
-    limits: Limits
-    guarantee: Guarantee
+    output: str  # Name of the output with its unit
+    limits: Limits  # One or two limits [unit of the output]
+    guarantee: Guarantee  # What must be shown
 
     @property
     def sentence(self) -> str:
@@ -42,18 +32,10 @@ class Requirement:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """How a verified design stands against one requirement.
+    """How a verified design stands against one requirement."""
 
-    Parameters
-    ----------
-    requirement
-        The requirement.
-    sides
-        Its limited sides, the upper one first.
-    """
-
-    requirement: Requirement
-    sides: tuple[Side, ...]
+    requirement: Requirement  # The requirement
+    sides: tuple[Side, ...]  # Its limited sides, the upper one first
 
     @property
     def met(self) -> bool:

@@ -24,53 +24,27 @@ SAME = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Variant:
-    """The answer under one changed assumption.
+    """The answer under one changed assumption."""
 
-    Parameters
-    ----------
-    name
-        What was changed.
-    scales
-        Scale of every group [-].
-    cost
-        Its cost under the changed assumption, with the locked zones at their own [cost units].
-    regret
-        What the undisturbed answer costs more than this one under the changed assumption, as a share of its cost; not
-        a number where the chosen design no longer keeps a requirement [-].
-    kept
-        Whether the chosen design still keeps every requirement, judged by the change that the same units show.
-    """
-
-    name: str
-    scales: Float[np.ndarray, " group"]
-    cost: float
+    name: str  # What was changed
+    scales: Float[np.ndarray, " group"]  # Scale of every group [-]
+    cost: float  # Its cost under the changed assumption, with the locked zones at their own [cost units]
+    # What the undisturbed answer costs more than this one under the changed assumption, as a share of its cost; not a
+    # number where the chosen design no longer keeps a requirement [-]
     regret: float
-    kept: bool
+    kept: bool  # Whether the chosen design still keeps every requirement, judged by the change that the same units show
 
 
 @dataclass(frozen=True, kw_only=True)
 class Robustness:
-    """Answers under changed assumptions.
+    """Answers under changed assumptions."""
 
-    Parameters
-    ----------
-    groups
-        Names of the groups.
-    optimum
-        The undisturbed answer of the same local models [-].
-    costs
-        In random corners of the box in which every cost changes by `COST_CHANGE`.
-    uncertain
-        With what is uncertain in the model drawn from what is known of it; none where nothing is.
-    second_best
-        With the second-best set of processes, none where there is no other.
-    """
-
-    groups: tuple[str, ...]
-    optimum: Float[np.ndarray, " group"]
-    costs: tuple[Variant, ...]
+    groups: tuple[str, ...]  # Names of the groups
+    optimum: Float[np.ndarray, " group"]  # The undisturbed answer of the same local models [-]
+    costs: tuple[Variant, ...]  # In random corners of the box in which every cost changes by `COST_CHANGE`
+    # With what is uncertain in the model drawn from what is known of it; none where nothing is
     uncertain: tuple[Variant, ...]
-    second_best: Variant | None
+    second_best: Variant | None  # With the second-best set of processes, none where there is no other
 
     @property
     def variants(self) -> tuple[Variant, ...]:

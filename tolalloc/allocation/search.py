@@ -21,33 +21,18 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class ZoneAllocation:
-    """What the search found.
+    """What the search found."""
 
-    Parameters
-    ----------
-    limit
-        Limit of the leading output, the upper one of two [unit of the output].
-    chosen
-        The cheapest design that fresh units on the real kernel show to be met, or the least violating one.
-    tried
-        All designs verified on the way, in order.
-    proportional_tried
-        Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself.
-    optimum
-        Cheapest design of all that the chosen one's convex models let keep the limits; without locked zones.
-    inside
-        The same one standard error inside the limits, which is where the search aims.
-    locked_cost
-        Cost of the locked zones [cost units].
-    """
-
-    limit: float
+    limit: float  # Limit of the leading output, the upper one of two [unit of the output]
+    # The cheapest design that fresh units on the real kernel show to be met, or the least violating one
     chosen: VerifiedDesign
-    tried: tuple[VerifiedDesign, ...]
+    tried: tuple[VerifiedDesign, ...]  # All designs verified on the way, in order
+    # Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself
     proportional_tried: tuple[VerifiedDesign, ...]
+    # Cheapest design of all that the chosen one's convex models let keep the limits; without locked zones
     optimum: Solution
-    inside: Solution
-    locked_cost: float
+    inside: Solution  # The same one standard error inside the limits, which is where the search aims
+    locked_cost: float  # Cost of the locked zones [cost units]
 
     @property
     def proportional(self) -> VerifiedDesign:

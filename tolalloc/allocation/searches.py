@@ -41,49 +41,22 @@ _EXACT = (0.85, 1.25)
 
 @dataclass(frozen=True, kw_only=True)
 class DrawingQuestion:
-    """What is asked of the cheapest drawing.
+    """What is asked of the cheapest drawing."""
 
-    Parameters
-    ----------
-    model
-        The model at the sources of the tolerance table.
-    space
-        Design variables with every setting free.
-    requirements
-        What must be kept; the first one limits the leading output.
-    effort
-        How much may be computed.
-    seed
-        Seed of every random number [-].
-    largest_failed_share
-        Share of units that may fail [-].
-    grades
-        Whether zones come from ISO 286 grades and preferred numbers alone.
-    fixed_first
-        Whether the settings are first left as they are, which says what freeing them is worth.
-    front
-        Whether cost is traded against the limit.
-    what_if
-        Whether the settings are traded against the zones, and costs, the model and processes are changed.
-    unit_price, quality_loss
-        What becomes of units beyond a limit, and what the leading output costs a user although it keeps its limit.
-    place
-        Where the question stands, for messages.
-    """
-
-    model: Model
-    space: DesignSpace
-    requirements: tuple[Requirement, ...]
-    effort: AllocationEffort
-    seed: int
-    largest_failed_share: float
-    grades: bool
-    fixed_first: bool
-    front: bool
-    what_if: bool
+    model: Model  # The model at the sources of the tolerance table
+    space: DesignSpace  # Design variables with every setting free
+    requirements: tuple[Requirement, ...]  # What must be kept; the first one limits the leading output
+    effort: AllocationEffort  # How much may be computed
+    seed: int  # Seed of every random number [-]
+    largest_failed_share: float  # Share of units that may fail [-]
+    grades: bool  # Whether zones come from ISO 286 grades and preferred numbers alone
+    fixed_first: bool  # Whether the settings are first left as they are, which says what freeing them is worth
+    front: bool  # Whether cost is traded against the limit
+    what_if: bool  # Whether the settings are traded against the zones, and costs, the model and processes are changed
+    # What becomes of units beyond a limit, and what the leading output costs a user although it keeps its limit
     unit_price: UnitPrice | None
     quality_loss: QualityLoss | None
-    place: str
+    place: str  # Where the question stands, for messages
 
     @property
     def limits_one_side_above(self) -> bool:

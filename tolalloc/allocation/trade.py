@@ -23,25 +23,15 @@ _SETTLED = 1 / 1200
 
 @dataclass(frozen=True, kw_only=True)
 class SettingTrade:
-    """Least cost over the settings.
+    """Least cost over the settings."""
 
-    Parameters
-    ----------
-    names
-        Names of the settings with their units.
-    values
-        Values of each that were tried, ascending [unit of the setting].
-    cost
-        Cost of the cheapest zones that keep the requirements there, one axis for each setting; not a number where none
-        do, or where a unit of the real model has no answer [cost units].
-    error
-        Root-mean-square of what is left between the local and the real model after the last correction, not a number
-        where no choice has a cost [unit of the leading output].
-    """
-
-    names: tuple[str, ...]
-    values: tuple[Float[np.ndarray, " _step"], ...]
+    names: tuple[str, ...]  # Names of the settings with their units
+    values: tuple[Float[np.ndarray, " _step"], ...]  # Values of each that were tried, ascending [unit of the setting]
+    # Cost of the cheapest zones that keep the requirements there, one axis for each setting; not a number where none
+    # do, or where a unit of the real model has no answer [cost units]
     cost: Float[np.ndarray, "..."]
+    # Root-mean-square of what is left between the local and the real model after the last correction, not a number
+    # where no choice has a cost [unit of the leading output]
     error: float
 
     @property

@@ -27,33 +27,16 @@ _COLUMN_STEP = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class FreshUnits:
-    """Random units of one design.
+    """Random units of one design."""
 
-    Parameters
-    ----------
-    space
-        The design variables.
-    model
-        The real model.
-    design
-        Scales [-] and settings.
-    standard
-        Standard values of the units [-].
-    outputs
-        Names of the outputs, the leading one first.
-    slope_units
-        Units, the first ones, over which derivatives that the model does not know exactly are averaged [-].
-    seeds
-        Node of the seed tree, for the worst units.
-    """
-
-    space: DesignSpace
-    model: Model
-    design: Float[np.ndarray, " variable"]
-    standard: Float[np.ndarray, "unit column"]
-    outputs: tuple[str, ...]
+    space: DesignSpace  # The design variables
+    model: Model  # The real model
+    design: Float[np.ndarray, " variable"]  # Scales [-] and settings
+    standard: Float[np.ndarray, "unit column"]  # Standard values of the units [-]
+    outputs: tuple[str, ...]  # Names of the outputs, the leading one first
+    # Units, the first ones, over which derivatives that the model does not know exactly are averaged [-]
     slope_units: int
-    seeds: SeedTree
+    seeds: SeedTree  # Node of the seed tree, for the worst units
 
     @cached_property
     def x(self) -> Float[np.ndarray, "unit column"]:
@@ -192,18 +175,10 @@ class FreshUnits:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputTrial:
-    """What fresh units of a design say of one output, which guarantees judge.
+    """What fresh units of a design say of one output, which guarantees judge."""
 
-    Parameters
-    ----------
-    units
-        The units.
-    output
-        Name of the output with its unit.
-    """
-
-    units: FreshUnits
-    output: str
+    units: FreshUnits  # The units
+    output: str  # Name of the output with its unit
 
     @property
     def design(self) -> Float[np.ndarray, " variable"]:

@@ -19,45 +19,21 @@ from tolalloc.models import Model
 
 @dataclass(frozen=True, kw_only=True)
 class VerifiedDesign:
-    """A design with the fresh Monte Carlo run that judged it.
+    """A design with the fresh Monte Carlo run that judged it."""
 
-    Parameters
-    ----------
-    name
-        Which search made it, and its number there.
-    space
-        The design variables.
-    design
-        Scales [-] and settings.
-    processes
-        Name of the process of every group.
-    cost
-        Cost [cost units].
-    sample
-        The fresh units on the real model with the leading output, which the first requirement limits.
-    achieved
-        Yield within its limits.
-    checks
-        How the design stands against every requirement, the leading one first.
-    joint
-        Share of units that keep the limits of all requirements.
-    outputs
-        Outputs of all requirements of every fresh unit, NaN where a unit has none.
-    by_zone
-        Change of the leading output's value with the zone of each active source; none where the model does not know
-        its derivatives exactly [unit of the output per m].
-    """
-
-    name: str
-    space: DesignSpace
-    design: Float[np.ndarray, " variable"]
-    processes: tuple[str, ...]
-    cost: float
-    sample: MonteCarlo
-    achieved: Yield
-    checks: tuple[Check, ...]
-    joint: Yield
+    name: str  # Which search made it, and its number there
+    space: DesignSpace  # The design variables
+    design: Float[np.ndarray, " variable"]  # Scales [-] and settings
+    processes: tuple[str, ...]  # Name of the process of every group
+    cost: float  # Cost [cost units]
+    sample: MonteCarlo  # The fresh units on the real model with the leading output, which the first requirement limits
+    achieved: Yield  # Yield within its limits
+    checks: tuple[Check, ...]  # How the design stands against every requirement, the leading one first
+    joint: Yield  # Share of units that keep the limits of all requirements
+    # Outputs of all requirements of every fresh unit, NaN where a unit has none
     outputs: dict[str, Float[np.ndarray, " unit"]]
+    # Change of the leading output's value with the zone of each active source; none where the model does not know its
+    # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
 
     @property
@@ -101,36 +77,19 @@ class VerifiedDesign:
 class Verifier:
     """Judges designs on fresh units.
 
-    Parameters
-    ----------
-    space
-        The design variables.
-    model
-        The real model.
-    requirements
-        What must be kept; the first one limits the leading output.
-    seeds
-        Node of the seed tree; every verification takes its own child.
-    units
-        Units per verification [-].
-    slope_units
-        How many of them derivatives that the model does not know exactly are averaged over [-].
-    largest_failed_share
-        Share of the units that may fail [-].
-
     Raises
     ------
     InputError
         There are too few units for a guarantee.
     """
 
-    space: DesignSpace
-    model: Model
-    requirements: tuple[Requirement, ...]
-    seeds: SeedTree
-    units: int
-    slope_units: int = 1024
-    largest_failed_share: float = LARGEST_FAILED_SHARE
+    space: DesignSpace  # The design variables
+    model: Model  # The real model
+    requirements: tuple[Requirement, ...]  # What must be kept; the first one limits the leading output
+    seeds: SeedTree  # Node of the seed tree; every verification takes its own child
+    units: int  # Units per verification [-]
+    slope_units: int = 1024  # How many of them derivatives that the model does not know exactly are averaged over [-]
+    largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
 
     def __post_init__(self) -> None:
         for requirement in self.requirements:
