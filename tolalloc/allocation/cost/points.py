@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -68,14 +67,6 @@ class Points:
         return Points(zones=tuple(zone / unit for zone in self.zones), costs=self.costs, place=self.place)
 
 
-class LengthUnit(StrEnum):
-    """Unit of a tolerance."""
-
-    MICROMETRE = "µm"
-    MICROMETRE_TYPED = "um"
-    MILLIMETRE = "mm"
-
-
 class ShopPrice(TableRow):
     """One row; the fields are the column headers without their unit."""
 
@@ -84,7 +75,7 @@ class ShopPrice(TableRow):
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
     tolerance: Annotated[float, Field(gt=0)]
-    unit: LengthUnit
+    unit: Literal["µm", "um", "mm"]
     cost: Annotated[float, Field(gt=0, le=1e9)]
     note: str = ""
 
