@@ -9,15 +9,15 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, require_shape
-from tolalloc.drawings.table_file import DATA, TableRow, read_rows
+from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import shipped_or_path
+from tolalloc.files import Record, shipped_or_path
 
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
 
 
-class ProcessCapability(TableRow):
+class ProcessCapability(Record):
     """One row: a process and a feature; the fields are the column headers without their unit."""
 
     process: Annotated[str, Field(min_length=1)]

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import ClassVar, TypeVar, get_args
+from types import MappingProxyType
+from typing import TypeVar, get_args
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, validated
@@ -135,20 +136,16 @@ def split_header(header: str) -> tuple[str, str]:
     return match[1], match[2].strip().replace("\u03bc", "µ").replace("\u22c5", "·")
 
 
-class TableRow(Record):
-    """Base of the rows; the fields are the column headers without their unit."""
-
-    units: ClassVar[Mapping[str, str]] = {}
-    """Field → unit that its header may state; numbers are never converted, so every other unit is refused."""
+Row = TypeVar("Row", bound=Record)
 
 
-Row = TypeVar("Row", bound=TableRow)
-
-
-def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Row], ...]:
+def read_rows(
+    path: Path, kind: type[Row], named_by: str, units: Mapping[str, str] = MappingProxyType({})
+) -> tuple[tuple[str, Row], ...]:
     """Return the rows of a CSV file, each behind the place that messages name: file, row, and the field `named_by`.
 
-    The headers are the fields of the record, with or without a unit in brackets.
+    The headers are the fields of the record, with or without a unit in brackets. Numbers are never converted, so a
+    field for which a unit is given may state no other.
 
     Raises
     ------
@@ -160,7 +157,7 @@ def read_rows(path: Path, kind: type[Row], named_by: str) -> tuple[tuple[str, Ro
     headers = tuple(name for name, _ in stated)
     require_columns(path, headers, kind)
     for name, unit in stated:
-        known = kind.units.get(name, unit)
+        known = units.get(name, unit)
         if unit and unit != known:
             raise InputError.at(path, f"the unit of column {name}", unit, f"{known}; numbers are not converted")
     rows = []

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tolalloc.drawings.fields import LARGEST_ZONE, UNITS
-from tolalloc.drawings.table_file import TableRow, read_rows
+from tolalloc.drawings.table_file import read_rows
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.files import Record
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +68,8 @@ class Points:
         return Points(zones=tuple(zone / unit for zone in self.zones), costs=self.costs, place=self.place)
 
 
-class ShopPrice(TableRow):
+class ShopPrice(Record):
     """One row; the fields are the column headers without their unit."""
-
-    units: ClassVar[Mapping[str, str]] = {"cost": "cost units"}
 
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
@@ -95,7 +94,7 @@ def load_shop_points(path: Path) -> ShopPoints:
         The file, row, field and value that are not allowed, or a process with less than two tolerances.
     """
     prices: dict[tuple[str, Feature | None], list[tuple[float, float]]] = {}
-    for place, row in read_rows(path, ShopPrice, "process"):
+    for place, row in read_rows(path, ShopPrice, "process", {"cost": "cost units"}):
         zone = row.tolerance * UNITS[row.unit]
         if zone > LARGEST_ZONE:
             raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,14 +26,20 @@ from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawings.fields import LARGEST_ZONE
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import DATA, TableRow, read_rows
+from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import shipped_or_path
+from tolalloc.files import Record, shipped_or_path
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 Cost = Annotated[float, Field(ge=0, le=1e9)]
 Zone = Annotated[float | None, Field(gt=0, le=LARGEST_ZONE)]
 Positive = Annotated[float | None, Field(gt=0, le=1e12)]
+
+_UNITS = {
+    **dict.fromkeys(("scale", "min", "max"), "µm"),
+    **dict.fromkeys(("fixed", "change", "inspection"), "cost units"),
+}
+"""Field → unit that its header may state."""
 
 
 class CostCurve(StrEnum):
@@ -71,13 +77,8 @@ class CostCurve(StrEnum):
         return self.needs if self.is_through_points else self.needs | {"fixed", "factor"}
 
 
-class ProcessCostRow(TableRow):
+class ProcessCostRow(Record):
     """One row; the fields are the column headers without their unit, zones in micrometres."""
-
-    units: ClassVar[Mapping[str, str]] = {
-        **dict.fromkeys(("scale", "min", "max"), "µm"),
-        **dict.fromkeys(("fixed", "change", "inspection"), "cost units"),
-    }
 
     sources: Annotated[str, Field(min_length=1)]
     process: Annotated[str, Field(min_length=1)]
@@ -237,7 +238,7 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
         The file, row, field and value that are not allowed, or a feature that no process can hold.
     """
     path = shipped_or_path(name, DATA, ".process_costs.csv", "process cost table")
-    rows = read_rows(path, ProcessCostRow, "sources")
+    rows = read_rows(path, ProcessCostRow, "sources", _UNITS)
     for place, row in rows:
         if not any(fnmatchcase(source.name, row.sources) for source in sources):
             raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
