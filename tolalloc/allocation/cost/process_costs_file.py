@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
@@ -42,39 +41,25 @@ _UNITS = {
 """Field → unit that its header may state."""
 
 
-class CostCurve(StrEnum):
-    """How a cost falls with the zone."""
+CostCurve = Literal[
+    "reciprocal",
+    "reciprocal power",
+    "reciprocal squared",
+    "exponential",
+    "combined",
+    "tabulated",
+    "spline",
+    "fitted",
+]
+"""How a cost falls with the zone."""
 
-    RECIPROCAL = "reciprocal"
-    RECIPROCAL_POWER = "reciprocal power"
-    RECIPROCAL_SQUARED = "reciprocal squared"
-    EXPONENTIAL = "exponential"
-    COMBINED = "combined"
-    TABULATED = "tabulated"
-    SPLINE = "spline"
-    FITTED = "fitted"
-
-    @property
-    def is_through_points(self) -> bool:
-        """Whether it is made from shop data."""
-        return self in (CostCurve.TABULATED, CostCurve.SPLINE, CostCurve.FITTED)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Columns that must be given."""
-        if self.is_through_points:
-            return frozenset({"points"})
-        needed = {
-            CostCurve.RECIPROCAL_POWER: {"exponent"},
-            CostCurve.EXPONENTIAL: {"scale"},
-            CostCurve.COMBINED: {"exponent", "scale"},
-        }
-        return frozenset(needed.get(self, ()))
-
-    @property
-    def takes(self) -> frozenset[str]:
-        """Columns that may be given."""
-        return self.needs if self.is_through_points else self.needs | {"fixed", "factor"}
+_NEEDS: Mapping[str, frozenset[str]] = {
+    "reciprocal power": frozenset({"exponent"}),
+    "exponential": frozenset({"scale"}),
+    "combined": frozenset({"exponent", "scale"}),
+    **dict.fromkeys(("tabulated", "spline", "fitted"), frozenset({"points"})),
+}
+"""Curve → columns that must be given."""
 
 
 class ProcessCostRow(Record):
@@ -98,10 +83,11 @@ class ProcessCostRow(Record):
     def _columns_fit_the_model(self) -> ProcessCostRow:
         columns = ("fixed", "factor", "exponent", "scale", "points")
         given = {name for name in columns if getattr(self, name) is not None}
-        if missing := sorted(self.model.needs - given):
-            raise ValueError(f"model {self.model.value} needs {' and '.join(missing)}")
-        if excess := sorted(given - self.model.takes):
-            raise ValueError(f"model {self.model.value} takes no {' and no '.join(excess)}")
+        needs = _NEEDS.get(self.model, frozenset())
+        if missing := sorted(needs - given):
+            raise ValueError(f"model {self.model} needs {' and '.join(missing)}")
+        if excess := sorted(given - (needs if "points" in needs else needs | {"fixed", "factor"})):
+            raise ValueError(f"model {self.model} takes no {' and no '.join(excess)}")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise ValueError(f"min must not be above max: {self.min:g}, {self.max:g} µm")
         return self
@@ -129,14 +115,14 @@ class ProcessCostRow(Record):
         return self._closed_form(fixed, falling / float(unit))
 
     def _through(self, points: Points) -> CostModel:
-        if self.model is CostCurve.FITTED:
+        if self.model == "fitted":
             model = best_fit(points).model
             return replace(model, fixed=model.fixed + self.inspection)
         inspected = replace(points, costs=tuple(cost + self.inspection for cost in points.costs))
-        return Tabulated(inspected) if self.model is CostCurve.TABULATED else Spline(inspected)
+        return Tabulated(inspected) if self.model == "tabulated" else Spline(inspected)
 
     def _closed_form(self, fixed: float, factor: float) -> ClosedForm:
-        if self.model is CostCurve.RECIPROCAL_SQUARED:
+        if self.model == "reciprocal squared":
             return reciprocal_squared(fixed=fixed, factor=factor)
         if self.exponent and self.scale:
             return Combined(fixed=fixed, factor=factor, exponent=self.exponent, scale=self.scale)
