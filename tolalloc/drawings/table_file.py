@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypeVar, get_args
+from typing import Literal, TypeVar, get_args, get_origin
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, validated
@@ -219,9 +219,12 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
             return float(value)
         except ValueError:
             raise InputError.at(place, header, value, "a number with a decimal point") from None
+    words: tuple[str, ...] = get_args(annotation) if get_origin(annotation) is Literal else ()
     if isinstance(annotation, type) and issubclass(annotation, StrEnum):
-        if value not in list(annotation):
+        words = tuple(annotation)
+    if words:
+        if value not in words:
             more = "; a truncated one is written as its distribution with sorted = yes" if value == "truncated" else ""
-            raise InputError.at(place, header, value, "one of " + ", ".join(annotation) + more)
-        return annotation(value)
+            raise InputError.at(place, header, value, "one of " + ", ".join(words) + more)
+        return words[words.index(value)]
     return value
