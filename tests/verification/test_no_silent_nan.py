@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from tests.first_order import DesignPoints, design_point, design_points
+from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import monte_carlo
