@@ -8,8 +8,9 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import pydantic
 
@@ -22,12 +23,22 @@ Model = TypeVar("Model", bound=pydantic.BaseModel)
 
 _NUMBER = "constrained-float"
 """How pydantic calls the kind of a field that may be a number in a range or a record."""
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""How it calls a field that a record or a dataclass does not have."""
 
 
 class Record(pydantic.BaseModel):
     """Base of everything that is read from a file: no unknown fields, no silent conversion, finite numbers."""
 
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def times(unit: float) -> pydantic.AfterValidator:
+    """Return what takes a number from a file's unit of measurement, such as that of an alias `length_mm`, to SI units.
+
+    A record of the design says by it, and by bounds in the file's unit, how a file may state its numbers.
+    """
+    return pydantic.AfterValidator(lambda value: value * unit)
 
 
 @contextmanager
@@ -82,15 +93,14 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         problems = sorted(
             error.errors(),
             key=lambda problem: (
-                problem["type"] != "extra_forbidden",
+                problem["type"] not in _UNKNOWN,
                 problem["loc"][-1:] == (_NUMBER,) and isinstance(problem["input"], Mapping),
             ),
         )
         problem = problems[0]
-        # Such a field also names the failing kind; a reader knows the field alone.
-        place_in_file = tuple(part for part in problem["loc"] if part != _NUMBER and "Record" not in str(part))
+        place_in_file = _place_in_file(problem["loc"], data, problem["type"] == "missing")
         field = ".".join(str(part) for part in place_in_file)
-        if problem["type"] == "extra_forbidden":
+        if problem["type"] in _UNKNOWN:
             known = _known_fields(model, place_in_file)
             raise UnknownNameError.among(place, "field", field, known) from None
         if problem["type"] == "missing":
@@ -99,23 +109,47 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         if message[1:2].islower():
             message = message[0].lower() + message[1:]
         if isinstance(problem["input"], Mapping):  # a check of several fields together names their values itself
-            whole = f"{field}: " if problem["loc"] else ""
+            whole = f"{field}: " if field else ""
             raise InputError(f"{place}: {whole}{message}.") from None
         raise InputError(f"{place}: {field} is {problem['input']!r}; {message}.") from None
 
 
-def _known_fields(model: type[pydantic.BaseModel], location: tuple[int | str, ...]) -> list[str]:
+def _place_in_file(location: tuple[int | str, ...], data: Any, missing: bool) -> list[int | str]:
+    """Return where in the data a problem is; of a field that may be of several kinds, pydantic names the kind too."""
+    found: list[int | str] = []
+    for part in location:
+        known = part in data if isinstance(data, Mapping) else isinstance(data, list)
+        if known:
+            data = data[part]
+        elif not (missing and part == location[-1]):
+            continue
+        found.append(part)
+    return found
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    """Return the fields of a record, or of a dataclass that is read from a file, as files name them: their types."""
+    if isinstance(kind, type) and issubclass(kind, pydantic.BaseModel):
+        return {name: info.annotation for name, info in kind.model_fields.items()}
+    if not (isinstance(kind, type) and is_dataclass(kind)):
+        return {}
+    fields = {}
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        aliases = [getattr(mark, "alias", None) for mark in getattr(hint, "__metadata__", ())]
+        fields[next(filter(None, aliases), name)] = hint
+    return fields
+
+
+def _known_fields(kind: Any, location: list[int | str]) -> list[str]:
     """Return the dotted names of the fields beside an unknown one."""
     prefix = ""
     for part in location[:-1]:
-        kind = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
-        inner = [
-            one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, pydantic.BaseModel)
-        ]
+        one = _fields(kind).get(str(part))
+        inner = [own for own in (one, *get_args(one)) if _fields(own)]
         if not inner:
             break
-        model, prefix = inner[0], f"{prefix}{part}."
-    return [prefix + name for name in model.model_fields]
+        kind, prefix = inner[0], f"{prefix}{part}."
+    return [prefix + name for name in _fields(kind)]
 
 
 def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> Path:

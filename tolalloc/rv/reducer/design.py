@@ -4,36 +4,46 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import cos, sqrt
+from typing import Annotated
+
+from pydantic import Field
 
 from tolalloc.exceptions import InputError
+from tolalloc.files import times
 from tolalloc.named_fields import is_number
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
+from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+
+Teeth = Annotated[int, Field(ge=5, le=1000)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FirstStage:
-    """Sun gear and planet gears, an involute pair."""
+    """Sun gear and planet gears, an involute pair; table ``[first_stage]`` of a reducer file."""
 
     # Numbers of teeth Z1 and Z2 [-]
-    sun_teeth: int
-    planet_teeth: int
+    sun_teeth: Teeth
+    planet_teeth: Teeth
     # Module m and pressure angle α [m, rad]
-    module: float
-    pressure_angle: float
+    module: Annotated[float, Field(alias="module_mm", ge=0.1, le=20), times(MILLIMETRE)]
+    pressure_angle: Annotated[float, Field(alias="pressure_angle_deg", ge=5, le=45), times(DEGREE)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CycloidStage:
-    """Cycloid discs against the ring of pins."""
+    """Cycloid discs against the ring of pins; table ``[cycloid_stage]``."""
 
-    pin_count: int  # Number zp [-]
-    disc_teeth: int  # Number zc = zp − 1 [-]
+    pin_count: Teeth  # Number zp [-]
+    disc_teeth: Teeth  # Number zc = zp − 1 [-]
     # Radius Rp of the circle of pin centres, and r_rp of a pin [m]
-    pin_circle_radius: float
-    pin_radius: float
-    eccentricity: float  # Crank eccentricity e [m]
-    face_width: float  # Loaded width b of a disc [m]
-    disc_spacing: float = 0.0  # Distance between the middle planes of neighbouring discs [m]
+    pin_circle_radius: Annotated[float, Field(alias="pin_circle_radius_mm", ge=5, le=1000), times(MILLIMETRE)]
+    pin_radius: Annotated[float, Field(alias="pin_radius_mm", ge=0.1, le=50), times(MILLIMETRE)]
+    # Crank eccentricity e [m]
+    eccentricity: Annotated[float, Field(alias="eccentricity_mm", ge=0.05, le=10), times(MILLIMETRE)]
+    # Loaded width b of a disc, and distance between the middle planes of neighbouring discs, in a file b unless given
+    # [m]
+    face_width: Annotated[float, Field(alias="face_width_mm", ge=0.5, le=200), times(MILLIMETRE)]
+    disc_spacing: Annotated[float, Field(alias="disc_spacing_mm", ge=0, le=500), times(MILLIMETRE)] = 0.0
 
     @property
     def shortening(self) -> float:
@@ -112,21 +122,24 @@ class Modification:
 
 @dataclass(frozen=True, kw_only=True)
 class Clearances:
-    """Nominal clearance of the bilateral interfaces; where it is 0 the interface has no play."""
+    """Nominal clearance, half the play, of the bilateral interfaces, 0 where there is none; table ``[clearances]``."""
 
-    gear_mesh: float = 0.0  # Half the normal backlash of a sun–planet mesh [m]
+    # Half the normal backlash of a sun–planet mesh [m]
+    gear_mesh: Annotated[float, Field(alias="gear_mesh_um", ge=0, le=200), times(MICROMETRE)] = 0.0
     # Radial clearance of a bearing, half its diametral one [m]
-    crank_disc_bearing: float = 0.0
-    crank_carrier_bearing: float = 0.0
-    carrier_bearing: float = 0.0
+    crank_disc_bearing: Annotated[float, Field(alias="crank_disc_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+    crank_carrier_bearing: Annotated[
+        float, Field(alias="crank_carrier_bearing_um", ge=0, le=200), times(MICROMETRE)
+    ] = 0.0
+    carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """Torques on the carrier [N·m]; negative resists the positive direction of rotation."""
+    """Torques on the carrier [N·m]; negative resists the positive direction of rotation. Table ``[load]``."""
 
-    test_torque: float
-    rated_torque: float
+    test_torque: Annotated[float, Field(alias="test_torque_nm", ge=-1e5, le=1e5)]
+    rated_torque: Annotated[float, Field(alias="rated_torque_nm", gt=0, le=1e5)]
 
 
 @dataclass(frozen=True, kw_only=True)

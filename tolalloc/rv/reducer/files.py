@@ -9,110 +9,46 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.exceptions import InputError
-from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, validated, write_new
+from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.rv.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
-from tolalloc.rv.reducer.stiffness_records import (
-    IDENTIFIABLE,
-    BallRecord,
-    IdentifiedStiffnessRecord,
-    StiffnessRecord,
-)
-from tolalloc.units import DEGREE, GIGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.rv.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
+from tolalloc.units import MICROMETRE, MILLIMETRE
 
 PRESETS = Path(__file__).parent / "presets"
 
-Teeth = Annotated[int, Field(ge=5, le=1000)]
 
-_SI = {"mm": MILLIMETRE, "um": MICROMETRE, "deg": DEGREE, "gpa": GIGAPASCAL, "nm": 1.0}
-"""Unit of measurement at the end of a field's name → what it is in SI units; ``nm`` is N·m."""
-
-
-def _in_si(record: Record) -> dict[str, Any]:
-    """Return the fields of a record in SI units, named without their units of measurement."""
-    fields: dict[str, Any] = {}
-    for name, value in record:
-        quantity, _, unit = name.rpartition("_")
-        fields |= {quantity: value * _SI[unit]} if unit in _SI and value is not None else {name: value}
-    return fields
+def _with_spacing(table: Any) -> Any:
+    """Return table ``[cycloid_stage]`` with discs that stand side by side unless it says otherwise."""
+    if not isinstance(table, dict) or "face_width_mm" not in table:
+        return table
+    return {"disc_spacing_mm": table["face_width_mm"], **table}
 
 
-class FirstStageRecord(Record):
-    """Table ``[first_stage]``."""
-
-    sun_teeth: Teeth
-    planet_teeth: Teeth
-    module_mm: Annotated[float, Field(ge=0.1, le=20)]
-    pressure_angle_deg: Annotated[float, Field(ge=5, le=45)]
-
-
-class CycloidStageRecord(Record):
-    """Table ``[cycloid_stage]``."""
-
-    pin_count: Teeth
-    disc_teeth: Teeth
-    pin_circle_radius_mm: Annotated[float, Field(ge=5, le=1000)]
-    pin_radius_mm: Annotated[float, Field(ge=0.1, le=50)]
-    eccentricity_mm: Annotated[float, Field(ge=0.05, le=10)]
-    face_width_mm: Annotated[float, Field(ge=0.5, le=200)]
-    disc_spacing_mm: Annotated[float, Field(ge=0, le=500)] | None = None
-
-    @model_validator(mode="after")
-    def _is_a_cycloid(self) -> CycloidStageRecord:
-        if self.disc_teeth != self.pin_count - 1:
-            raise ValueError(f"disc_teeth must be pin_count − 1 = {self.pin_count - 1} (one-tooth difference)")
-        shortening = self.eccentricity_mm * self.pin_count / self.pin_circle_radius_mm
-        if not shortening < 1:
-            raise ValueError(f"K1 = eccentricity·pin_count/pin_circle_radius must be below 1 and is {shortening:.3g}")
-        half_pitch, convex = self.pin_circle_radius_mm * pi / self.pin_count, self.stage().smallest_convex_radius
-        if self.pin_radius_mm >= half_pitch:
-            raise ValueError(f"pin_radius_mm must be below {half_pitch:.3g}, where neighbouring pins overlap")
-        if self.pin_radius_mm * MILLIMETRE >= convex:
-            raise ValueError(f"pin_radius_mm must be below {convex / MILLIMETRE:.3g}, where pins undercut the teeth")
-        return self
-
-    def stage(self) -> CycloidStage:
-        """Return the cycloid stage in SI units."""
-        spacing = self.face_width_mm if self.disc_spacing_mm is None else self.disc_spacing_mm
-        return CycloidStage(**_in_si(self.model_copy(update={"disc_spacing_mm": spacing})))
+def _is_a_cycloid(stage: CycloidStage) -> CycloidStage:
+    if stage.disc_teeth != stage.pin_count - 1:
+        raise ValueError(f"disc_teeth must be pin_count − 1 = {stage.pin_count - 1} (one-tooth difference)")
+    if not stage.shortening < 1:
+        raise ValueError(f"K1 = eccentricity·pin_count/pin_circle_radius must be below 1 and is {stage.shortening:.3g}")
+    half_pitch, convex = stage.pin_circle_radius * pi / stage.pin_count, stage.smallest_convex_radius
+    for largest, what in ((half_pitch, "neighbouring pins overlap"), (convex, "pins undercut the teeth")):
+        if stage.pin_radius >= largest:
+            raise ValueError(f"pin_radius_mm must be below {largest / MILLIMETRE:.3g}, where {what}")
+    return stage
 
 
-class MaterialRecord(Record):
-    """Table ``[material]``, and ``[pin_material]`` where the pins are of another one."""
-
-    elastic_modulus_gpa: Annotated[float, Field(ge=10, le=1000)]
-    poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
-
-
-class ClearancesRecord(Record):
-    """Table ``[clearances]``, half the play; an interface that is not named has none."""
-
-    gear_mesh_um: Annotated[float, Field(ge=0, le=200)] = 0.0
-    crank_disc_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
-    crank_carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
-    carrier_bearing_um: Annotated[float, Field(ge=0, le=200)] = 0.0
+Micrometres = Annotated[float, Field(ge=-200, le=200), times(MICROMETRE)]
 
 
 class ModificationRecord(Record):
     """Table ``[modification]``; the convention says whether the shift was written Rp + Δr_p or Rp − Δr_p."""
 
-    equidistant_um: Annotated[float, Field(ge=-200, le=200)]
-    shift_um: Annotated[float, Field(ge=-200, le=200)]
+    equidistant_um: Micrometres
+    shift_um: Micrometres
     convention: Literal["plus", "minus"] = "plus"
-
-    def modification(self) -> Modification:
-        """Return the modification in SI units and in the program's convention."""
-        return Modification.from_convention(**_in_si(self))
-
-
-class LoadRecord(Record):
-    """Table ``[load]``; torques resist the positive direction of rotation when negative."""
-
-    test_torque_nm: Annotated[float, Field(ge=-1e5, le=1e5)]
-    rated_torque_nm: Annotated[float, Field(gt=0, le=1e5)]
 
 
 class ReducerRecord(Record):
@@ -122,39 +58,40 @@ class ReducerRecord(Record):
     source: str
     crank_count: Annotated[int, Field(ge=2, le=6)]
     disc_count: Annotated[int, Field(ge=1, le=3)]
-    first_stage: FirstStageRecord
-    cycloid_stage: CycloidStageRecord
-    material: MaterialRecord
-    pin_material: MaterialRecord | None = None
+    first_stage: FirstStage
+    cycloid_stage: Annotated[CycloidStage, BeforeValidator(_with_spacing), AfterValidator(_is_a_cycloid)]
+    material: Material
+    pin_material: Material | None = None
     stiffness: StiffnessRecord
     modification: ModificationRecord
-    load: LoadRecord
-    clearances: ClearancesRecord = ClearancesRecord()
+    load: Load
+    clearances: Clearances = Clearances()
     assumptions: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _preload_is_carried(self) -> ReducerRecord:
-        if isinstance(self.stiffness.carrier_bearing, BallRecord):
-            self.stiffness.carrier_bearing.stiffness(Material(**_in_si(self.material)))
+    def _holds_together(self) -> ReducerRecord:
+        self.reducer()
         return self
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        stage, disc = self.cycloid_stage.stage(), Material(**_in_si(self.material))
-        pin = Material(**_in_si(self.pin_material)) if self.pin_material else disc
+        disc, grinding = self.material, self.modification
+        pin = self.pin_material or disc
         return Reducer(
             name=self.name,
             source=self.source,
             crank_count=self.crank_count,
             disc_count=self.disc_count,
-            first_stage=FirstStage(**_in_si(self.first_stage)),
-            cycloid_stage=stage,
+            first_stage=self.first_stage,
+            cycloid_stage=self.cycloid_stage,
             disc_material=disc,
             pin_material=pin,
-            stiffness=self.stiffness.stiffness(disc, pin, stage),
-            modification=self.modification.modification(),
-            load=Load(**_in_si(self.load)),
-            clearances=Clearances(**_in_si(self.clearances)),
+            stiffness=self.stiffness.stiffness(disc, pin, self.cycloid_stage),
+            modification=Modification.from_convention(
+                grinding.convention, equidistant=grinding.equidistant_um, shift=grinding.shift_um
+            ),
+            load=self.load,
+            clearances=self.clearances,
             assumptions=self.assumptions,
         )
 

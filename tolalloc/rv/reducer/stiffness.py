@@ -8,11 +8,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from math import inf, pi
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
+from pydantic import Field
 
 from tolalloc.exceptions import InputError
+from tolalloc.files import times
+from tolalloc.units import GIGAPASCAL
 
 ROUNDING = 1e-9
 """What a correlation may miss of symmetry, of 1 on its diagonal and of no negative eigenvalue [-]."""
@@ -37,11 +41,11 @@ class Stiffness:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """Elastic constants."""
+    """Elastic constants; table ``[material]``, and ``[pin_material]`` where the pins are of another one."""
 
     # Young's modulus E and Poisson's ratio µ [Pa, -]
-    elastic_modulus: float
-    poisson_ratio: float
+    elastic_modulus: Annotated[float, Field(alias="elastic_modulus_gpa", ge=10, le=1000), times(GIGAPASCAL)]
+    poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
 
 
 def contact_modulus(first: Material, second: Material) -> float:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from tolalloc.files import Record
+from tolalloc.files import Record, times
 from tolalloc.rv.reducer.design import CycloidStage
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 from tolalloc.rv.reducer.table2 import (
@@ -23,60 +25,66 @@ from tolalloc.units import MILLIMETRE
 NewtonPerMetre = Annotated[float, Field(ge=1e4, le=1e13)]
 
 
-class ShaftRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class Shaft:
     """Dimensions from which Table 2 of liu2020 gives the support of the sun."""
 
-    diameter_mm: Annotated[float, Field(gt=0, le=500)]
-    length_mm: Annotated[float, Field(gt=0, le=2000)]
+    diameter: Annotated[float, Field(alias="diameter_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
+    length: Annotated[float, Field(alias="length_mm", gt=0, le=2000), times(MILLIMETRE)]  # [m]
 
-    @model_validator(mode="after")
-    def _bends(self) -> ShaftRecord:
-        if self.length_mm < self.diameter_mm:
+    def __post_init__(self) -> None:
+        if self.length < self.diameter:
             raise ValueError(
-                f"length_mm is {self.length_mm:g}; allowed is diameter_mm = {self.diameter_mm:g} or more, because the "
-                "formula bends the shaft and knows no shear"
+                f"length_mm is {self.length / MILLIMETRE:g}; allowed is diameter_mm = {self.diameter / MILLIMETRE:g} "
+                "or more, because the formula bends the shaft and knows no shear"
             )
-        return self
 
 
-class BearingRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class Rollers:
     """Roller length times number of rollers, from which Table 2 of liu2020 gives a bearing's stiffness."""
 
-    loaded_length_mm: Annotated[float, Field(gt=0, le=10000)]
+    loaded_length: Annotated[float, Field(alias="loaded_length_mm", gt=0, le=10000), times(MILLIMETRE)]  # [m]
 
 
-class MeshRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class GearPair:
     """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness."""
 
     contact_ratio: Annotated[float, Field(ge=1, le=2.5)]
     sun_virtual_teeth: Annotated[float, Field(ge=5)]
     planet_virtual_teeth: Annotated[float, Field(ge=5)]
-    face_width_mm: Annotated[float, Field(gt=0, le=500)]
+    face_width: Annotated[float, Field(alias="face_width_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
 
 
-class BallRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class Balls:
     """Data of the carrier's angular-contact bearing from which Hertz's contact gives its stiffness."""
 
-    ball_radius_mm: Annotated[float, Field(ge=0.1, le=50)]
+    ball_radius: Annotated[float, Field(alias="ball_radius_mm", ge=0.1, le=50), times(MILLIMETRE)]  # [m]
     balls: Annotated[int, Field(ge=1, le=1000)]
-    preload_n: Annotated[float, Field(gt=0, le=1e7)]
+    preload: Annotated[float, Field(alias="preload_n", gt=0, le=1e7)]  # [N]
 
-    def stiffness(self, material: Material) -> float:
-        """Return the stiffness under the preload [N/m].
 
-        Raises
-        ------
-        ValueError
-            The preload is beyond what the balls carry as Hertz says.
-        """
-        radius, elastic = self.ball_radius_mm * MILLIMETRE, (material.elastic_modulus, material.poisson_ratio)
-        largest = largest_preload(radius, self.balls, *elastic)
-        if self.preload_n > largest:
-            raise ValueError(
-                f"stiffness.carrier_bearing.preload_n is {self.preload_n:g}; allowed is up to {largest:.4g}, where the "
-                "contacts are a tenth as wide as the balls"
-            )
-        return ball_bearing(radius, self.balls, self.preload_n, *elastic)
+def _preloaded(ball_radius: float, balls: int, preload: float, **elastic: float) -> float:
+    """Return the stiffness of a ball bearing unless the preload is beyond what the balls carry as Hertz says."""
+    largest = largest_preload(ball_radius, balls, **elastic)
+    if preload > largest:
+        raise ValueError(
+            f"stiffness.carrier_bearing.preload_n is {preload:g}; allowed is up to {largest:.4g}, where the contacts "
+            "are a tenth as wide as the balls"
+        )
+    return ball_bearing(ball_radius, balls, preload, **elastic)
+
+
+FORMULAS: Mapping[str, Callable[..., float]] = {
+    "sun_support": lambda elastic_modulus, poisson_ratio, **own: shaft_support(**own, elastic_modulus=elastic_modulus),  # noqa: ARG005
+    "gear_mesh": lambda elastic_modulus, poisson_ratio, **own: gear_mesh(**own, elastic_modulus=elastic_modulus),  # noqa: ARG005
+    "crank_disc_bearing": roller_bearing,
+    "crank_carrier_bearing": lambda **own: roller_bearing(**own, contact_angle=TAPER_ANGLE),
+    "carrier_bearing": _preloaded,
+}
+"""Stiffness → its formula, of the dimensions in the file and the elastic constants of the discs."""
 
 
 class StiffnessRecord(Record):
@@ -85,37 +93,23 @@ class StiffnessRecord(Record):
     ``pin_span_mm`` is the distance of two supports between which the pins bend; without it they rest in half grooves.
     """
 
-    sun_support: NewtonPerMetre | ShaftRecord
-    gear_mesh: NewtonPerMetre | MeshRecord
-    crank_disc_bearing: NewtonPerMetre | BearingRecord
-    crank_carrier_bearing: NewtonPerMetre | BearingRecord
-    carrier_bearing: NewtonPerMetre | BallRecord
+    sun_support: NewtonPerMetre | Shaft
+    gear_mesh: NewtonPerMetre | GearPair
+    crank_disc_bearing: NewtonPerMetre | Rollers
+    crank_carrier_bearing: NewtonPerMetre | Rollers
+    carrier_bearing: NewtonPerMetre | Balls
     pin_contact: NewtonPerMetre | None = None
     pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
     pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
 
     def stiffness(self, disc: Material, pin: Material, stage: CycloidStage) -> Stiffness:
         """Return all stiffnesses, given or by formula [N/m]."""
-        modulus, poisson = disc.elastic_modulus, disc.poisson_ratio
-        sun, mesh, carrier = self.sun_support, self.gear_mesh, self.carrier_bearing
-        journal, crank = self.crank_disc_bearing, self.crank_carrier_bearing
-        if isinstance(sun, ShaftRecord):
-            sun = shaft_support(sun.diameter_mm * MILLIMETRE, sun.length_mm * MILLIMETRE, modulus)
-        if isinstance(mesh, MeshRecord):
-            teeth, width = (mesh.sun_virtual_teeth, mesh.planet_virtual_teeth), mesh.face_width_mm * MILLIMETRE
-            mesh = gear_mesh(mesh.contact_ratio, *teeth, width, modulus)
-        if isinstance(journal, BearingRecord):
-            journal = roller_bearing(journal.loaded_length_mm * MILLIMETRE, modulus, poisson)
-        if isinstance(crank, BearingRecord):
-            crank = roller_bearing(crank.loaded_length_mm * MILLIMETRE, modulus, poisson, TAPER_ANGLE)
-        if isinstance(carrier, BallRecord):
-            carrier = carrier.stiffness(disc)
+        bearings: dict[str, Any] = {}
+        for name, formula in FORMULAS.items():
+            own = getattr(self, name)
+            bearings[name] = own if isinstance(own, float) else formula(**vars(own), **vars(disc))
         return Stiffness(
-            sun_support=sun,
-            gear_mesh=mesh,
-            crank_disc_bearing=journal,
-            crank_carrier_bearing=crank,
-            carrier_bearing=carrier,
+            **bearings,
             pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
             pin_contact_law=self.pin_contact_law,
             pin_bending=inf
