@@ -1,9 +1,9 @@
-"""What moves, damps and weighs a virtual prototype."""
+"""What moves a virtual prototype: input speed and torque over time."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -56,56 +56,3 @@ class TimeCourse:
         at = max(bisect_right(knots, time) - 1, 0)
         after = time - knots[at]
         return integrals[at] + after * (values[at] + (after * slopes[at] / 2 if after > 0 else 0.0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Drive:
-    """What moves the reducer."""
-
-    speed: TimeCourse  # Of the input [rad/s]
-    torque: TimeCourse  # On the carrier, negative against the rotation [N·m]
-
-
-@dataclass(frozen=True, kw_only=True)
-class PrototypeDamping:
-    """What takes energy out of vibrations; contacts of pins and teeth take none.
-
-    Raises
-    ------
-    InputError
-        One of them is negative.
-    """
-
-    bearings: float  # Damping over stiffness of all bearings [s]
-    output: float  # Torque on the carrier over what its speed lacks of the nominal one [N·m·s/rad]
-
-    def __post_init__(self) -> None:
-        for name, value in (("bearings", self.bearings), ("output", self.output)):
-            if not 0.0 <= value < float("inf"):
-                raise InputError.at("virtual prototype", f"damping of {name}", value, "a number of 0 or more")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Masses:
-    """Mass and moment of inertia about the own centre of each moving part.
-
-    Raises
-    ------
-    InputError
-        One of them is not above 0.
-    """
-
-    # Of one crankshaft with its planet gear [kg, kg·m²]
-    crank_mass: float
-    crank_inertia: float
-    # Of one disc [kg, kg·m²]
-    disc_mass: float
-    disc_inertia: float
-    carrier_mass: float  # Of the carrier [kg]
-    carrier_inertia: float  # Of the carrier with all that the output drives [kg·m²]
-
-    def __post_init__(self) -> None:
-        for part in fields(self):
-            value = getattr(self, part.name)
-            if not 0.0 < value < float("inf"):
-                raise InputError.at("virtual prototype", part.name, value, "a number above 0")

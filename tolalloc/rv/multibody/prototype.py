@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.rv.dynamics.properties import Damping, Inertia
 from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
+from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.part_errors import PartErrors
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh
 from tolalloc.rv.multibody.system import System, engine
@@ -47,33 +48,39 @@ def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
 
 
 def assemble(
-    reducer: Reducer, masses: Masses, errors: PartErrors, mesh: Mesh, drive: Drive, damping: PrototypeDamping
+    reducer: Reducer,
+    inertia: Inertia,
+    damping: Damping,
+    errors: PartErrors,
+    mesh: Mesh,
+    speed: TimeCourse,
+    torque: TimeCourse,
 ) -> Prototype:
     """Return a reducer in the engine, at rest at the carrier angle 0."""
-    exudyn = engine()
+    exudyn, bearings = engine(), damping.stiffness_proportional
     new = System(exudyn, exudyn.SystemContainer().AddSystem())
     stiffness, places = reducer.stiffness, reference_places(reducer)
     ground = new.content.AddObject(exudyn.itemInterface.ObjectGround())
-    carrier = new.body(places[0], masses.carrier_mass, masses.carrier_inertia)
+    carrier = new.body(places[0], inertia.carrier, inertia.carrier_moment)
     first_disc = 1 + reducer.crank_count
-    cranks = [new.body(place, masses.crank_mass, masses.crank_inertia) for place in places[1:first_disc]]
-    discs = [new.body(place, masses.disc_mass, masses.disc_inertia) for place in places[first_disc:]]
+    cranks = [new.body(place, inertia.planet, inertia.planet_moment) for place in places[1:first_disc]]
+    discs = [new.body(place, inertia.disc, inertia.disc_moment) for place in places[first_disc:]]
     support = [(carrier[1], np.zeros(2)), (ground, errors.carrier)]
-    new.bearing(support, stiffness.carrier_bearing, damping.bearings)
+    new.bearing(support, stiffness.carrier_bearing, bearings)
     carrier_rotation, gears = new.rotation(carrier[0]), []
     for i, crank in enumerate(cranks):
         axis = places[1 + i]
         pair = [(crank[1], np.zeros(2)), (carrier[1], axis + errors.carrier_bore[i])]
-        new.bearing(pair, stiffness.crank_carrier_bearing, damping.bearings)
+        new.bearing(pair, stiffness.crank_carrier_bearing, bearings)
         for j, disc in enumerate(discs):
             journal = places[first_disc + j] + errors.journal[i, j]
             pair = [(crank[1], journal), (disc[1], axis + errors.disc_bore[j, i])]
-            new.bearing(pair, stiffness.crank_disc_bearing, damping.bearings)
-        gear = new.first_stage(reducer, new.rotation(crank[0]), carrier_rotation, drive.speed)
+            new.bearing(pair, stiffness.crank_disc_bearing, bearings)
+        gear = new.first_stage(reducer, new.rotation(crank[0]), carrier_rotation, speed)
         gears.append(new.moment_sensor(gear))
     reference = np.column_stack([places[first_disc:], np.zeros(len(discs))]).ravel()
     new.pin_contacts([node for node, _ in discs], reference, mesh)
-    new.output(reducer, carrier_rotation, drive, damping.output)
+    new.output(reducer, carrier_rotation, speed, torque, damping.mass_proportional * inertia.carrier_moment)
     nodes = [node for node, _ in (carrier, *cranks, *discs)]
     parts = [(new.sensor(node, "Coordinates"), new.sensor(node, "Coordinates_t")) for node in nodes]
     acceleration = new.sensor(carrier[0], "Coordinates_tt")

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping
+from tolalloc.rv.dynamics.properties import Damping, Inertia
+from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import Prototype, assemble, reference_places
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_pin_forces
@@ -122,7 +123,9 @@ def _run(prototype: Prototype, steps: TimeSteps, progress: Progress) -> None:
     progress(1.0)
 
 
-def _answer(prototype: Prototype, reducer: Reducer, masses: Masses, mesh: Mesh, drive: Drive) -> PrototypeAnswer:
+def _answer(
+    prototype: Prototype, reducer: Reducer, inertia: Inertia, mesh: Mesh, sun_speed: TimeCourse, load: TimeCourse
+) -> PrototypeAnswer:
     stored = prototype.system.GetSensorStoredData
     time = stored(prototype.carrier_acceleration)[:, 0]
     moved, speed = (np.stack([stored(part[kind])[:, 1:] for part in prototype.parts], axis=1) for kind in (0, 1))
@@ -131,24 +134,24 @@ def _answer(prototype: Prototype, reducer: Reducer, masses: Masses, mesh: Mesh, 
     pin_forces = np.empty((time.size, reducer.disc_count, mesh.place.size))
     fill_pin_forces(mesh, moved[:, first_disc:].reshape(time.size, -1), pin_forces)
     bodies = (
-        [(masses.carrier_mass, masses.carrier_inertia)]
-        + [(masses.crank_mass, masses.crank_inertia)] * reducer.crank_count
-        + [(masses.disc_mass, masses.disc_inertia)] * reducer.disc_count
+        [(inertia.carrier, inertia.carrier_moment)]
+        + [(inertia.planet, inertia.planet_moment)] * reducer.crank_count
+        + [(inertia.disc, inertia.disc_moment)] * reducer.disc_count
     )
-    weight = np.array([(mass, mass, inertia) for mass, inertia in bodies])
-    input_angle = np.array([drive.speed.integral(at) for at in time])
+    weight = np.array([(mass, mass, moment) for mass, moment in bodies])
+    input_angle = np.array([sun_speed.integral(at) for at in time])
     gears = reducer.first_stage.sun_teeth / reducer.first_stage.planet_teeth
     on_cranks = sum(stored(gear)[:, 1] for gear in prototype.gears)
     return PrototypeAnswer(
         time=time,
-        input_speed=np.array([drive.speed.at(at) for at in time]),
+        input_speed=np.array([sun_speed.at(at) for at in time]),
         input_angle=input_angle,
         output_speed=speed[:, 0, 2],
         output_acceleration=stored(prototype.carrier_acceleration)[:, 3],
         output_angle=moved[:, 0, 2],
         transmission_error=moved[:, 0, 2] - input_angle / reducer.ratio,
         input_torque=-gears * np.asarray(on_cranks),
-        output_torque=np.array([drive.torque.at(at) for at in time]),
+        output_torque=np.array([load.at(at) for at in time]),
         pin_forces=pin_forces,
         kinetic_energy=np.asarray((weight * speed**2).sum(axis=(1, 2)) / 2),
     )
@@ -156,32 +159,37 @@ def _answer(prototype: Prototype, reducer: Reducer, masses: Masses, mesh: Mesh, 
 
 def simulate_prototype(
     reducer: Reducer,
-    masses: Masses,
-    drive: Drive,
+    inertia: Inertia,
+    damping: Damping,
+    speed: TimeCourse,
+    torque: TimeCourse,
     steps: TimeSteps,
-    damping: PrototypeDamping,
     errors: Mapping[str, float] | None = None,
     progress: Progress = _untold,
 ) -> PrototypeAnswer:
     """Return what the virtual prototype of a reducer does, from rest at the carrier angle 0.
 
     Of the nominal design count the stiffness of bearings and pin contacts and the modification; its first stage is
-    ideal gears. Errors are columns of `tolalloc.rv.multibody.part_errors.part_errors` [m]; progress is told which share
-    is done.
+    ideal gears, so that the sun's mass does not count. Damping is that of all bearings alike, and by the carrier's
+    inertia of how its speed leaves the nominal one; contacts of pins and teeth have none. The speed is the sun's
+    [rad/s], the torque that on the carrier, negative against the rotation [N·m]. Errors are columns of
+    `tolalloc.rv.multibody.part_errors.part_errors` [m]; progress is told which share is done.
 
     Raises
     ------
     InputError
-        The engine is not installed, or a design or error that the prototype does not know.
+        The engine is not installed, or a design, damping or error that the prototype does not know.
     SolveError
         A time step without a solution.
     """
     engine()
+    if damping.interfaces:
+        raise InputError.at("virtual prototype", "interface with its own damping", [*damping.interfaces], "none")
     found = part_errors(reducer, errors or {})
     mesh = mesh_of(reducer, found)
-    prototype = assemble(reducer, masses, found, mesh, drive, damping)
+    prototype = assemble(reducer, inertia, damping, found, mesh, speed, torque)
     _run(prototype, steps, progress)
-    answer = _answer(prototype, reducer, masses, mesh, drive)
+    answer = _answer(prototype, reducer, inertia, mesh, speed, torque)
     if not np.isfinite(answer.transmission_error).all():
         raise SolveError("virtual prototype: the simulation left finite numbers; a shorter step may help.")
     return answer

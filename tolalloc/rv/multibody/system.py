@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
-from tolalloc.rv.multibody.drive import Drive, TimeCourse
+from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_forces
 from tolalloc.rv.reducer.design import Reducer
 
@@ -103,13 +103,11 @@ class System:
             )
         )
 
-    def output(self, reducer: Reducer, carrier: Any, drive: Drive, damping: float) -> None:
-        """Load the carrier, whose rotation is marked, and damp how its speed leaves the nominal one."""
+    def output(self, reducer: Reducer, carrier: Any, speed: TimeCourse, torque: TimeCourse, damping: float) -> None:
+        """Load the carrier, whose rotation is marked, and damp how its speed leaves the nominal one [N·m·s/rad]."""
         items = self.engine.itemInterface
         self.content.AddLoad(
-            items.LoadCoordinate(
-                markerNumber=carrier, loadUserFunction=lambda _system, time, _load: drive.torque.at(time)
-            )
+            items.LoadCoordinate(markerNumber=carrier, loadUserFunction=lambda _system, time, _load: torque.at(time))
         )
         fixed = self.content.AddNode(items.NodePointGround())
         self.content.AddObject(
@@ -118,8 +116,8 @@ class System:
                     self.content.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0)),
                     carrier,
                 ],
-                springForceUserFunction=lambda _system, time, _item, _moved, speed, *_: (
-                    damping * (speed - drive.speed.at(time) / reducer.ratio)
+                springForceUserFunction=lambda _system, time, _item, _moved, turning, *_: (
+                    damping * (turning - speed.at(time) / reducer.ratio)
                 ),
             )
         )

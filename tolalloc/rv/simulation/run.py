@@ -16,7 +16,7 @@ from tolalloc.rv.dynamics.simulation import simulate as simulate_model
 from tolalloc.rv.dynamics.speeds import modes
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.multibody.drive import Drive, Masses, PrototypeDamping, TimeCourse
+from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
 from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries
 from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
@@ -86,13 +86,15 @@ def _milliseconds(duration: float, progress: Progress) -> Callable[[float], None
     return tell
 
 
+def _damping(prepared: PreparedSimulation) -> Damping:
+    return Damping(mass_proportional=prepared.mass_damping, stiffness_proportional=prepared.asked.damping)
+
+
 def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
     """Simulate the equivalent model."""
     asked, every = prepared.asked, np.arange(motion.time.size)
-    damping = Damping(mass_proportional=prepared.mass_damping, stiffness_proportional=asked.damping)
-    found = simulate_model(
-        prepared.model, prepared.errors, motion, prepared.inertia, damping, INTEGRATORS[asked.engine], every, tell
-    )
+    given = (prepared.inertia, _damping(prepared), INTEGRATORS[asked.engine])
+    found = simulate_model(prepared.model, prepared.errors, motion, *given, every, tell)
     failed = np.flatnonzero(found.status[0] != Status.CONVERGED)
     if failed.size:
         outcome = Status(int(found.status[0, failed[0]])).sentence
@@ -110,23 +112,14 @@ def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[fl
 
 def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
     """Simulate the virtual prototype."""
-    asked, inertia = prepared.asked, prepared.inertia
+    asked = prepared.asked
     found = simulate_prototype(
         prepared.reducer,
-        Masses(
-            crank_mass=inertia.planet,
-            crank_inertia=inertia.planet_moment,
-            disc_mass=inertia.disc,
-            disc_inertia=inertia.disc_moment,
-            carrier_mass=inertia.carrier,
-            carrier_inertia=inertia.carrier_moment,
-        ),
-        Drive(
-            speed=TimeCourse.step(prepared.speed, 0.0, asked.ramp),
-            torque=TimeCourse.step(prepared.torque, asked.ramp, prepared.loaded),
-        ),
+        prepared.inertia,
+        _damping(prepared),
+        TimeCourse.step(prepared.speed, 0.0, asked.ramp),
+        TimeCourse.step(prepared.torque, asked.ramp, prepared.loaded),
         TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=PROTOTYPE_RADIUS),
-        PrototypeDamping(bearings=asked.damping, output=prepared.mass_damping * inertia.carrier_moment),
         prepared.prototype_errors,
         tell,
     )
