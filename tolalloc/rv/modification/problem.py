@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -40,7 +39,7 @@ class EvaluatedAmounts:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModificationProblem(ABC):
+class ModificationProblem:
     """Find the amounts (Δr_rp, Δr_p) with the smallest objective.
 
     Notes
@@ -54,21 +53,14 @@ class ModificationProblem(ABC):
     """
 
     name: str  # What reports call it
+    description: str  # What the objective measures, in a sentence for reports
     stage: CycloidStage  # Cycloid stage
+    objective: Callable[[Amounts], Float[np.ndarray, " n"]]  # What is to be minimised [m]
     # Bounds of the two amounts [m]
     lower: Float[np.ndarray, " 2"]
     upper: Float[np.ndarray, " 2"]
     radial_clearance: float = 0.0  # Smallest clearance j at tip and root, Δr_rp − Δr_p ≥ j [m]
     require_gap: bool = False  # Whether no pin may interfere once the flank at φ0 is closed
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """What the objective measures, in a sentence for reports."""
-
-    @abstractmethod
-    def objective(self, amounts: Amounts) -> Float[np.ndarray, " n"]:
-        """Return what is to be minimised [m]."""
 
     def constraints(self, amounts: Amounts) -> Float[np.ndarray, "n c"]:
         """Return what must not be negative: radial clearance beyond j and, if required, q·Δr_rp − Δr_p [m]."""

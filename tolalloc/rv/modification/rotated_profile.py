@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -27,76 +25,102 @@ _REACH = np.pi / 2  # the nearest point of the modified profile is at most that 
 _CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RotatedProfileFit(ModificationProblem):
-    """Fit the profile with equidistant and shift modification to the one that is rotated by δ and nothing else.
+def rotated_profile_fit(
+    stage: CycloidStage,
+    shift_sign: int = 1,
+    metric: Metric = "same_angle",
+    rotation: float = 0.005,
+    points: int = 180,
+    radial_clearance: float = 0.0,
+    require_gap: bool = False,
+) -> ModificationProblem:
+    """Return the problem of the modified profile that comes closest to the one that is rotated by δ and nothing else.
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    shift_sign
+        1 for a positive and −1 for a negative shift [-].
+    metric
+        Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``.
+    rotation
+        δ of the profile to come close to [rad].
+    points
+        m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-].
+    radial_clearance, require_gap
+        As in `ModificationProblem` [m].
+
+    Raises
+    ------
+    InputError
+        A rotation that is not above 0 and up to a sixteenth of a tooth pitch.
 
     Notes
     -----
     ``same_angle`` is mostly slip along the profile, which is no error of the profile. ``nearest`` carries the modified
-    profile on beyond root and tip.
+    profile on beyond root and tip. Δr_rp goes from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm, a box
+    that is assumed. The source prints Δr_rp − |Δr_p| > 0 as its condition of a radial clearance (equation (11)), which
+    for a negative shift is none; here it is Δr_rp − Δr_p ≥ j for both signs.
 
     References
     ----------
     song2019, equation (10).
     """
+    name = f"rotated profile, {'positive' if shift_sign > 0 else 'negative'} shift, {metric}"
+    largest, shift = np.pi / (8 * stage.disc_teeth), np.array([0.0, np.sign(shift_sign) * MILLIMETRE])
+    if not 0 < rotation <= largest:
+        raise InputError.at(
+            name, "rotation", rotation, f"above 0 and up to a sixteenth of a tooth pitch, {largest:.4g} rad"
+        )
+    angles = np.arange(1, points + 1) * np.pi / points
+    turned = Modification(equidistant=0.0, shift=0.0, rotation=rotation)
+    place = ToothProfile(stage=stage, modification=turned).points(angles)
+    rotated = place[:, 0] + 1j * place[:, 1]
 
-    metric: Metric = "same_angle"  # Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``
-    rotation: float = 0.005  # δ of the profile to come close to [rad]
-    # m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-]
-    points: int = 180
-
-    def __post_init__(self) -> None:
-        largest = np.pi / (8 * self.stage.disc_teeth)
-        if not 0 < self.rotation <= largest:
-            allowed = f"above 0 and up to a sixteenth of a tooth pitch, {largest:.4g} rad"
-            raise InputError.at(self.name, "rotation", self.rotation, allowed)
-
-    @property
-    def description(self) -> str:
-        """What the objective measures."""
-        return f"{METRICS[self.metric]}; δ = {self.rotation:g} rad, φ = iπ/{self.points}, i = 1…{self.points}"
-
-    @cached_property
-    def _angles(self) -> Float[np.ndarray, " point"]:
-        return np.arange(1, self.points + 1) * np.pi / self.points
-
-    @cached_property
-    def _rotated(self) -> Complex[np.ndarray, " point"]:
-        rotated = Modification(equidistant=0.0, shift=0.0, rotation=self.rotation)
-        points = ToothProfile(stage=self.stage, modification=rotated).points(self._angles)
-        return np.asarray(points[:, 0] + 1j * points[:, 1])
-
-    def objective(self, amounts: Amounts) -> Float[np.ndarray, " n"]:
-        """Return the mean distance of the two profiles [m]."""
-        angle = self._nearest(amounts) if self.metric == "nearest" else self._angles
-        path, slope, _ = _path(self.stage, amounts, angle)
+    def mean_distance(amounts: Amounts) -> Float[np.ndarray, " n"]:
+        angle = _nearest(stage, rotated, angles, amounts) if metric == "nearest" else angles
+        path, slope, _ = _path(stage, amounts, angle)
         normal = -1j * slope / np.abs(slope)
-        difference = self._rotated - path - (self.stage.pin_radius + amounts[:, :1]) * normal
-        if self.metric != "same_angle":
+        difference = rotated - path - (stage.pin_radius + amounts[:, :1]) * normal
+        if metric != "same_angle":
             # Where the nearest point is, all of the difference is along the normal.
             difference = (difference * normal.conj()).real
         return np.asarray(np.abs(difference).mean(axis=-1))
 
-    def _nearest(self, amounts: Amounts) -> Float[np.ndarray, "n point"]:
-        """Return φ of the modified profiles' points that are nearest to the rotated profile's points [rad].
+    return ModificationProblem(
+        name=name,
+        description=f"{METRICS[metric]}; δ = {rotation:g} rad, φ = iπ/{points}, i = 1…{points}",
+        stage=stage,
+        objective=mean_distance,
+        lower=np.array([0.0, shift.min()]),
+        upper=np.array([MILLIMETRE, shift.max()]),
+        radial_clearance=radial_clearance,
+        require_gap=require_gap,
+    )
 
-        There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals.
-        """
-        angle = np.tile(self._angles, (len(amounts), 1))
-        low, high = angle - _REACH, angle + _REACH
-        for _ in range(60):
-            path, slope, bend = _path(self.stage, amounts, angle)
-            offset = (self._rotated - path).conj()
-            value, change = (offset * slope).real, (offset * bend - slope * slope.conj()).real
-            low, high = np.where(value > 0, angle, low), np.where(value > 0, high, angle)
-            falls = change < 0
-            new = angle - value / np.where(falls, change, 1.0)
-            new = np.where(falls & (low <= new) & (new <= high), new, (low + high) / 2)
-            step, angle = np.abs(new - angle).max(), new
-            if step < _CLOSE:
-                break
-        return angle
+
+def _nearest(
+    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
+) -> Float[np.ndarray, "n point"]:
+    """Return φ of the modified profiles' points that are nearest to points of another with these φ [rad].
+
+    There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals.
+    """
+    angle = np.tile(angles, (len(amounts), 1))
+    low, high = angle - _REACH, angle + _REACH
+    for _ in range(60):
+        path, slope, bend = _path(stage, amounts, angle)
+        offset = (points - path).conj()
+        value, change = (offset * slope).real, (offset * bend - slope * slope.conj()).real
+        low, high = np.where(value > 0, angle, low), np.where(value > 0, high, angle)
+        falls = change < 0
+        new = angle - value / np.where(falls, change, 1.0)
+        new = np.where(falls & (low <= new) & (new <= high), new, (low + high) / 2)
+        step, angle = np.abs(new - angle).max(), new
+        if step < _CLOSE:
+            break
+    return angle
 
 
 def _path(
@@ -111,33 +135,3 @@ def _path(
     crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
     slope = 1j / stage.disc_teeth * (stage.pin_count * crank - pin)
     return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
-
-
-def rotated_profile_fit(
-    stage: CycloidStage,
-    shift_sign: int = 1,
-    metric: Metric = "same_angle",
-    rotation: float = 0.005,
-    points: int = 180,
-    radial_clearance: float = 0.0,
-    require_gap: bool = False,
-) -> RotatedProfileFit:
-    """Return the problem in song2019's box: Δr_rp from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm.
-
-    Notes
-    -----
-    The source prints Δr_rp − |Δr_p| > 0 as its condition of a radial clearance (equation (11)), which for a negative
-    shift is none; here it is Δr_rp − Δr_p ≥ j for both signs. The box is assumed.
-    """
-    shift = np.array([0.0, np.sign(shift_sign) * MILLIMETRE])
-    return RotatedProfileFit(
-        name=f"rotated profile, {'positive' if shift_sign > 0 else 'negative'} shift, {metric}",
-        stage=stage,
-        lower=np.array([0.0, shift.min()]),
-        upper=np.array([MILLIMETRE, shift.max()]),
-        radial_clearance=radial_clearance,
-        require_gap=require_gap,
-        metric=metric,
-        rotation=rotation,
-        points=points,
-    )
