@@ -69,7 +69,7 @@ BAD = [
     ("weibull,2.0", "mixture,", "mixture belongs to single sources"),
     ("own,position,1.5,", "own,position,1.5,0.2", "shift must be 0 for feature position: 0.2"),
     ("own,position", "own,size", r"row 3 \(own\): process is 'own' for feature size for the second time"),
-    ("note\n", "source\n", "column 'source' is not known; the nearest known are"),
+    ("note\n", "source\n", "column 'source' is not known; the nearest known"),
     ("Cp [-]", "shift [-]", "the column 'shift' is there twice"),
     (",measured in the shop\nown,pos", ",\nown,pos", "note is missing"),
 ]
