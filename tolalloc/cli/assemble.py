@@ -7,16 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    UnitProgress,
-    announce_compilation,
-    print_json,
-    print_table,
-    say,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
 
 
 def assemble(
@@ -38,23 +29,17 @@ def assemble(
     from tolalloc.report.folder import require_usable
 
     study = prepare_assembly(chain, measured, precision, seed)
-    if out:
-        require_usable(out)
+    require_usable(out)
     if study.plan.reducer:
         announce_compilation()
     with UnitProgress("assemblies") as progress:
         answer = assembled(study, progress)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    listed = answer.tables["steps"]
+    listed, steps = answer.tables["steps"], []
     said = [name for name in ("step [-]", "mount", "measure") if name in listed]
     for (step, *done), rows in listed.groupby(said, sort=False):
         work = ", ".join(f"{verb} {what}" for verb, what in zip(said[1:], done, strict=True))
-        print_table(rows.drop(columns=said), f"Step {step}: {work}, turn about own axes")
-    print_table(
-        answer.characteristics,
-        f"{study.name or study.plan.name}: final angles against {study.plan.chain.datum}, before and after adjusting",
-    )
-    say(answer.document)
+        steps.append((rows.drop(columns=said), f"Step {step}: {work}, turn about own axes"))
+    name, datum = study.name or study.plan.name, study.plan.chain.datum
+    final = f"{name}: final angles against {datum}, before and after adjusting"
+    tell(answer, as_json, *steps, (answer.characteristics, final))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, print_json, print_table, say
+from tolalloc.cli.console import AsJson, ReportFolder, tell
 
 
 def compare(
@@ -23,10 +23,4 @@ def compare(
     answer = ComparisonAnswer.of(read_run(first), read_run(second))
     if out:
         answer.save(out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    for name in ("ranking", "zones"):
-        if name in answer.tables:
-            print_table(answer.to_frame(name), name)
-    say(answer.document)
+    tell(answer, as_json, (answer.to_frame("zones"), "zones"))

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from tolalloc.report.answer import Answer
-    from tolalloc.report.document import Document
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
@@ -66,20 +65,16 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def say(document: Document) -> None:
-    """Print a report's answer and warnings."""
-    _say(document.answer, document.warnings)
-
-
-def tell(answer: Answer) -> None:
-    """Print an answer's sentences and warnings."""
-    _say(answer.sentences, answer.warnings)
-
-
-def _say(sentences: tuple[str, ...], warnings: tuple[str, ...]) -> None:
-    for sentence in sentences:
+def tell(answer: Answer, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:
+    """Print an answer: its summary for a program; titled tables, its sentences and its warnings for a person."""
+    if as_json:
+        print_json(answer.summary)
+        return
+    for frame, title in tables:
+        print_table(frame, title)
+    for sentence in answer.sentences:
         typer.echo(sentence)
-    for warning in warnings:
+    for warning in answer.warnings:
         typer.secho(warning, fg="yellow")
 
 

@@ -7,16 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    announce_compilation,
-    note,
-    print_json,
-    print_table,
-    tell,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 if TYPE_CHECKING:
@@ -62,12 +53,8 @@ def contact(
     asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, PLACE)
     answer = contact_answer(design, asked, law=law, exact=True if exact else None, phases=phases)
     write_asked(answer, out, answer.assessment.profile, profile, points)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.profile_table, f"{design.name}: profile and clearance")
-    print_table(answer.contact_table, f"{design.name}: {asked:g} N·m on the carrier")
-    tell(answer)
+    loaded = (answer.contact_table, f"{design.name}: {asked:g} N·m on the carrier")
+    tell(answer, as_json, (answer.profile_table, f"{design.name}: profile and clearance"), loaded)
 
 
 def asked_reducer(reducer: Reducer, width_mm: float | None, support_mm: float | None) -> Reducer:
@@ -96,8 +83,7 @@ def require_writable(out: Path | None, file: Path | None, points: int) -> None:
     """Refuse a report or a profile that could not be written, before anything long runs."""
     from tolalloc.report.folder import require_usable
 
-    if out:
-        require_usable(out)
+    require_usable(out)
     if file:
         from tolalloc.rv.teeth.profile_files import require_profile_file
 

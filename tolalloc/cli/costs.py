@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, print_json, print_table, say, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, tell, write_report
 
 
 def costs(
@@ -21,9 +21,5 @@ def costs(
 
     answer = CostFitsAnswer.of(load_shop_points(shop), shop.name)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
     columns = ["process", "form, t in µm [cost units]", "rms error [%]", "error at points left out [%]", "taken"]
-    print_table(answer.fits[columns], f"{shop.name}: what a zone costs")
-    say(answer.document)
+    tell(answer, as_json, (answer.fits[columns], f"{shop.name}: what a zone costs"))

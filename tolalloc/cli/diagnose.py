@@ -7,16 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    UnitProgress,
-    announce_compilation,
-    print_json,
-    print_table,
-    say,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
 
 
@@ -60,14 +51,9 @@ def diagnose(
         level=level,
         seed=seed,
     )
-    if out:
-        require_usable(out)
+    require_usable(out)
     announce_compilation()
     with UnitProgress("curves") as progress:
         answer = diagnose_unit(asked, progress)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.sources.head(10), f"{curve.stem}: what the gauges would show")
-    say(answer.document)
+    tell(answer, as_json, (answer.sources.head(10), f"{curve.stem}: what the gauges would show"))

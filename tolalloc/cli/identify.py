@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    UnitProgress,
-    announce_compilation,
-    note,
-    print_json,
-    print_table,
-    say,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, note, tell, write_report
 from tolalloc.cli.options import ReducerOption, named_reducer
 from tolalloc.exceptions import InputError
 
@@ -68,8 +58,7 @@ def identify(
         seed=seed,
         data=str(data),
     )
-    if out:
-        require_usable(out)
+    require_usable(out)
     if stiffness:
         require_new(stiffness)
         if stiffness.suffix != ".toml":
@@ -86,14 +75,11 @@ def identify(
     if stiffness and answer.stiffness:
         write_identified_stiffness(answer.stiffness, stiffness)
         note(f"Stiffness file: {stiffness}")
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(estimates_table(answer), f"{design.name}: {measurements.name}")
+    tables = [(estimates_table(answer), f"{design.name}: {measurements.name}")]
     if answer.choices:
         short = ["fitted", "units left out, over noise [-]", "chosen"]
-        print_table(answer.to_frame("choices")[short], "Simpler explanations")
-    say(answer.document)
+        tables.append((answer.to_frame("choices")[short], "Simpler explanations"))
+    tell(answer, as_json, *tables)
 
 
 def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> tuple[Parameter, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, print_json, print_table, tell
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell
 from tolalloc.cli.contact import ProfileFile, ProfilePoints, require_writable, write_asked
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
@@ -50,8 +50,4 @@ def modify(
     announce_compilation("cycloid")
     answer = choose(study, design, asked)
     write_asked(answer, out, answer.contact.assessment.profile, profile, points)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.delivered, f"{design.name}, {method}: what the amounts deliver")
-    tell(answer)
+    tell(answer, as_json, (answer.delivered, f"{design.name}, {method}: what the amounts deliver"))

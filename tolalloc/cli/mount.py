@@ -7,16 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    UnitProgress,
-    announce_compilation,
-    print_json,
-    print_table,
-    say,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
 from tolalloc.cli.options import ReducerOption, TestTorqueOption, named_reducer
 
 
@@ -36,15 +27,10 @@ def mount(
     from tolalloc.report.folder import require_usable
 
     study = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
-    if out:
-        require_usable(out)
+    require_usable(out)
     announce_compilation()
     with UnitProgress() as progress:
         answer = mounted(study, progress)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.tables["fittings"], f"{parts.stem}: who goes where")
-    print_table(answer.tables["units"], "Unit by unit")
-    say(answer.document)
+    fittings, units = answer.tables["fittings"], answer.tables["units"]
+    tell(answer, as_json, (fittings, f"{parts.stem}: who goes where"), (units, "Unit by unit"))

@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    UnitProgress,
-    announce_compilation,
-    note,
-    print_json,
-    print_table,
-    say,
-)
+from tolalloc.cli.console import AsJson, UnitProgress, announce_compilation, note, print_json, tell
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
@@ -136,11 +128,12 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
 
 def _show(answer: Answer) -> None:
     """Print the first table of an answer, its sentences and its warnings."""
+    tables = []
     if answer.tables:
         frame = answer.to_frame()
         columns = [column for column in answer.shown if column in frame.columns] or list(frame.columns[:6])
-        print_table(frame[columns].head(16), f"{answer.header.name}: {answer.kind}")
-    say(answer.document)
+        tables = [(frame[columns].head(16), f"{answer.header.name}: {answer.kind}")]
+    tell(answer, False, *tables)
 
 
 def check(script: Script, as_json: AsJson = False) -> None:

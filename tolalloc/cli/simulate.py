@@ -6,16 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    UnitProgress,
-    announce_compilation,
-    print_json,
-    print_table,
-    tell,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 
@@ -70,14 +61,9 @@ def simulate(
         pin_stiffness=pin_stiffness,
     )
     prepared = prepare_simulation(asked)
-    if out:
-        require_usable(out)
+    require_usable(out)
     announce_compilation()
     with UnitProgress("ms") as progress:
         answer = simulated(prepared, progress)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.steady_table, f"{answer.header.model}: steady part")
-    tell(answer)
+    tell(answer, as_json, (answer.steady_table, f"{answer.header.model}: steady part"))

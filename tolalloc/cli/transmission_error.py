@@ -7,15 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import (
-    AsJson,
-    ReportFolder,
-    announce_compilation,
-    print_json,
-    print_table,
-    tell,
-    write_report,
-)
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
 
 _ORDERS = 5
@@ -40,22 +32,18 @@ def te(
     design = load_reducer(named_reducer(reducer, out))
     if stiffness:
         design = with_stiffness(design, load_identified_stiffness(stiffness))
-    if out:
-        require_usable(out)
+    require_usable(out)
     announce_compilation()
     asked = design.torque_on_carrier(torque, "tolalloc te")
     answer = transmission_error(design, load_unit(unit), asked, attributed=attributed)
     write_report(answer, out)
-    if as_json:
-        print_json(answer.summary)
-        return
-    print_table(answer.turn_table, answer.title)
+    tables = [(answer.turn_table, answer.title)]
     if attributed:
         shown = answer.attribution_table.iloc[:, : 2 + _ORDERS]
         shown.columns = [str(name).removesuffix(" [arcsec]").removeprefix("order ") for name in shown]
         words = "What each source adds to the curve and to the main orders [arcsec]; minus cancels; all: --json"
-        print_table(shown.map(_tenths), words)
-    tell(answer)
+        tables.append((shown.map(_tenths), words))
+    tell(answer, as_json, *tables)
 
 
 def _tenths(cell: str | float) -> str:

@@ -10,14 +10,16 @@ from pathlib import Path
 from tolalloc.exceptions import RunFolderError
 
 
-def require_usable(folder: Path) -> None:
-    """Raise unless the folder is new or empty.
+def require_usable(folder: Path | None) -> None:
+    """Raise unless the folder is new or empty, or none is wanted.
 
     Raises
     ------
     RunFolderError
         Something is in the way.
     """
+    if folder is None:
+        return
     if folder.is_file():
         raise RunFolderError(f"{folder}: is a file; the run needs a folder that is new or empty (--out).")
     if folder.is_dir() and any(folder.iterdir()):
