@@ -18,6 +18,7 @@ from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.answer import RankingAnswer, rank
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
+from tolalloc.sensitivity.measures import Measures
 
 GAP, PLAY = "gap [mm]", "play [deg]"
 EFFORT = RankingEffort(
@@ -92,7 +93,16 @@ class Silent:
 
 def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
     record, header = RunRecord(Silent(), model.outcomes), Header(name="links", model="", seed=1)
-    return rank(model, ERRORS, limits, 0.95, EFFORT, SeedTree(1), 0.01, record, header)
+    asked = Measures(
+        model=model,
+        errors=ERRORS,
+        limits=limits,
+        target=0.95,
+        effort=EFFORT,
+        seeds=SeedTree(1),
+        largest_failed_share=0.01,
+    )
+    return rank(asked, record, header)
 
 
 @pytest.fixture(scope="module")

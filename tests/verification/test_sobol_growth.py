@@ -18,7 +18,7 @@ from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.saltelli import SAMPLES_AT_ONCE, SaltelliDesign, saltelli_indices
-from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 
 FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")
@@ -187,14 +187,6 @@ def test_pairs_have_an_index_if_asked_for():
     assert (without.pairs, without.second.shape, without.second_interval.shape) == ((), (0,), (2, 0))
 
 
-def test_an_index_per_correlated_source_is_refused_with_the_reason():
-    errors = sizes("abcd", CORRELATED)
-    response = Linear(np.ones((1, 4)), errors.columns)
-    with pytest.raises(InputError, match=r"a \+ c are correlated; .* share .* arbitrarily; rank blocks or ask for Sha"):
-        sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64))
-    assert not response.asked
-
-
 @pytest.mark.parametrize("second_order", [False, True])
 def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_order):
     """A linear model: the variance of the block is w'Cw, and no block takes part in what another does."""
@@ -203,9 +195,7 @@ def test_a_block_of_correlated_sources_has_the_index_of_the_closed_form(second_o
     parts = np.array([pair, weights[1] ** 2, weights[3] ** 2])
     truth = parts / parts.sum()
     effort = fixed(2048, second_order=second_order)
-    found = sobol_indices(
-        Experiment.of(Linear(weights[np.newaxis], errors.columns), errors, SeedTree(8)), effort, FactorGroup.BLOCK
-    )
+    found = sobol_indices(Experiment.of(Linear(weights[np.newaxis], errors.columns), errors, SeedTree(8)), effort)
     own = found.of(0)
     assert found.sources == ("a + c", "b", "d")
     # Four standard errors.
@@ -222,17 +212,6 @@ def test_exchanging_a_block_exchanges_its_columns_and_no_others():
     a, exchanged, b = x[:, 0], x[:, 1], x[:, -1]
     np.testing.assert_allclose(exchanged[:, [0, 2]], b[:, [0, 2]], rtol=0, atol=1e-12)
     np.testing.assert_allclose(exchanged[:, [1, 3]], a[:, [1, 3]], rtol=0, atol=1e-12)
-
-
-def test_independent_sources_are_their_own_blocks():
-    errors = sizes("abc")
-    response = Linear(np.array([[1.0, 2.0, 3.0]]), errors.columns)
-    one, two = (
-        sobol_indices(Experiment.of(response, errors, SeedTree(1)), fixed(64), factor_group)
-        for factor_group in FactorGroup
-    )
-    assert one.sources == two.sources
-    same_indices(one, two)
 
 
 @pytest.mark.parametrize("sample", [0, 1, 4, 5 * 77 + 2])

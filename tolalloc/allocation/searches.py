@@ -32,7 +32,7 @@ from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 _EXACT = (0.85, 1.25)
@@ -192,7 +192,6 @@ class DrawingQuestion:
         return sobol_indices(
             Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share),
             SobolEffort(start=blocks, limit=blocks),
-            FactorGroup.BLOCK if errors.is_correlated else FactorGroup.SOURCE,
         ).of(leading)
 
 

@@ -13,7 +13,7 @@ from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SamplingDesign, SeedTree
+from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
@@ -26,7 +26,6 @@ from tolalloc.sensitivity.derivatives import (
     derivative_measures,
     local_derivatives,
 )
-from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.measures import Measures
 from tolalloc.sensitivity.ranking import Reproduction
@@ -205,35 +204,13 @@ class RankingAnswer(Answer):
         return summary(self)
 
 
-def rank(
-    model: Model,
-    errors: ErrorModel,
-    limits: Mapping[str, Limits],
-    target: float,
-    effort: RankingEffort,
-    seeds: SeedTree,
-    largest_failed_share: float,
-    record: RunRecord,
-    header: Header,
-) -> RankingAnswer:
+def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
     """Return what drives the outputs of a model at the zones of its drawing.
 
     Parameters
     ----------
-    model
-        What answers; its columns are those of the error model.
-    errors
-        Sources of the drawing.
-    limits
-        Output → limits; the first one leads: measures of one output are of this one.
-    target
-        Share of units that must keep a limit [-].
-    effort
-        How much may be computed.
-    seeds
-        Node of the seed tree that belongs to the ranking alone.
-    largest_failed_share
-        Share of units that may fail [-].
+    asked
+        What may be measured.
     record
         Keeps statuses and times.
     header
@@ -246,15 +223,7 @@ def rank(
     SolveError
         Too many units failed.
     """
-    measures = Measures(
-        model=model.observed(record.observe),
-        errors=errors,
-        limits=limits,
-        target=target,
-        effort=effort,
-        seeds=seeds,
-        largest_failed_share=largest_failed_share,
-    )
+    measures, model, effort = replace(asked, model=asked.model.observed(record.observe)), asked.model, asked.effort
     leading, spectra, own = measures.leading, model.spectra, measures.experiment
     with one_blas_thread():
         with record.stage("random units"):
@@ -288,9 +257,9 @@ def rank(
             stages=record.stages,
         ),
         model=model,
-        errors=errors,
-        limits=limits,
-        target=target,
+        errors=asked.errors,
+        limits=asked.limits,
+        target=asked.target,
         outputs=measures.outputs,
         sample=sample,
         design=effort.design,

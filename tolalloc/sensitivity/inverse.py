@@ -100,10 +100,9 @@ def inverse_sensitivity(
     meets, count = now <= limit, len(errors.active)
     factor = np.full(count, np.inf if meets else np.nan)
     low, high = np.full((2, count), np.nan)
-    bracket = _bracket(openings, now, limit, largest_factor)
-    if bracket.sources.size:
-        own = bracket.sources
-        factor[own], quantiles = _crossings(openings, bracket, limit, tolerance)
+    own, bracket = _bracket(openings, now, limit, largest_factor)
+    if own.size:
+        factor[own], quantiles = _crossings(openings, own, bracket, limit, tolerance)
         low[own], high[own] = _interval(openings, own, factor[own], quantiles, limit)
     return InverseSensitivity(
         sources=tuple(source.name for source in errors.active),
@@ -177,19 +176,13 @@ class _Openings:
             )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Bracket:
-    """Two factors per source with the limit between their quantiles, and quantile less limit at both."""
+def _bracket(
+    openings: _Openings, now: float, limit: float, largest_factor: float
+) -> tuple[Int[np.ndarray, " found"], Float[np.ndarray, "4 found"]]:
+    """Return the sources whose quantile crosses the limit between factor 1 and the last trial, and what brackets it.
 
-    sources: Int[np.ndarray, " found"]
-    near: Float[np.ndarray, " found"]
-    far: Float[np.ndarray, " found"]
-    near_excess: Float[np.ndarray, " found"]
-    far_excess: Float[np.ndarray, " found"]
-
-
-def _bracket(openings: _Openings, now: float, limit: float, largest_factor: float) -> _Bracket:
-    """Return the sources whose quantile crosses the limit between factor 1 and the last trial."""
+    These are two factors per source with the limit between their quantiles, then quantile less limit at both.
+    """
     doublings = 2.0 ** np.arange(1, int(np.ceil(np.log2(largest_factor))))
     trials = [*doublings.tolist(), largest_factor] if now <= limit else [0.0]
     left = np.arange(len(openings.errors.active))
@@ -202,22 +195,24 @@ def _bracket(openings: _Openings, now: float, limit: float, largest_factor: floa
         ends = np.full((2, left.size), [[near], [far]])
         found.append(np.stack([left, *ends, near_excess, excess])[:, crossed])
         left, near, near_excess = left[~crossed], far, excess[~crossed]
-    sources, *numbers = np.concatenate(found, axis=1)
-    names = ("near", "far", "near_excess", "far_excess")
-    return _Bracket(sources=sources.astype(int), **dict(zip(names, numbers, strict=True)))
+    sources, bracket = np.split(np.concatenate(found, axis=1), [1])
+    return sources[0].astype(int), bracket
 
 
 def _crossings(
-    openings: _Openings, bracket: _Bracket, limit: float, tolerance: float
+    openings: _Openings,
+    sources: Int[np.ndarray, " found"],
+    bracket: Float[np.ndarray, "4 found"],
+    limit: float,
+    tolerance: float,
 ) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
     """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
-    stale, fresh = bracket.near.copy(), bracket.far.copy()
-    stale_excess, fresh_excess = bracket.near_excess.copy(), bracket.far_excess.copy()
+    stale, fresh, stale_excess, fresh_excess = bracket.copy()
     left, quantiles = np.arange(stale.size), np.empty((stale.size, 3))
     for _ in range(_MOST_STEPS):
         a, b, at_a, at_b = stale[left], fresh[left], stale_excess[left], fresh_excess[left]
         trial = b - at_b * (b - a) / (at_b - at_a)
-        quantiles[left] = openings.quantiles(bracket.sources[left], trial)
+        quantiles[left] = openings.quantiles(sources[left], trial)
         excess = quantiles[left, 0] - limit
         # The new end replaces the one on its own side; an end that stays twice loses half its weight.
         other_side = (excess > 0.0) != (at_b > 0.0)
@@ -226,7 +221,7 @@ def _crossings(
         left = left[np.abs(excess) > tolerance * abs(limit)]
         if not left.size:
             return fresh, quantiles
-    name = openings.errors.active[bracket.sources[left[0]]].name
+    name = openings.errors.active[sources[left[0]]].name
     raise SolveError(f"Inverse sensitivity: the quantile jumps over the limit at {fresh[left[0]]:.6g} of {name}.")
 
 

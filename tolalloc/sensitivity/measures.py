@@ -23,7 +23,7 @@ from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import FactorGroup, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
 from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
@@ -113,7 +113,6 @@ class Measures:
         return sobol_indices(
             self.experiment(name, response, joint),
             replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
-            FactorGroup.BLOCK if self.errors.is_correlated else FactorGroup.SOURCE,
             ranked=tuple(self.limits),
         )
 

@@ -59,6 +59,7 @@ class SourceRanking:
     total: Float[np.ndarray, " source"]
     total_resamples: Float[np.ndarray, "resample source"]
     blocks: int  # Saltelli blocks used [-]
+    drives: tuple[str, ...] = ()  # Of a ranking over several outputs: the one for which each source has that index
 
     @property
     def total_interval(self) -> Float[np.ndarray, "2 source"]:

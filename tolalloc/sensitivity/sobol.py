@@ -8,14 +8,10 @@ whole, so `tolalloc.sensitivity.saltelli` gives the same samples in chunks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import StrEnum
-
 import numpy as np
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.exceptions import InputError
 from tolalloc.models import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import Resampled, grow_until_stable
@@ -26,59 +22,20 @@ _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
 
 
-class FactorGroup(StrEnum):
-    """Whose share of the variance an index is."""
-
-    SOURCE = "source"
-    """One source; the sources must be independent."""
-    BLOCK = "block"
-    """Sources that depend on each other, together; one source where it depends on no other."""
-
-
-@dataclass
-class _Answers:
-    """Answers of the blocks so far; only new blocks are evaluated."""
-
-    experiment: Experiment[Response]
-    design: SaltelliDesign
-    blocks: int = 0
-    parts: list[Evaluation] = field(default_factory=list)
-
-    def up_to(self, blocks: int) -> Evaluation:
-        """Return the answers of the first blocks."""
-        for uniform in self.design.chunks(self.blocks, blocks):
-            standard = self.experiment.errors.standard_values(np.maximum(uniform, _HALF_STEP))
-            self.parts.append(self.experiment.response(self.experiment.deviations(standard)))
-        self.blocks = blocks
-        joined = Evaluation(
-            values=np.concatenate([part.values for part in self.parts]),
-            status=np.concatenate([part.status for part in self.parts]),
-        )
-        self.parts = [joined]
-        return joined
-
-
-def sobol_indices(
-    experiment: Experiment[Response],
-    effort: SobolEffort,
-    factor_group: FactorGroup = FactorGroup.SOURCE,
-    ranked: tuple[str, ...] = (),
-) -> SobolAnalysis:
+def sobol_indices(experiment: Experiment[Response], effort: SobolEffort, ranked: tuple[str, ...] = ()) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
+
+    Sources that depend on each other have one index together: a share of each alone would be arbitrary.
 
     Parameters
     ----------
     effort
         Blocks, from a first number doubled up to a limit, and what stops them.
-    factor_group
-        Whether each source has an index, or each block of sources that depend on each other.
     ranked
         Outputs that count in the ranking over all, which is the one that must become stable; all of them if empty.
 
     Raises
     ------
-    InputError
-        An index per source is asked for although sources are correlated.
     SolveError
         Too many blocks hold a failed sample, or no output varies.
 
@@ -93,16 +50,24 @@ def sobol_indices(
     groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
     """
     errors, seeds, outputs = experiment.errors, experiment.seeds, experiment.response.outputs
-    factor_groups, counted = _factor_groups(errors, factor_group), ranked or outputs
-    design = SaltelliDesign(
-        factor_groups=factor_groups, seed=seeds.child("sample").integer(), second_order=effort.second_order
-    )
-    answers, steps = _Answers(experiment, design), list[SaltelliIndices]()
+    counted, sample = ranked or outputs, seeds.child("sample").integer()
+    design = SaltelliDesign(factor_groups=errors.block_of_column, seed=sample, second_order=effort.second_order)
+    answers, steps = list[Evaluation](), list[SaltelliIndices]()
 
     def resampled(blocks: int) -> Resampled:
+        solved = steps[-1].blocks + steps[-1].dropped if steps else 0
+        for uniform in design.chunks(solved, blocks):
+            standard = errors.standard_values(np.maximum(uniform, _HALF_STEP))
+            answers.append(experiment.response(experiment.deviations(standard)))
+        answers[:] = [
+            Evaluation(
+                values=np.concatenate([part.values for part in answers]),
+                status=np.concatenate([part.status for part in answers]),
+            )
+        ]
         steps.append(
             saltelli_indices(
-                answers.up_to(blocks),
+                answers[0],
                 len(design.names),
                 seeds.child("resamples"),
                 second_order=effort.second_order,
@@ -127,7 +92,7 @@ def sobol_indices(
         sources=design.names,
         indices=steps[-1],
         growth=growth,
-        samples=answers.blocks * design.samples_per_block,
+        samples=answers[0].status.size,
     )
 
 
@@ -135,14 +100,3 @@ def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ..
     """Return the tolerance group of each factor group: the tolerance that it shares with others, or itself."""
     group_of = {source.name: source.group for source in errors.sources if source.group}
     return tuple(group_of.get(name, name) for name in factor_groups)
-
-
-def _factor_groups(errors: ErrorModel, factor_group: FactorGroup) -> tuple[str, ...]:
-    """Return the name of the factor group of each column."""
-    correlated = [" + ".join(block) for block in errors.blocks if len(block) > 1]
-    if factor_group is FactorGroup.SOURCE and correlated:
-        raise InputError(
-            f"Sobol indices: {'; '.join(correlated)} are correlated; a Sobol index per source would share their "
-            "variance arbitrarily; rank blocks or ask for Shapley effects."
-        )
-    return errors.block_of_column

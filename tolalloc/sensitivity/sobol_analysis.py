@@ -46,13 +46,6 @@ class SobolIndices(SourceRanking):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OverallRanking(SourceRanking):
-    """One ranking over all outputs: the total index of a source is its largest one over the outputs that vary."""
-
-    drives: tuple[str, ...]  # Output for which each source has that index
-
-
-@dataclass(frozen=True, kw_only=True)
 class SobolAnalysis:
     """Indices of all outputs from the same samples."""
 
@@ -79,7 +72,7 @@ class SobolAnalysis:
         return tuple(name for name, varies in zip(self.outputs, self.indices.varies, strict=True) if not varies)
 
     @cached_property
-    def overall(self) -> OverallRanking:
+    def overall(self) -> SourceRanking:
         """The ranking over all outputs."""
         return overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
 
@@ -128,17 +121,8 @@ class SobolAnalysis:
 
 def overall_ranking(
     sources: tuple[str, ...], outputs: tuple[str, ...], ranked: tuple[str, ...], indices: SaltelliIndices
-) -> OverallRanking:
-    """Return the ranking over those outputs that count and vary.
-
-    Parameters
-    ----------
-    sources, outputs
-        Names, in the order of the indices.
-    ranked
-        Outputs that count.
-    indices
-        Indices of all outputs.
+) -> SourceRanking:
+    """Return the ranking over those outputs that count and vary: the total index of a source is its largest one.
 
     Raises
     ------
@@ -149,7 +133,7 @@ def overall_ranking(
     if not varying.size:
         raise SolveError("Sobol indices: every output is the same for all samples, so no source can be ranked.")
     total = indices.total[varying]
-    return OverallRanking(
+    return SourceRanking(
         sources=sources,
         total=total.max(axis=0),
         total_resamples=indices.total_resamples[varying].max(axis=0),

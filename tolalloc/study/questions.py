@@ -64,19 +64,19 @@ class Ranking(Question):
         """Return what drives the outputs at the zones of the drawing."""
         from tolalloc.drawings.seeds import SeedTree
         from tolalloc.sensitivity.answer import rank
+        from tolalloc.sensitivity.measures import Measures
 
         study = prepared.study
-        return rank(
-            prepared.model.observed(record.observe),
-            prepared.errors,
-            {requirement.output: requirement.limits for requirement in prepared.requirements},
-            prepared.target,
-            study.effort.ranking,
-            SeedTree(study.seed).child("rank"),
-            study.largest_failed_share,
-            record,
-            prepared.header,
+        asked = Measures(
+            model=prepared.model,
+            errors=prepared.errors,
+            limits={requirement.output: requirement.limits for requirement in prepared.requirements},
+            target=prepared.target,
+            effort=study.effort.ranking,
+            seeds=SeedTree(study.seed).child("rank"),
+            largest_failed_share=study.largest_failed_share,
         )
+        return rank(asked, record, prepared.header)
 
 
 @dataclass(frozen=True, kw_only=True)
