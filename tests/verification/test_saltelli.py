@@ -112,10 +112,8 @@ def test_a_single_source_has_no_pairs():
     assert (found.second.shape, found.pairs) == ((2, 0), ())
 
 
-@pytest.mark.parametrize("outputs_at_once", [2, 3, OUTPUTS, 100])
-def test_no_bit_depends_on_the_outputs_held_at_once(outputs_at_once):
+def test_no_bit_of_an_output_depends_on_the_others():
     values = answers()
-    same_bits(indices(values), indices(values, outputs_at_once=outputs_at_once))
     alone = indices(values[:, [3]])
     for name in FIELDS:
         np.testing.assert_array_equal(getattr(alone, name)[0], getattr(indices(values), name)[3])
@@ -156,7 +154,7 @@ def test_an_output_that_does_not_vary_concerns_itself_alone():
     flat = values.copy()
     flat[:, 2] = 0.1
     flat[:, 5] = 1e3 * (1 + np.finfo(float).eps * (np.arange(values.shape[0]) % 2))
-    found, others = indices(flat, outputs_at_once=3), np.array([0, 1, 3, 4, 6])
+    found, others = indices(flat), np.array([0, 1, 3, 4, 6])
     assert found.varies.tolist() == [True, True, False, True, True, False, True]
     for name in FIELDS[:6]:
         assert np.isnan(getattr(found, name)[[2, 5]]).all()
@@ -184,8 +182,6 @@ def test_seed_zero_is_a_seed_like_every_other():
 def test_wrong_sizes_are_refused():
     with pytest.raises(InputError, match="a multiple of 12"):
         indices(answers()[:-1])
-    with pytest.raises(InputError, match="outputs at once is 0"):
-        indices(answers(), outputs_at_once=0)
 
 
 RESAMPLED = np.array([[0.5, 0.3, 0.2], [0.5, 0.2, 0.3], [0.6, 0.2, 0.1], [0.4, 0.3, -0.1]])

@@ -30,6 +30,8 @@ from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 
+_DRAWS = 50
+"""Random assemblies whose transmission is solved where the parts are not measured [-]."""
 _AT_ONCE = 64
 """Samples whose pins are read at all angles of a turn together, some 40 MB per quantity [-]."""
 
@@ -49,12 +51,9 @@ class TransmissionCurves:
 
 
 def transmission_curves(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "sample column"],
-    torque: float,
-    carrier_angle: Float[np.ndarray, " angle"] | None = None,
+    model: EquivalentModel, errors: Float[np.ndarray, "sample column"], torque: float
 ) -> TransmissionCurves:
-    """Return the transmission of a few samples over one output turn.
+    """Return the transmission of a few samples over one output turn, at the coarse angles of the model's search.
 
     Parameters
     ----------
@@ -64,10 +63,8 @@ def transmission_curves(
         Deviations in the order of the model's columns, `OrientationResponse.errors` [m, angles rad].
     torque
         Torque on the carrier; negative resists the rotation [N·m].
-    carrier_angle
-        Carrier angles; the coarse angles of the model's search unless given [rad].
     """
-    solved = Solved.of(model.equilibria(errors, torque, carrier_angle))
+    solved = Solved.of(model.equilibria(errors, torque))
     found, pins = solved.equilibria, solved.forces.pins
     line_load = peak_line_load(found, solved.forces)
     return TransmissionCurves(
@@ -227,7 +224,6 @@ def transmission_effect(
     plan: AssemblyPlan,
     errors: Float[np.ndarray, "part 3"] | None,
     precisions: Float[np.ndarray, " precision"],
-    draws: int,
     seeds: SeedTree,
     observe: Observer,
 ) -> TransmissionEffect:
@@ -241,8 +237,6 @@ def transmission_effect(
         Measured errors of the parts; unless given, parts are drawn from the plan's tolerances [rad].
     precisions
         Q [-].
-    draws
-        Assemblies drawn if no errors are given [-].
     seeds
         Node of the seed tree.
     observe
@@ -258,7 +252,7 @@ def transmission_effect(
     reducer = load_reducer(plan.reducer)
     model, torque = EquivalentModel(reducer), reducer.load.test_torque
     response = OrientationResponse(model=model, chain=plan.chain, torque=torque, observe=observe)
-    final = final_angles(plan, errors, precisions, draws, seeds)
+    final = _final_angles(plan, errors, precisions, seeds)
     perfect = response(np.zeros((1, final.shape[2])))
     found = response(final.reshape(-1, final.shape[2]))
     good = np.asarray(found.good.reshape(final.shape[:2]).all(axis=0))
@@ -284,31 +278,18 @@ def transmission_effect(
     )
 
 
-def final_angles(
+def _final_angles(
     plan: AssemblyPlan,
     errors: Float[np.ndarray, "part 3"] | None,
     precisions: Float[np.ndarray, " precision"],
-    draws: int,
     seeds: SeedTree,
 ) -> Float[np.ndarray, "precision sample state"]:
-    """Return final angles of the measured parts, or of the same random assemblies at every precision [rad].
-
-    Parameters
-    ----------
-    plan, errors, precisions, draws, seeds
-        As in `transmission_effect`.
-    """
+    """Return final angles of the measured parts, or of the same random assemblies at every precision [rad]."""
     space = plan.space
     if errors is not None:
         own = errors.ravel()[np.newaxis]
         weights = (plan.final_weight(float(precision)) for precision in precisions)
         return np.array([foreseen(space, regulator(space, weight), own).adjusted[:, -1] for weight in weights])
-    standard = seeds.generator().standard_normal((draws, random_numbers(space)))
-    return np.array(
-        [
-            assembled(plan, tuned_gains(plan, float(precision), plan.tolerances), plan.tolerances, standard).adjusted[
-                :, -1
-            ]
-            for precision in precisions
-        ]
-    )
+    standard = seeds.generator().standard_normal((_DRAWS, random_numbers(space)))
+    gains = (tuned_gains(plan, float(precision), plan.tolerances) for precision in precisions)
+    return np.array([assembled(plan, own, plan.tolerances, standard).adjusted[:, -1] for own in gains])

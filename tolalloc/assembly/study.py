@@ -63,7 +63,6 @@ class AssemblyStudy:
     name: str = ""  # Where the errors of the parts come from; empty if they are not measured
     errors: Float[np.ndarray, "part 3"] | None = None  # Measured errors of its parts, if there are any [rad]
     assemblies: int = 100_000  # Random assemblies that verify the tolerances [-]
-    draws: int = 50  # Random assemblies whose transmission is solved where the parts are not measured [-]
     seed: int = 1  # Seed of every random number [-]
 
 
@@ -123,9 +122,7 @@ def assemble(study: AssemblyStudy, progress: Progress) -> AssemblyAnswer:
         shown = np.array(sorted({*SHOWN, plan.precision}))
         transmission = None
         if plan.reducer:
-            transmission = transmission_effect(
-                plan, study.errors, shown, study.draws, seeds.child("transmission"), record.observe
-            )
+            transmission = transmission_effect(plan, study.errors, shown, seeds.child("transmission"), record.observe)
     return AssemblyAnswer(
         header=Header(
             name=plan.name,

@@ -22,9 +22,9 @@ CLASSES = 10
 """Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
 
 
-def fewest_units(fewest: int = FEWEST_OUTSIDE) -> int:
+def fewest_units() -> int:
     """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
-    return ceil(fewest / WORST_SHARE)
+    return ceil(FEWEST_OUTSIDE / WORST_SHARE)
 
 
 _FEWEST = {

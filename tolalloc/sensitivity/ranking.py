@@ -120,11 +120,9 @@ def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "r
     return np.asarray(np.argsort(np.argsort(-resamples, axis=1, kind="stable"), axis=1, kind="stable") + 1)
 
 
-def rank_interval(
-    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.9
-) -> Int[np.ndarray, "2 source"]:
-    """Return the two-sided interval of every rank, of whole ranks that some resample has [-]."""
-    return np.asarray(np.quantile(ranks(resamples), _tails(confidence), axis=0, method="inverted_cdf").astype(int))
+def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
+    """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has [-]."""
+    return np.asarray(np.quantile(ranks(resamples), _tails(0.9), axis=0, method="inverted_cdf").astype(int))
 
 
 def among_first(resamples: Float[np.ndarray, "resample source"], count: int) -> Float[np.ndarray, " source"]:
@@ -139,24 +137,14 @@ def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray,
     return np.stack([((own > columns).mean(axis=1) + (own >= columns).mean(axis=1)) / 2 for own in columns])
 
 
-def indistinguishable_from_zero(
-    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.95
-) -> Bool[np.ndarray, " source"]:
-    """Return which indices are indistinguishable from 0, so that nobody reads a negative share.
-
-    Parameters
-    ----------
-    resamples
-        Resampled indices [-].
-    confidence
-        One-sided confidence with which an index must be above 0 to count [-].
+def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"]) -> Bool[np.ndarray, " source"]:
+    """Return which indices are, with one-sided 95 % confidence, indistinguishable from 0: no negative share is read.
 
     Notes
     -----
     A total index is a mean of squares: it is flagged only if the output does not depend on the source at all.
     """
-    require_confidence(confidence)
-    return np.asarray(np.quantile(resamples, 1 - confidence, axis=0) <= 0)
+    return np.asarray(np.quantile(resamples, 1 - 0.95, axis=0) <= 0)
 
 
 def neighbours(

@@ -123,7 +123,6 @@ def saltelli_indices(
     second_order: bool = False,
     resamples: int = 400,
     largest_failed_share: float = 0.01,
-    outputs_at_once: int = 1,
 ) -> SaltelliIndices:
     """Return the indices of all outputs of a Saltelli design.
 
@@ -141,8 +140,6 @@ def saltelli_indices(
         Bootstrap resamples [-].
     largest_failed_share
         Share of blocks that may hold a failed sample [-].
-    outputs_at_once
-        Outputs held in memory as a copy of their own; no bit of the result depends on it [-].
 
     Raises
     ------
@@ -162,7 +159,6 @@ def saltelli_indices(
     answers of an output are centred and divided by their standard deviation first, as SALib does: the first and the
     second order depend on it.
     """
-    _require_positive(sources=sources, resamples=resamples, outputs_at_once=outputs_at_once)
     size = (2 * sources if second_order else sources) + 2
     if evaluation.status.size % size:
         raise InputError.at("Sobol indices", "samples", evaluation.status.size, f"a multiple of {size}")
@@ -173,8 +169,8 @@ def saltelli_indices(
     counts = resample_counts(blocks, resamples, seeds)
     with one_blas_thread():
         found = [
-            one_pass(np.ascontiguousarray(values[:, :, part][whole].transpose(2, 1, 0)), counts, sources)
-            for part in _parts(values.shape[2], outputs_at_once)
+            one_pass(np.ascontiguousarray(values[:, :, at : at + 1][whole].transpose(2, 1, 0)), counts, sources)
+            for at in range(values.shape[2])  # one copy in memory at a time
         ]
     varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return SaltelliIndices(
@@ -264,18 +260,6 @@ def _over_variance(
 ) -> Float[np.ndarray, "output row index"]:
     """Return parts of the variance over it, 0 where there is none [-]."""
     return np.asarray(np.divide(part, variance, out=np.zeros_like(part), where=variance > np.finfo(float).eps))
-
-
-def _parts(outputs: int, at_once: int) -> Iterator[slice]:
-    """Yield the outputs that are held at a time."""
-    return (slice(start, start + at_once) for start in range(0, outputs, at_once))
-
-
-def _require_positive(**counts: int) -> None:
-    """Raise unless every count is at least 1."""
-    for field, value in counts.items():
-        if value < 1:
-            raise InputError.at("Sobol indices", field.replace("_", " "), value, "1 or more")
 
 
 def _require_blocks(drawn: int, whole: int, largest_failed_share: float) -> None:

@@ -24,6 +24,8 @@ from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
 
+_RESAMPLES = 400
+"""Bootstrap resamples of the trajectories [-]."""
 _CURVE_POINTS = 100
 """Points at which delta compares two densities, SALib's number."""
 
@@ -77,7 +79,6 @@ def elementary_effects(
     *,
     levels: int = 4,
     trim: float = 0.001,
-    resamples: int = 400,
 ) -> ElementaryEffects:
     """Return the elementary effects of all sources on all outputs.
 
@@ -89,8 +90,6 @@ def elementary_effects(
         Levels of every uniform number, an even number; a step goes over half of them [-].
     trim
         Share of the distribution left out at either end, where a normal number would be infinite [-].
-    resamples
-        Bootstrap resamples of the trajectories [-].
 
     Raises
     ------
@@ -136,7 +135,7 @@ def elementary_effects(
         members,
         levels / (2.0 * (levels - 1)),
     )
-    counts = resample_counts(used, resamples, seeds.child("resamples"))
+    counts = resample_counts(used, _RESAMPLES, seeds.child("resamples"))
     magnitudes = counts @ np.abs(effects) / used
     return ElementaryEffects(
         sources=names,
@@ -154,7 +153,6 @@ def moment_independent(
     errors: ErrorModel,
     seeds: SeedTree,
     *,
-    classes: int = CLASSES,
     resamples: int = 50,
     dummies: int = 20,
     largest_failed_share: float = LARGEST_FAILED_SHARE,
@@ -169,8 +167,6 @@ def moment_independent(
         The sources that the units were drawn from, at any zones.
     seeds
         Node of the seed tree.
-    classes
-        Classes of equal size that PAWN divides each measure into [-].
     resamples
         Bootstrap resamples of the units for delta [-].
     dummies
@@ -183,7 +179,7 @@ def moment_independent(
     Raises
     ------
     InputError
-        Too few units for the classes.
+        Too few units for the classes of PAWN.
     SolveError
         More units failed, or the output does not vary.
 
@@ -198,7 +194,7 @@ def moment_independent(
     Pianosi & Wagener 2018 (PAWN from given data); Plischke, Borgonovo & Smith 2013, eq. (26) and (30) (delta).
     """
     require_few_failures(sample, "moment-independent indices", largest_failed_share)
-    drawn, needed = sample.x.shape[0], FEWEST_UNITS_OF_CLASS * classes
+    drawn, needed = sample.x.shape[0], FEWEST_UNITS_OF_CLASS * CLASSES
     if drawn < needed:
         raise InputError.at("moment-independent indices", "units", drawn, f"{needed} or more")
     y, known = sample.values, _known(errors, sample.x[sample.evaluation.good])
@@ -206,7 +202,7 @@ def moment_independent(
         raise SolveError("Moment-independent indices: the output is the same for all units; no source can be ranked.")
     widest, shuffle = max(known, key=lambda own: own.shape[1]), seeds.child("dummies").generator()
     known += [shuffle.permutation(widest) for _ in range(dummies)]
-    pawns = np.array([_pawn(columns, y, classes).max() for columns in known])
+    pawns = np.array([_pawn(columns, y).max() for columns in known])
     generator = seeds.child("resamples").generator()
     with one_blas_thread():
         chosen = [columns[:, np.argmax([_delta(column, y) for column in columns.T])] for columns in known]
@@ -247,14 +243,12 @@ def _known(errors: ErrorModel, x: Float[np.ndarray, "unit column"]) -> list[Floa
     return found
 
 
-def _pawn(
-    columns: Float[np.ndarray, "unit measure"], y: Float[np.ndarray, " unit"], classes: int
-) -> Float[np.ndarray, " measure"]:
+def _pawn(columns: Float[np.ndarray, "unit measure"], y: Float[np.ndarray, " unit"]) -> Float[np.ndarray, " measure"]:
     """Return SALib's PAWN index of every measure [-]."""
     from SALib.analyze import pawn
 
     problem = {"num_vars": columns.shape[1], "names": [str(at) for at in range(columns.shape[1])]}
-    return np.asarray(pawn.analyze(problem, columns, y, S=classes)["median"])
+    return np.asarray(pawn.analyze(problem, columns, y, S=CLASSES)["median"])
 
 
 def _delta(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]) -> float:

@@ -71,7 +71,6 @@ def target_sensitivity(
     limit: float,
     seeds: SeedTree,
     *,
-    fewest: int = FEWEST_OUTSIDE,
     resamples: int = 400,
     permutations: int = 1999,
     largest_failed_share: float = LARGEST_FAILED_SHARE,
@@ -85,11 +84,9 @@ def target_sensitivity(
     errors
         The sources that the units were drawn from, at any zones.
     limit
-        Largest output allowed [output].
+        Largest output allowed; unless enough units stand on either side, the worst 5 % are taken instead [output].
     seeds
         Node of the seed tree.
-    fewest
-        Units needed on either side of the limit; otherwise the worst 5 % are taken and the result says so [-].
     resamples, permutations
         Bootstrap resamples, and random choices of units for the test of no effect [-].
     largest_failed_share
@@ -120,7 +117,7 @@ def target_sensitivity(
     require_few_failures(sample, "target sensitivity", largest_failed_share)
     good = sample.evaluation.good
     x, values = sample.x[good], sample.values
-    threshold, is_limit = _threshold(values, limit, fewest, units=good.size)
+    threshold, is_limit = _threshold(values, limit, units=good.size)
     outside = values > threshold
     if not outside.any():
         raise SolveError("Target sensitivity: the output is the same for all the worst units, so none is set apart.")
@@ -179,12 +176,12 @@ def _varying_columns(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) 
     return np.array([np.count_nonzero(varies[where == name]) for name in dict.fromkeys(errors.source_of_column)])
 
 
-def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, fewest: int, *, units: int) -> tuple[float, bool]:
+def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, *, units: int) -> tuple[float, bool]:
     """Return the limit, or what cuts off the worst units if it divides them too unevenly, and which it is."""
     outside = int(np.count_nonzero(values > limit))
-    if fewest <= outside <= values.size - fewest:
+    if FEWEST_OUTSIDE <= outside <= values.size - FEWEST_OUTSIDE:
         return limit, True
-    needed = fewest_units(fewest)
+    needed = fewest_units()
     if units < needed:
         raise InputError.at("target sensitivity", "units", units, f"{needed} or more for {outside} outside")
     return float(np.quantile(values, 1.0 - WORST_SHARE)), False

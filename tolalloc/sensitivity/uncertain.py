@@ -62,7 +62,7 @@ class UncertainEffect:
 
 
 def uncertain_effect(
-    model: Model, output: str, x: Float[np.ndarray, "unit column"], seeds: SeedTree, units: int = _UNITS
+    model: Model, output: str, x: Float[np.ndarray, "unit column"], seeds: SeedTree
 ) -> UncertainEffect:
     """Return what the model's uncertain columns alone do to units, with the first order checked at ±2σ.
 
@@ -73,14 +73,12 @@ def uncertain_effect(
     output
         Name of the output with its unit.
     x
-        Good units.
+        Good units, the first of which are taken.
     seeds
         Node of the seed tree, from which the directions of the changes come.
-    units
-        How many of the units are taken [-].
     """
     factor = _factor(model.uncertain)
-    gradient = _gradient(model, output, x[:units])
+    gradient = _gradient(model, output, x[:_UNITS])
     known = gradient[np.isfinite(gradient).all(axis=1)]
     directions = seeds.generator().standard_normal((_DIRECTIONS, len(factor)))
     ends = 2.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True) @ factor.T

@@ -33,15 +33,11 @@ class RetunedAllocation:
         return min(self.allocations, key=lambda each: each.total)
 
 
-def retuned_allocation(
-    plan: AssemblyPlan, precision: float | None = None, most_filters: int = 100
-) -> RetunedAllocation:
+def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAllocation:
     """Return allocations whose filters are tuned again until the tolerances settle.
 
     Parameters
     ----------
-    precision
-        Q in place of the plan's own [-].
     most_filters
         Filters after which the iteration ends, settled or not [-].
 
@@ -56,7 +52,7 @@ def retuned_allocation(
     settles. Gains and tolerances together are not a convex program: neither the fixed point nor the best of the
     allocations is claimed to be the cheapest of all filters. The iteration ends where no tolerances keep the limits.
     """
-    found = [allocate_angles(plan, precision)]
+    found = [allocate_angles(plan)]
     while len(found) < most_filters:
         last = found[-1]
         following = allocated(plan, tuned_gains(plan, last.gains.precision, last.tolerances))

@@ -18,6 +18,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tolalloc.assembly.mounting.answer import MountingResult, RandomMountings
 from tolalloc.assembly.mounting.stock import Mountings, PartStock
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Response
@@ -161,7 +162,7 @@ def best_mounting(
     response: Response,
     seeds: SeedTree,
     starts: int = 4,
-    largest_failed_share: float = 0.01,
+    largest_failed_share: float = LARGEST_FAILED_SHARE,
 ) -> MountingResult:
     """Return the mounting with the least mean peak-to-peak that was found; of equals, the one with the least largest.
 
@@ -209,9 +210,7 @@ def best_mounting(
     )
 
 
-def random_mounting(
-    stock: PartStock, response: Response, count: int, seeds: SeedTree, largest_failed_share: float = 0.01
-) -> RandomMountings:
+def random_mounting(stock: PartStock, response: Response, count: int, seeds: SeedTree) -> RandomMountings:
     """Return what random mountings of the same parts do; for one unit, all mountings, each once.
 
     Raises
@@ -230,7 +229,7 @@ def random_mounting(
         mountings = np.concatenate([stock.random_mountings(generator) for _ in range(count)])
     memory = EvaluatedUnits(stock=stock, response=response)
     values = memory(mountings)
-    memory.require_few_failures(largest_failed_share)
+    memory.require_few_failures(LARGEST_FAILED_SHARE)
     return RandomMountings(
         peak_to_peaks=values.reshape(-1, stock.units), failures=int(np.count_nonzero(np.isinf(values))), every=one
     )

@@ -19,7 +19,6 @@ from tolalloc.drawings.sources import ANGULAR
 from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.unit_table import LARGEST_LENGTH
@@ -185,11 +184,10 @@ def count_units(parts: Sequence[MeasuredPart], places: Sequence[Place], origin: 
     return int(next(iter(units.values())))
 
 
-def load_parts(path: str | Path, reducer: Reducer, orders: tuple[int, ...] = HARMONICS) -> tuple[MeasuredPart, ...]:
+def load_parts(path: str | Path, reducer: Reducer) -> tuple[MeasuredPart, ...]:
     """Return the parts of a CSV file with the columns ``part, kind, error, value, unit``, in the order of the file.
 
-    A value is in µm, or in arcsec for an angle; the reducer says what kinds of parts there are, and pitch and run-out
-    have harmonic deviations of the orders.
+    A value is in µm, or in arcsec for an angle; the reducer says what kinds of parts there are.
 
     Raises
     ------
@@ -199,7 +197,7 @@ def load_parts(path: str | Path, reducer: Reducer, orders: tuple[int, ...] = HAR
     table = read_text_table(Path(path))
     if table.headers != HEADERS:
         raise InputError.at(table.path, "columns", ", ".join(table.headers), ", ".join(HEADERS))
-    known = own_errors(reducer, orders)
+    known = own_errors(reducer)
     kinds: dict[str, str] = {}
     errors: dict[str, dict[str, float]] = {}
     for row, (part, kind, error, value, unit) in zip(table.rows, table.cells, strict=True):
@@ -226,9 +224,9 @@ def load_parts(path: str | Path, reducer: Reducer, orders: tuple[int, ...] = HAR
     return parts
 
 
-def own_errors(reducer: Reducer, orders: tuple[int, ...] = HARMONICS) -> dict[str, tuple[str, ...]]:
+def own_errors(reducer: Reducer) -> dict[str, tuple[str, ...]]:
     """Return the own names of the errors that a part of each kind can have."""
-    columns, found = EquivalentModel(reducer, orders=orders).columns, {}
+    columns, found = EquivalentModel(reducer).columns, {}
     for place in places_of(reducer):
         names = (own_name(column, place) for column in columns)
         found[place.kind] = tuple(name for name in names if name is not None)

@@ -22,6 +22,7 @@ from tolalloc.bench.diagnosis.sources import (
     with_twins,
 )
 from tolalloc.bench.measurement.files import MeasuredCurve
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
@@ -96,20 +97,18 @@ def diagnose(
     seeds: SeedTree,
     effort: DiagnosisEffort,
     level: float = 0.97,
-    largest_failed_share: float = 0.01,
 ) -> Diagnosis:
     """Return what a measured curve tells of the errors of the unit's parts.
 
     The kernel is solved at the curve's torque and has the columns of the errors; zones are those of the sources that
-    vary [m]. The named sources contain the dominant one with the probability ``level`` [-], and at most the given share
-    of the solved curves may fail [-].
+    vary [m]. The named sources contain the dominant one with the probability ``level`` [-].
 
     Raises
     ------
     InputError
         Too few readings, a level that is no probability, or sources that stand on no drawing.
     SolveError
-        More of the curves failed.
+        More of the curves failed than may fail.
 
     Notes
     -----
@@ -140,9 +139,9 @@ def diagnose(
     fit = _fit(problem, numbers, judged)
     names, probability = tuple(source.name for source in errors.active), np.zeros(len(errors.active))
     if fit.explained:
-        falls = reductions(problem, judged, largest_failed_share)
+        falls = reductions(problem, judged)
         probability = np.bincount(dominant(falls), minlength=len(names)) / len(falls)
-    if solved[False] > largest_failed_share * solved.total():
+    if solved[False] > LARGEST_FAILED_SHARE * solved.total():
         raise SolveError(f"{solved[False]} of {solved.total()} curves of a diagnosis failed to solve.")
     gauge = np.stack(
         [limited_measure(source, deviations[:, _places(errors, source.name)]) for source in errors.active], axis=1

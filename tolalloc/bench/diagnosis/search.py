@@ -24,6 +24,9 @@ _WIDER = 3.0
 _VAIN = 3
 """Searches in vain, each in a wider neighbourhood, that end an attempt [-]."""
 
+_ENOUGH, _LEAST = 0.05, 0.001
+"""Plausibility with which an attempt ends once nothing better was found nearby, and with which the attempts end [-]."""
+
 _SAME_DEPTH = 2.0
 """Objectives this close belong to one neighbourhood, whose kinks leave many small minima [-]."""
 
@@ -59,31 +62,20 @@ class Explanation:
         return Neighbourhood(centre=self.numbers, precision=weight * self.information + np.eye(self.numbers.size))
 
 
-def explain(
-    problem: CurveProblem, seeds: SeedTree, effort: DiagnosisEffort, enough: float = 0.05, least: float = 0.001
-) -> Explanation:
-    """Return the best explanation of some attempts, ended early by one that is plausible.
-
-    An attempt ends once nothing better was found nearby and its plausibility is enough; the attempts end with one that
-    has the least.
-    """
+def explain(problem: CurveProblem, seeds: SeedTree, effort: DiagnosisEffort) -> Explanation:
+    """Return the best explanation of some attempts, ended early by one that is plausible."""
     everywhere = Neighbourhood(centre=np.zeros(problem.size), precision=np.eye(problem.size))
     rough = _rough_weight(problem, everywhere, seeds.child("spread").generator(), effort)
     found: list[Explanation] = []
     for number in range(effort.attempts):
-        found.append(_attempt(problem, everywhere, rough, seeds.child(str(number)), effort, enough))
-        if found[-1].plausible >= least:
+        found.append(_attempt(problem, everywhere, rough, seeds.child(str(number)), effort))
+        if found[-1].plausible >= _LEAST:
             break
     return min(found, key=lambda one: one.objective)
 
 
 def _attempt(
-    problem: CurveProblem,
-    everywhere: Neighbourhood,
-    rough: float,
-    seeds: SeedTree,
-    effort: DiagnosisEffort,
-    enough: float,
+    problem: CurveProblem, everywhere: Neighbourhood, rough: float, seeds: SeedTree, effort: DiagnosisEffort
 ) -> Explanation:
     """Search among all errors, then around the best so far, in a wider neighbourhood after each search in vain."""
     best, vain = _search(problem, everywhere, rough, seeds.child("first").generator(), effort), 0
@@ -92,7 +84,7 @@ def _attempt(
         one = _search(problem, near, weight, seeds.child(str(number)).generator(), effort)
         vain = 0 if one.objective < best.objective - _SAME_DEPTH else vain + 1
         best = min(best, one, key=lambda found: found.objective)
-        if vain == _VAIN or (vain > 0 and best.plausible >= enough):
+        if vain == _VAIN or (vain > 0 and best.plausible >= _ENOUGH):
             break
     return best
 

@@ -16,12 +16,16 @@ from scipy.sparse.csgraph import connected_components
 
 from tolalloc.bench.diagnosis.bridge import LogDensity
 from tolalloc.bench.diagnosis.problem import CurveProblem
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.exceptions import SolveError
 from tolalloc.rv.reducer.design import Reducer
 
 _OTHER = {"1": "2", "2": "1"}
 _PAST = {"disc1": 1, "disc2": -1}
 """Half teeth by which half a turn carries a disc past, or short of, the teeth of the other one [-]."""
+
+_LINK = 0.9
+"""Correlation from which on two columns replace one another [-]."""
 
 _DRAWN = 8192
 """Units, and as many with all signs turned, that give the mean and spread of the columns to under a percent [-]."""
@@ -111,9 +115,7 @@ def _drawings(problem: CurveProblem, generator: np.random.Generator) -> LogDensi
     return density
 
 
-def reductions(
-    problem: CurveProblem, deviations: Float[np.ndarray, "unit column"], largest_failed_share: float = 0.01
-) -> Float[np.ndarray, "unit source"]:
+def reductions(problem: CurveProblem, deviations: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit source"]:
     """Return by how much each unit's peak-to-peak falls when one source is put in the middle of its zone [arcsec].
 
     The readings of the problem play no part.
@@ -121,7 +123,7 @@ def reductions(
     Raises
     ------
     SolveError
-        A larger share of the units has a curve that failed.
+        Too many units have a curve that failed.
     """
     owner, middle = np.array(problem.errors.source_of_column), problem.deviations(np.zeros((1, problem.size)))
     names = list(dict.fromkeys(problem.errors.source_of_column))
@@ -130,7 +132,7 @@ def reductions(
     values = np.where(evaluation.good, evaluation.values[:, 0], np.nan).reshape(len(cases), -1)
     fall = (values[0] - values[1:]).T
     good = np.isfinite(fall).all(axis=1)
-    if (~good).mean() > largest_failed_share:
+    if (~good).mean() > LARGEST_FAILED_SHARE:
         raise SolveError(f"{(~good).sum()} of {good.size} units have a curve that failed to solve.")
     return np.asarray(fall[good])
 
@@ -163,17 +165,14 @@ class InseparableColumns:
 
 
 def groups(
-    numbers: Float[np.ndarray, "particle column"],
-    columns: tuple[str, ...],
-    source_of_column: tuple[str, ...],
-    link: float = 0.9,
+    numbers: Float[np.ndarray, "particle column"], columns: tuple[str, ...], source_of_column: tuple[str, ...]
 ) -> tuple[InseparableColumns, ...]:
     """Return the columns whose errors replace one another in the curve.
 
     The numbers are standard normal ones that the curve allows, near one explanation; a correlation of either sign
-    beyond the link [-] puts two columns together.
+    beyond 0.9 puts two columns together.
     """
-    linked = np.abs(np.corrcoef(numbers.T)) >= link
+    linked = np.abs(np.corrcoef(numbers.T)) >= _LINK
     count, label = connected_components(linked, directed=False)
     found = []
     for at in (np.flatnonzero(label == number) for number in range(count)):
