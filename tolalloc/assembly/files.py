@@ -119,26 +119,6 @@ class PartRecord(Record):
         )
 
 
-class AssemblyStepRecord(Record):
-    """One table ``[[step]]``."""
-
-    mount: Name
-    adjust: tuple[Name, ...]
-    effort: dict[str, Positive] = Field(default_factory=dict)
-    measure: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _efforts_are_of_what_is_turned(self) -> AssemblyStepRecord:
-        for name in self.effort:
-            if name not in self.adjust:
-                raise ValueError(f"effort names {name}; allowed are parts that the step adjusts")
-        return self
-
-    def step(self) -> AssemblyStep:
-        """Return the step."""
-        return AssemblyStep(mount=self.mount, adjust=self.adjust, effort=self.effort, measure=self.measure)
-
-
 class NoiseRecord(Record):
     """Table ``[noise]``, standard deviations."""
 
@@ -238,12 +218,15 @@ def _steps(record: ChainRecord, chain: DatumFlowChain, path: Path) -> tuple[Asse
     if not record.step:
         efforts = record.effort or Efforts()
         return steps_in_order(chain, record.adjust or "mounted", record.measure or "current", efforts)
-    steps = tuple(
-        validated(AssemblyStepRecord, data, f"{path}, step {number}").step()
-        for number, data in enumerate(record.step, start=1)
-    )
+    steps = []
+    for number, data in enumerate(record.step, start=1):
+        place = f"{path}, step {number}"
+        steps.append(validated(AssemblyStep, data, place))
+        for name in steps[-1].effort:
+            if name not in steps[-1].adjust:
+                raise InputError(f"{place}: effort names {name}; allowed are parts that the step adjusts.")
     check_steps(chain, steps, str(path))
-    return steps
+    return tuple(steps)
 
 
 def _requirements(record: ChainRecord, parts: Sequence[PartRecord], path: Path) -> AngularRequirements | None:

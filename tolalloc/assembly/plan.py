@@ -70,5 +70,6 @@ class AssemblyPlan:
     @property
     def turning_fewer(self) -> AssemblyPlan:
         """The same assembly in which every step turns the part that it mounts, and no other."""
-        steps = tuple(replace(step, adjust=tuple(set(step.adjust) & {step.mount})) for step in self.steps)
+        own = ({"adjust": tuple(set(step.adjust) & {step.mount})} for step in self.steps)
+        steps = tuple(step.model_copy(update=each) for step, each in zip(self.steps, own, strict=True))
         return replace(self, steps=steps)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,14 +19,13 @@ Choice = Literal["current", "mounted", "all"]
 """The part just mounted; all parts mounted so far; also those that are not there yet, as zhang2025's R = 1000 does."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class AssemblyStep:
-    """One step: mount a part, measure, adjust."""
+class AssemblyStep(Record):
+    """One step: mount a part, measure, adjust; table ``[[step]]`` of a file."""
 
     mount: str  # Name of the part that is mounted
     adjust: tuple[str, ...]  # T(k): names of the parts that may be turned
     # R(k): effort of turning each of them by one unit of angle, against the precision weight [-]
-    effort: Mapping[str, float] = field(default_factory=dict)
+    effort: dict[str, Positive] = Field(default_factory=dict)
     # C(k): what is measured against the datum, ``A``, or of one part against another, ``A - B``
     measure: tuple[str, ...] = ()
 
@@ -141,8 +140,7 @@ def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str
     Raises
     ------
     InputError
-        A part is mounted twice or never, a part is adjusted or measured before it is mounted, an effort is not
-        positive.
+        A part is mounted twice or never, or a part is adjusted or measured before it is mounted.
     UnknownNameError
         A name that no part has.
 
@@ -153,7 +151,7 @@ def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str
     mounted: list[str] = []
     for number, step in enumerate(steps, start=1):
         where = f"{place}, step {number}"
-        _check_names_and_efforts(chain, step, where)
+        _check_names(chain, step, where)
         if step.mount in mounted:
             raise InputError.at(where, "mount", step.mount, "a part that is not mounted yet")
         mounted.append(step.mount)
@@ -175,8 +173,8 @@ def _measured(step: AssemblyStep) -> list[str]:
     return [name.strip() for text in step.measure for name in text.split(" - ")]
 
 
-def _check_names_and_efforts(chain: DatumFlowChain, step: AssemblyStep, where: str) -> None:
-    """Refuse unknown names, efforts that are not positive and measurements that are none."""
+def _check_names(chain: DatumFlowChain, step: AssemblyStep, where: str) -> None:
+    """Refuse unknown names and measurements that are none."""
     for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
         if name not in chain.names:
             if name == chain.datum:
@@ -186,9 +184,6 @@ def _check_names_and_efforts(chain: DatumFlowChain, step: AssemblyStep, where: s
             if "-" in name and all(each.strip() in chain.names for each in name.split("-")):
                 raise InputError.at(where, "measure", name, "one part - another, with spaces around the sign")
             raise UnknownNameError.among(where, "part", name, chain.names)
-    for name, effort in step.effort.items():
-        if not 0 < effort < np.inf:
-            raise InputError.at(where, f"effort of {name}", effort, "a number above 0")
     for text in step.measure:
         parts = [name.strip() for name in text.split(" - ")]
         if len(parts) > 2 or len(set(parts)) < len(parts):

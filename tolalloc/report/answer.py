@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.report.document import Document, Section
+from tolalloc.report.document import Document, Section, tables_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,7 +142,7 @@ class Answer(ABC):
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables by name, units in the headers."""
-        return self.document.tables
+        return tables_of(self.sections)
 
     @property
     def figures(self) -> dict[str, Figure | HeatMap]:

@@ -74,12 +74,17 @@ class Document:
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables by name, in the order of the report."""
-        return {name: frame for section in self.sections for name, frame in section.tables}
+        return tables_of(self.sections)
 
     @property
     def figures(self) -> dict[str, Figure | HeatMap]:
         """All figures by name, in the order of the report."""
         return {figure.name: figure for section in self.sections for figure in section.figures}
+
+
+def tables_of(sections: Iterable[Section]) -> dict[str, pd.DataFrame]:
+    """Return all tables by name, in the order of the sections."""
+    return {name: frame for section in sections for name, frame in section.tables}
 
 
 def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **manifest: Any) -> Document:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.report.answer import Answer, Header
@@ -14,55 +14,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CalculatedAnswer(Answer):
-    """The report that a function made.
-
-    Parameters
-    ----------
-    made
-        The report.
-    """
+    """The report that a function made, part by part."""
 
     kind: ClassVar[str] = "calculation"
 
-    made: Document
+    title: str = ""
+    subtitle: str = ""
+    sentences: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    sections: tuple[Section, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    summary: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, made: Document, prepared: Prepared) -> CalculatedAnswer:
         """Return the answer of a study whose function made the report."""
         study = prepared.study
-        return cls(made=made, header=Header(name=study.name, model="", seed=made.seed, quick=study.quick))
-
-    @property
-    def title(self) -> str:
-        """Its own."""
-        return self.made.title
-
-    @property
-    def subtitle(self) -> str:
-        """Its own."""
-        return self.made.subtitle
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """Its own."""
-        return self.made.answer
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Its own."""
-        return self.made.warnings
-
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """Its own."""
-        return self.made.assumptions
-
-    @property
-    def sections(self) -> tuple[Section, ...]:
-        """Its own."""
-        return self.made.sections
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Its own."""
-        return self.made.summary
+        return cls(
+            header=Header(name=study.name, model="", seed=made.seed, quick=study.quick),
+            title=made.title,
+            subtitle=made.subtitle,
+            sentences=made.answer,
+            warnings=made.warnings,
+            sections=made.sections,
+            assumptions=made.assumptions,
+            summary=made.summary,
+        )

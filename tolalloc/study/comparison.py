@@ -49,17 +49,60 @@ class ComparisonAnswer(Answer):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """The comparison in a few sentences."""
-        return _sentences(self)
+        sentences = []
+        for label, run in zip(self.names, self.runs, strict=True):
+            found = run.summary
+            # Ranking and allocation of one run may name the same limit differently.
+            limits = " and ".join(dict.fromkeys(with_unit(f"{limit:g}", name) for name, limit in run.limits.items()))
+            kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {limits}"
+            if "met" in found:  # an allocation; a ranking alone decides nothing
+                kept += f", {'met' if found['met'] else 'NOT met'}, cost {found['cost [cost units]']:.2f} cost units"
+            sentences.append(f"{kept}.")
+        table = self.ranking
+        moved = list(table.loc[table["90 % intervals"] == "apart", "source"])
+        sentences.append(
+            f"Sources whose total indices differ beyond their 90 % intervals: {', '.join(moved)}."
+            if moved
+            else "No source's total index differs beyond its 90 % intervals."
+        )
+        return tuple(sentences)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What makes the two hard to compare."""
-        return _warnings(self)
+        found = []
+        if not self.same_question:
+            found.append("The two studies were not asked the same question: reducer, torque, limit or yield differ.")
+        versions = [run.manifest.get("versions") for run in self.runs]
+        if versions[0] != versions[1]:
+            found.append("The two studies ran with different versions of the program or its libraries.")
+        found += [
+            f"{label} is a quick run: its intervals are wide."
+            for label, run in zip(self.names, self.runs, strict=True)
+            if run.manifest.get("quick")
+        ]
+        if self.first.manifest.get("study hash") == self.second.manifest.get("study hash"):
+            found.append("Both are runs of one and the same study, seed included.")
+        return tuple(found)
 
     @cached_property
     def ranking(self) -> pd.DataFrame:
         """Every source with its rank and total index in both, and whether their intervals lie apart."""
-        return _ranking_table(self)
+        columns = ["rank [-]", TOTAL, LOW, HIGH]
+        first, second = (run.ranking.set_index("source")[columns] for run in self.runs)
+        joint = first.join(second, how="outer", lsuffix=" A", rsuffix=" B")
+        apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
+        missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
+        return pd.DataFrame(
+            {
+                "source": joint.index,
+                "rank A [-]": joint["rank [-] A"].to_numpy(),
+                "rank B [-]": joint["rank [-] B"].to_numpy(),
+                "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
+                "total index B [-]": joint[f"{TOTAL} B"].to_numpy(),
+                "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
+            }
+        ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -78,7 +121,7 @@ class ComparisonAnswer(Answer):
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The comparison for a program."""
-        answers, ranking, zones = (self.tables_of_sections[name] for name in ("answers", "rankings", "zones"))
+        answers, ranking, zones = (self.tables[name] for name in ("answers", "rankings", "zones"))
         return {
             "A": self.first.name,
             "B": self.second.name,
@@ -88,11 +131,6 @@ class ComparisonAnswer(Answer):
             "zones": zones.astype(object).where(zones.notna(), None).to_dict("records"),
             "warnings": list(self.warnings),
         }
-
-    @property
-    def tables_of_sections(self) -> dict[str, pd.DataFrame]:
-        """All tables by name."""
-        return {name: frame for section in self.sections for name, frame in section.tables}
 
     @property
     def runs(self) -> tuple[FinishedRun, FinishedRun]:
@@ -125,25 +163,6 @@ def _headline_table(comparison: ComparisonAnswer) -> pd.DataFrame:
         row["B − A"] = float(numbers[1] - numbers[0]) if len(numbers) == 2 else ""
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _ranking_table(comparison: ComparisonAnswer) -> pd.DataFrame:
-    """Return every source with its rank and total index in both, and whether their intervals lie apart."""
-    columns = ["rank [-]", TOTAL, LOW, HIGH]
-    first, second = (run.ranking.set_index("source")[columns] for run in comparison.runs)
-    joint = first.join(second, how="outer", lsuffix=" A", rsuffix=" B")
-    apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
-    missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
-    return pd.DataFrame(
-        {
-            "source": joint.index,
-            "rank A [-]": joint["rank [-] A"].to_numpy(),
-            "rank B [-]": joint["rank [-] B"].to_numpy(),
-            "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
-            "total index B [-]": joint[f"{TOTAL} B"].to_numpy(),
-            "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
-        }
-    ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
 
 
 def _zones_table(comparison: ComparisonAnswer) -> pd.DataFrame:
@@ -184,42 +203,3 @@ def _ranking_figure(comparison: ComparisonAnswer) -> Figure:
         y_label="",
         series=tuple(series),
     )
-
-
-def _sentences(comparison: ComparisonAnswer) -> tuple[str, ...]:
-    """Return the comparison in a few sentences."""
-    sentences = []
-    for label, run in zip(comparison.names, comparison.runs, strict=True):
-        found = run.summary
-        # Ranking and allocation of one run may name the same limit differently.
-        limits = " and ".join(dict.fromkeys(with_unit(f"{limit:g}", name) for name, limit in run.limits.items()))
-        kept = f"{label}: {found['yield [-]']:.2%} of units keep the limit of {limits}"
-        if "met" in found:  # an allocation; a ranking alone decides nothing
-            kept += f", {'met' if found['met'] else 'NOT met'}, cost {found['cost [cost units]']:.2f} cost units"
-        sentences.append(f"{kept}.")
-    table = comparison.ranking
-    moved = list(table.loc[table["90 % intervals"] == "apart", "source"])
-    sentences.append(
-        f"Sources whose total indices differ beyond their 90 % intervals: {', '.join(moved)}."
-        if moved
-        else "No source's total index differs beyond its 90 % intervals."
-    )
-    return tuple(sentences)
-
-
-def _warnings(comparison: ComparisonAnswer) -> tuple[str, ...]:
-    """Return what makes the two hard to compare."""
-    found = []
-    if not comparison.same_question:
-        found.append("The two studies were not asked the same question: reducer, torque, limit or yield differ.")
-    versions = [run.manifest.get("versions") for run in comparison.runs]
-    if versions[0] != versions[1]:
-        found.append("The two studies ran with different versions of the program or its libraries.")
-    found += [
-        f"{label} is a quick run: its intervals are wide."
-        for label, run in zip(comparison.names, comparison.runs, strict=True)
-        if run.manifest.get("quick")
-    ]
-    if comparison.first.manifest.get("study hash") == comparison.second.manifest.get("study hash"):
-        found.append("Both are runs of one and the same study, seed included.")
-    return tuple(found)

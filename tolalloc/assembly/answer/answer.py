@@ -114,11 +114,6 @@ class AssemblyAnswer(Answer):
         return characteristic_table(self)
 
     @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """All tables by name, units in the headers."""
-        return {name: frame for section in self.sections for name, frame in section.tables}
-
-    @property
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
         from tolalloc.assembly.answer.cautions import assumptions

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
@@ -53,15 +53,8 @@ class RawReadings:
 
     def chosen(self, which: np.ndarray) -> RawReadings:
         """Return the readings that a mask or a list of positions names, in its order."""
-        return RawReadings(
-            path=self.path,
-            header=self.header,
-            factor=self.factor,
-            row=self.row[which],
-            along=self.along[which],
-            values=self.values[which],
-            averaged=self.averaged[which],
-        )
+        own = {name: getattr(self, name)[which] for name in ("row", "along", "values", "averaged")}
+        return replace(self, **own)
 
 
 def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarray, " row"]]:
