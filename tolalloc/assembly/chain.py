@@ -119,13 +119,7 @@ class DatumFlowChain:
         return _from_blocks(self.carries, blocks)
 
     def finite(self, errors: Float[np.ndarray, "part 3"]) -> Float[np.ndarray, "part 3"]:
-        """Return the exact orientations as rotation vectors against nominal, in the datum's axes [rad].
-
-        Parameters
-        ----------
-        errors
-            Rotation vector of every part's error in its own axes [rad].
-        """
+        """Return exact rotation vectors against nominal, in the datum's axes, of errors in own axes [rad]."""
         where = {name: at for at, name in enumerate(self.names)}
         turned: list[Rotation] = []
         for at, part in enumerate(self.parts):
@@ -134,13 +128,7 @@ class DatumFlowChain:
         return np.array([rotation.as_rotvec() for rotation in turned])
 
     def columns(self, orientations: Float[np.ndarray, "*samples part 3"]) -> dict[str, Float[np.ndarray, "*samples"]]:
-        """Return the deviations of the equivalent model's error columns that the parts' orientations make.
-
-        Parameters
-        ----------
-        orientations
-            Rotation vector of every part against the datum, in its axes [rad].
-        """
+        """Return the equivalent model's error columns that orientations against the datum, in its axes, make [rad]."""
         found: dict[str, Float[np.ndarray, "*samples"]] = {}
         for at, part in enumerate(self.parts):
             for name in part.tilts:

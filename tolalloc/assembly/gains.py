@@ -114,15 +114,7 @@ def assembled(
     tolerances: Float[np.ndarray, "part 3"],
     standard: Float[np.ndarray, "*samples number"],
 ) -> Trajectory:
-    """Return assemblies of parts within given tolerances, from standard normal numbers.
-
-    Parameters
-    ----------
-    tolerances
-        Tolerances of the parts [rad].
-    standard
-        `tolalloc.assembly.trajectory.random_numbers` per assembly [-].
-    """
+    """Return assemblies of parts within given tolerances [rad], from standard normal numbers as of `drawn` [-]."""
     deviations = (tolerances.ravel() / 3, plan.measurement_noise, gains.adjustment_noise)
     return drawn(plan.space, gains.regulator, gains.kalman, deviations, standard)
 

@@ -187,13 +187,7 @@ class OrientationResponse:
         return OutputsResponse(kernel=self._kernel, readings=self.readings)(self._deviations(x))
 
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
-        """Return the deviations in the order of the model's columns [m, angles rad].
-
-        Parameters
-        ----------
-        x
-            Orientations in the order of ``columns`` [rad].
-        """
+        """Return the deviations in the order of the model's columns [m, angles rad] for orientations [rad]."""
         return self._kernel.errors(self._deviations(x))
 
     @property

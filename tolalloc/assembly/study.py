@@ -69,18 +69,9 @@ class AssemblyStudy:
 def prepare_assembly(
     chain: str | Path, measured: Path | None = None, precision: float | None = None, seed: int = 1
 ) -> AssemblyStudy:
-    """Return an assembly with its files read and checked.
+    """Return an assembly with its files read and checked: a shipped chain or a file, and measured errors of its parts.
 
-    Parameters
-    ----------
-    chain
-        Shipped name or chain file.
-    measured
-        CSV file with the measured errors of its parts, if there is one.
-    precision
-        Q in place of the chain's own [-].
-    seed
-        As in `AssemblyStudy`.
+    The precision is Q in place of the chain's own [-].
 
     Raises
     ------

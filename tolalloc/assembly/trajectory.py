@@ -46,12 +46,7 @@ def simulated(
 ) -> Trajectory:
     """Return assemblies in which the state is estimated from readings.
 
-    Parameters
-    ----------
-    reading_noise
-        What every reading adds, the readings of all steps in a row [rad].
-    adjustment_noise
-        What every adjustment misses [rad].
+    Given is what every reading adds, the readings of all steps in a row, and what every adjustment misses [rad].
     """
     ends = np.cumsum([len(observing) for observing in space.observing])
     noise = np.split(reading_noise, ends[:-1], axis=-1)

@@ -35,14 +35,9 @@ StiffnessOption = Annotated[str, typer.Option(help="Identified stiffness: shippe
 
 
 def named_reducer(reducer: str | None, *written: Path | None) -> str:
-    """Return the reducer that was asked for, the default one unless given; no file is about a reducer nobody named.
+    """Return the reducer that was asked for, the default one unless given.
 
-    Parameters
-    ----------
-    reducer
-        Preset name or TOML file, if given.
-    written
-        Files and folders that the command was asked to write.
+    No file, of those that the command was asked to write, is about a reducer that nobody named.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Figure:
     title
         What it shows, as a sentence.
     x_label, y_label
-        Axis titles with units.
+        Axis titles with units; bars need none of y.
     series
         The data.
     vertical, horizontal
@@ -60,7 +60,7 @@ class Figure:
     name: str
     title: str
     x_label: str
-    y_label: str
+    y_label: str = ""
     series: tuple[Series, ...]
     vertical: tuple[tuple[float, str], ...] = ()
     horizontal: tuple[tuple[float, str], ...] = ()
@@ -98,7 +98,7 @@ class HeatMap:
     title: str
     columns: Sequence[str]
     rows: Sequence[str]
-    x_label: str
+    x_label: str = ""
     label: str
     values: Sequence[Sequence[float]]
 

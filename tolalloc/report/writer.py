@@ -67,12 +67,7 @@ def versions() -> dict[str, str]:
 def write_document(document: Document, folder: Path) -> None:
     """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json``, tables as CSV and figures as PNG.
 
-    Parameters
-    ----------
-    document
-        The report.
-    folder
-        New or empty folder.
+    The folder is new or empty.
     """
     figures = folder / "figures"
     figures.mkdir(parents=True)

@@ -18,7 +18,6 @@ def ranking_figure(answer: RankingAnswer) -> Figure:
         name="ranking",
         title=f"Which error drives the {answer.spoken}, at the zones of the tolerance table",
         x_label="Sobol index [-]",
-        y_label="",
         series=tuple(
             Series(
                 label=f"{label} with its 90 % interval",
@@ -46,7 +45,6 @@ def requirements_figure(answer: RankingAnswer) -> HeatMap:
         title="Which error drives which requirement",
         columns=[_broken(name.split(" [")[0]) for name in outputs],
         rows=[sobol.sources[at] for at in rows],
-        x_label="",
         label="total Sobol index [-]",
         values=[[float(sobol.indices.total[sobol.position(name), at]) for name in outputs] for at in rows],
     )
@@ -102,7 +100,6 @@ def reject_figure(answer: RankingAnswer) -> Figure:
         name="rejects",
         title="What the units outside have in common",
         x_label="mean square deviation outside beyond that of all units, sum over columns [-]",
-        y_label="",
         series=(
             Series(
                 label="excess with its 90 % interval",
@@ -127,7 +124,6 @@ def inverse_figure(answer: RankingAnswer) -> Figure | None:
         name="alone",
         title=f"How far each zone may {'open' if answer.inverse.meets else 'stay'} alone, all others as they are",
         x_label="zone [µm]",
-        y_label="",
         series=(
             Series(label="now", kind="bars", x=list(frame["source"]), y=list(frame["zone now [µm]"])),
             Series(

@@ -86,14 +86,9 @@ class SourceRanking:
         return among_first(self.total_resamples, count)
 
     def reproduced_by(self, other: SourceRanking, confidence: float = 0.9) -> Reproduction:
-        """Return how many of the orders promised here another ranking of the same sources has, made of other samples.
+        """Return how many of the orders promised here the same analysis with another seed has.
 
-        Parameters
-        ----------
-        other
-            The same analysis with another seed.
-        confidence
-            Share of resamples that makes an order a promise [-].
+        The confidence is the share of resamples that makes an order a promise [-].
         """
         if not 0.5 < confidence < 1:
             raise InputError.at("reproduction", "confidence", confidence, "a number between 0.5 and 1")
@@ -155,16 +150,7 @@ def neighbours(
 ) -> tuple[Neighbours, ...]:
     """Return every pair of neighbours in the ranking, and what would tell them apart.
 
-    Parameters
-    ----------
-    indices
-        Indices that make the ranking [-].
-    resamples
-        The same from resamples [-].
-    blocks
-        Blocks that they come from [-].
-    confidence
-        Share of resamples that must have the order for it to count [-].
+    The confidence is the share of resamples that must have an order for it to count [-].
 
     Notes
     -----

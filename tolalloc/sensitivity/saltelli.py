@@ -208,14 +208,7 @@ def one_pass(
 ]:
     """Return which outputs vary, and variance [output²], first-order, total and second-order indices for every row [-].
 
-    Parameters
-    ----------
-    answers
-        Good answers in the order of the design's samples [output].
-    counts
-        How often each row holds each block [-].
-    sources
-        Groups of columns that were exchanged; without BA samples there are no pairs [-].
+    Answers are good ones in the order of the design's samples [output]; without BA samples there are no pairs.
     """
     blocks = counts.shape[1]
     y, deviation, varies = _standardised(answers)

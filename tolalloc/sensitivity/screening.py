@@ -161,20 +161,14 @@ def moment_independent(
 
     Parameters
     ----------
-    sample
-        Random units and their answers; the first output is analysed.
-    errors
-        The sources that the units were drawn from, at any zones.
-    seeds
-        Node of the seed tree.
+    sample, errors, seeds, largest_failed_share
+        As of `tolalloc.sensitivity.target.target_sensitivity`.
     resamples
         Bootstrap resamples of the units for delta [-].
     dummies
         Vectors that the output does not depend on, each the source of most measures in a random order of the units.
         A source without an effect passes them all with probability 1/(dummies + 1), or less if it has fewer
         measures [-].
-    largest_failed_share
-        Share of the units that may fail [-].
 
     Raises
     ------

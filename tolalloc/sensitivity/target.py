@@ -144,13 +144,6 @@ def target_sensitivity(
 def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
     """Return what the drawing limits, for every source, in such a way that it compares with the zone [m].
 
-    Parameters
-    ----------
-    errors
-        The sources.
-    x
-        The units' deviations [m, angles rad].
-
     Notes
     -----
     A size: its deviation from the middle. A position: twice the distance from the true one. Pitch and run-out: the

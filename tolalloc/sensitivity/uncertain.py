@@ -95,10 +95,7 @@ def first_order_error(
 ) -> FirstOrderError:
     """Return how far the first order is from the model whose uncertain columns have changed.
 
-    Parameters
-    ----------
-    changes
-        Joint changes of the uncertain columns, each of which the model must be made anew for.
+    For each of the joint changes of these columns the model is made anew.
 
     Raises
     ------

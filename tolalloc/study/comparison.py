@@ -200,6 +200,5 @@ def _ranking_figure(comparison: ComparisonAnswer) -> Figure:
         name="rankings",
         title="Total Sobol index of every source in both studies, with 90 % intervals",
         x_label="total index ST [-]",
-        y_label="",
         series=tuple(series),
     )

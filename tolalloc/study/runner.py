@@ -65,20 +65,9 @@ def run(
     progress: Progress | None = None,
     checkpoint: Path | None = None,
 ) -> Run:
-    """Ask the questions and write one folder; on any error nothing stays behind.
+    """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
 
-    Parameters
-    ----------
-    study
-        What is asked.
-    folder
-        New or empty folder.
-    questions
-        Some of its questions; all unless given.
-    progress
-        Told how far the work has come.
-    checkpoint
-        File that keeps an interrupted search, if one is wanted.
+    Progress and checkpoint are as of `Study.ask`.
 
     Raises
     ------

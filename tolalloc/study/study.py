@@ -211,10 +211,8 @@ class Study(NamedFields):
         ----------
         folder
             New or empty folder; ``runs/NAME`` unless given.
-        effort
-            The study's own effort, or a quick one.
-        progress
-            Told how far the work has come; silent unless given.
+        effort, progress
+            As of `ask`.
 
         Raises
         ------

@@ -73,12 +73,7 @@ def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
 
 
 def allocate_angles(plan: AssemblyPlan, precision: float | None = None) -> AngularAllocation:
-    """Return the cheapest tolerances with the filter that expects parts of the plan's tolerances.
-
-    Parameters
-    ----------
-    precision
-        Q in place of the plan's own [-].
+    """Return the cheapest tolerances, at the plan's precision or another Q [-], with the filter that expects its own.
 
     Raises
     ------

@@ -124,15 +124,7 @@ def plan_record(plan: AssemblyPlan) -> dict[str, Any]:
 
 
 def plain(values: float | Float[np.ndarray, "*shape"], unit: float = 1.0) -> Any:
-    """Return numbers in a unit for JSON, without digits that mean nothing; what is infinite is not stated.
-
-    Parameters
-    ----------
-    values
-        The numbers [SI].
-    unit
-        The unit [SI].
-    """
+    """Return numbers [SI] in a unit [SI] for JSON, without digits that mean nothing; what is infinite is not stated."""
     found = np.round(np.asarray(values) / unit, 6) + 0.0
     stated = np.asarray(found, dtype=object)
     stated[~np.isfinite(found)] = None

@@ -35,13 +35,7 @@ def at_precision(answer: AssemblyAnswer) -> int:
 def tilt_and_rotation(
     angles: Float[np.ndarray, "*steps state"],
 ) -> tuple[Float[np.ndarray, "*steps part"], Float[np.ndarray, "*steps part"]]:
-    """Return √(x² + y²) and z of every part; of standard deviations likewise.
-
-    Parameters
-    ----------
-    angles
-        About x, y and z, part by part [rad].
-    """
+    """Return √(x² + y²) and z of every part from x, y and z part by part [rad]; of standard deviations likewise."""
     of_parts = angles.reshape(*angles.shape[:-1], -1, 3)
     return np.hypot(of_parts[..., 0], of_parts[..., 1]), of_parts[..., 2]
 

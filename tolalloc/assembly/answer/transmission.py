@@ -43,32 +43,14 @@ def perfect(effect: TransmissionEffect, output: str) -> float:
 
 
 def change(effect: TransmissionEffect, output: str, precision: float) -> tuple[float, float]:
-    """Return an output unadjusted and adjusted, the median of random assemblies [as the name says].
-
-    Parameters
-    ----------
-    effect
-        What the final angles do.
-    output
-        Its name.
-    precision
-        Precision of the adjusted assembly, one of the solved ones [-].
-    """
+    """Return an output unadjusted and at a solved precision [-], medians of random assemblies [as the name says]."""
     at = int(np.flatnonzero(effect.precisions == precision)[0])
     before, after = np.median(answers(effect, output)[[0, at]], axis=1)
     return float(before), float(after)
 
 
 def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
-    """Return which outputs adjusting leaves larger, with both values.
-
-    Parameters
-    ----------
-    effect
-        What the final angles do.
-    precision
-        Precision of the adjusted assembly, one of the solved ones [-].
-    """
+    """Return which outputs adjusting at a solved precision [-] leaves larger, with both values."""
     found = []
     for output in _BETTER_SMALL:
         before, after = change(effect, output, precision)
@@ -177,15 +159,7 @@ def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figur
 
 
 def pressure_map(effect: TransmissionEffect, precision: float) -> HeatMap:
-    """Return the pressure along the pins that carry, unadjusted above adjusted.
-
-    Parameters
-    ----------
-    effect
-        What the final angles do.
-    precision
-        Precision of the adjusted assembly, one of the solved ones [-].
-    """
+    """Return the pressure along the pins that carry, unadjusted above adjusted at a solved precision [-]."""
     chosen = [(0.0, effect.patterns[0])]
     if precision > 0:
         chosen.append((precision, effect.patterns[int(np.flatnonzero(effect.precisions == precision)[0])]))

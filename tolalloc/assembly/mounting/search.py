@@ -38,12 +38,7 @@ MountingStep = Callable[[PartStock, Mountings, Peaks], Asking[Trial]]
 def units_from(stock: PartStock, parts: Sequence[int], turns: Sequence[Sequence[int]] | None = None) -> Mountings:
     """Return every unit that can be mounted from some of the parts; from those of one unit, all its mountings.
 
-    Parameters
-    ----------
-    parts
-        Numbers of the parts to choose from [-].
-    turns
-        Turns to choose from at every place; all unless given [-].
+    Parts are given by their numbers; the turns to choose from at every place are all of them unless given [-].
     """
     fitting = [[part for part in parts if part in stock.fitting(stock.places[slots[0]])] for slots in stock.slots]
     choices = product(*(permutations(own, len(slots)) for own, slots in zip(fitting, stock.slots, strict=True)))

@@ -34,18 +34,9 @@ class MountingStudy:
 def prepare_mounting(
     parts: Path, reducer: str = "rv20e", torque_nm: float | None = None, starts: int = 4, seed: int = 1
 ) -> MountingStudy:
-    """Return the parts with their file read and checked.
+    """Return the parts with their CSV file read and checked, for the reducer of a preset or TOML file.
 
-    Parameters
-    ----------
-    parts
-        CSV file with the columns ``part, kind, error, value, unit``.
-    reducer
-        Preset or TOML file.
-    torque_nm
-        Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m].
-    starts, seed
-        As in `MountingStudy`.
+    The torque on the carrier is the reducer's test torque unless given, negative where it resists the rotation [N·m].
 
     Raises
     ------

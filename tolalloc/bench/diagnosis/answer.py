@@ -210,7 +210,6 @@ class DiagnosisAnswer(Answer):
             name="dominant",
             title="Which source drives this unit",
             x_label="probability of being the dominant source [%]",
-            y_label="",
             series=(Series(label="probability", kind="bars", x=names, y=shares),),
         )
 
@@ -223,7 +222,6 @@ class DiagnosisAnswer(Answer):
             name="readings",
             title="What the gauges would show, over the drawing's zone",
             x_label="reading over zone [-]",
-            y_label="",
             series=(Series(label="mean and 95 % interval", kind="bars", x=names, y=mean, low=low, high=high),),
             vertical=((1.0, "zone"),),
         )

@@ -231,6 +231,5 @@ def _unit_residual_figure(answer: IdentificationAnswer, kind: str) -> Figure:
         name=f"{kind}_residuals",
         title=f"Root-mean-square of model less measured over each unit's {kind}s",
         x_label="rms [arcsec]",
-        y_label="",
         series=tuple(series),
     )
