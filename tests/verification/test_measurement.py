@@ -201,14 +201,14 @@ def test_resampling_adds_next_to_nothing(count, jitter, generator):
     angle = 0.3 + TURN * np.sort(np.arange(count) + jitter * generator.uniform(-1, 1, count)) / count
     whole = resampled(angle, curve(angle), whole_turn=True)
     # Where readings happen to leave a gap, an angle is left out rather than made up.
-    assert READINGS - (10 if jitter else 0) <= whole.angle.size <= READINGS
-    np.testing.assert_allclose(np.mod((whole.angle - whole.angle[0]) / TURN * READINGS + 0.5, 1.0), 0.5, atol=1e-9)
+    assert READINGS - (10 if jitter else 0) <= whole.along.size <= READINGS
+    np.testing.assert_allclose(np.mod((whole.along - whole.along[0]) / TURN * READINGS + 0.5, 1.0), 0.5, atol=1e-9)
     # Five orders of 5″ each; the spline errs by 1e-4 of an amplitude at order 80 and less below.
-    assert np.abs(whole.values - curve(whole.angle)).max() < 5e-4 * 5 * ARCSECOND
+    assert np.abs(whole.values - curve(whole.along)).max() < 5e-4 * 5 * ARCSECOND
     some = angle < 0.3 + 0.6 * TURN
     if some.sum() > FULL:
         piece = resampled(angle[some], curve(angle[some]), whole_turn=False)
-        assert np.abs(piece.values - curve(piece.angle)).max() < 5e-4 * 5 * ARCSECOND
+        assert np.abs(piece.values - curve(piece.along)).max() < 5e-4 * 5 * ARCSECOND
 
 
 def test_resampling_a_kink():
@@ -217,17 +217,17 @@ def test_resampling_a_kink():
     kinked = np.abs(np.sin(20 * angle))
     whole = resampled(angle, kinked, whole_turn=True)
     change = 40.0 * TURN / READINGS  # of the slope, times a spacing
-    assert np.abs(whole.values - np.abs(np.sin(20 * whole.angle))).max() < 0.15 * change
+    assert np.abs(whole.values - np.abs(np.sin(20 * whole.along))).max() < 0.15 * change
 
 
 def test_angles_in_gaps_are_left_out(generator):
     angle = turn(3600)
     seen = ((angle < 1.0) | (angle > 1.1)) & ((angle < 3.0) | (angle > 3.01)) & ((angle < 4.0) | (angle > 4.02))
     whole = resampled(angle[seen], curve(angle[seen]), whole_turn=True)
-    inside = (whole.angle > 1.0) & (whole.angle < 1.1 - 2 * TURN / READINGS)
+    inside = (whole.along > 1.0) & (whole.along < 1.1 - 2 * TURN / READINGS)
     assert not inside.any()
-    assert READINGS - 30 < whole.angle.size < READINGS - 15
-    assert np.abs(whole.values - curve(whole.angle)).max() < 1e-3 * 5 * ARCSECOND
+    assert READINGS - 30 < whole.along.size < READINGS - 15
+    assert np.abs(whole.values - curve(whole.along)).max() < 1e-3 * 5 * ARCSECOND
 
 
 @pytest.mark.parametrize(("count", "jitter"), [(2000, 0.0), (2000, 0.4), (5000, 0.0)])

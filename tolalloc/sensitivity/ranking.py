@@ -12,6 +12,9 @@ from scipy.stats import norm
 
 from tolalloc.exceptions import InputError
 
+_CONFIDENCE = 0.9
+"""Share of resamples that makes an order count, and that an interval holds [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbours:
@@ -24,7 +27,7 @@ class Neighbours:
     difference: float
     deviation: float
     probability: float  # Share of resamples in which they have this order [-]
-    separated: bool  # Whether that share reaches the confidence asked for
+    separated: bool  # Whether that share reaches 0.9
     # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal [-]
     more_blocks: int | None
 
@@ -78,26 +81,50 @@ class SourceRanking:
 
     @property
     def neighbours(self) -> tuple[Neighbours, ...]:
-        """Sources that follow each other, largest total index first, and what would tell them apart."""
-        return neighbours(self.total, self.total_resamples, self.blocks)
+        """Sources that follow each other, largest total index first, and what would tell them apart.
+
+        Notes
+        -----
+        The blocks to add are an extrapolation: they take the difference for the true one, and its distribution for a
+        normal one whose variance falls with one over the blocks. A difference that is itself doubtful makes them so
+        too.
+
+        References
+        ----------
+        One-sided normal quantile z with N′ = N·(z·σ/Δ)², from σ² ∝ 1/N; Efron & Tibshirani 1993, ch. 6.
+        """
+        found = []
+        for leading, following in pairwise(self.order):
+            apart = self.total_resamples[:, leading] - self.total_resamples[:, following]
+            difference, deviation = float(self.total[leading] - self.total[following]), float(apart.std(ddof=1))
+            probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
+            separated = probability >= _CONFIDENCE
+            found.append(
+                Neighbours(
+                    before=leading,
+                    after=following,
+                    difference=difference,
+                    deviation=deviation,
+                    probability=probability,
+                    separated=separated,
+                    more_blocks=0 if separated else _more_blocks(difference, deviation, self.blocks),
+                )
+            )
+        return tuple(found)
 
     def among_first(self, count: int) -> Float[np.ndarray, " source"]:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
-        return among_first(self.total_resamples, count)
+        require_places(count, len(self.sources))
+        return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
 
-    def reproduced_by(self, other: SourceRanking, confidence: float = 0.9) -> Reproduction:
-        """Return how many of the orders promised here the same analysis with another seed has.
-
-        The confidence is the share of resamples that makes an order a promise [-].
-        """
-        if not 0.5 < confidence < 1:
-            raise InputError.at("reproduction", "confidence", confidence, "a number between 0.5 and 1")
+    def reproduced_by(self, other: SourceRanking) -> Reproduction:
+        """Return how many of the orders promised here the same analysis with another seed has."""
         if other.sources != self.sources:
             raise InputError("Reproduction: the two rankings are not of the same sources.")
-        promised = before(self.total_resamples) >= confidence
+        promised = before(self.total_resamples) >= _CONFIDENCE
         found = promised & (other.total[:, np.newaxis] > other.total)
         return Reproduction(
-            confidence=confidence,
+            confidence=_CONFIDENCE,
             promised=int(np.count_nonzero(promised)),
             reproduced=int(np.count_nonzero(found)),
         )
@@ -117,13 +144,7 @@ def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "r
 
 def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
     """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has [-]."""
-    return np.asarray(np.quantile(ranks(resamples), _tails(0.9), axis=0, method="inverted_cdf").astype(int))
-
-
-def among_first(resamples: Float[np.ndarray, "resample source"], count: int) -> Float[np.ndarray, " source"]:
-    """Return the share of resamples in which each source is among the first ``count`` [-]."""
-    require_places(count, resamples.shape[1])
-    return np.asarray((ranks(resamples) <= count).mean(axis=0))
+    return np.asarray(np.quantile(ranks(resamples), _tails(_CONFIDENCE), axis=0, method="inverted_cdf").astype(int))
 
 
 def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray, "source source"]:
@@ -142,51 +163,11 @@ def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"])
     return np.asarray(np.quantile(resamples, 1 - 0.95, axis=0) <= 0)
 
 
-def neighbours(
-    indices: Float[np.ndarray, " source"],
-    resamples: Float[np.ndarray, "resample source"],
-    blocks: int,
-    confidence: float = 0.9,
-) -> tuple[Neighbours, ...]:
-    """Return every pair of neighbours in the ranking, and what would tell them apart.
-
-    The confidence is the share of resamples that must have an order for it to count [-].
-
-    Notes
-    -----
-    The blocks to add are an extrapolation: they take the difference for the true one, and its distribution for a
-    normal one whose variance falls with one over the blocks. A difference that is itself doubtful makes them so too.
-
-    References
-    ----------
-    One-sided normal quantile z with N′ = N·(z·σ/Δ)², from σ² ∝ 1/N; Efron & Tibshirani 1993, ch. 6.
-    """
-    require_confidence(confidence)
-    order, found = np.argsort(-indices, kind="stable").tolist(), []
-    for leading, following in pairwise(order):
-        apart = resamples[:, leading] - resamples[:, following]
-        difference, deviation = float(indices[leading] - indices[following]), float(apart.std(ddof=1))
-        probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
-        separated = probability >= confidence
-        found.append(
-            Neighbours(
-                before=leading,
-                after=following,
-                difference=difference,
-                deviation=deviation,
-                probability=probability,
-                separated=separated,
-                more_blocks=0 if separated else _more_blocks(difference, deviation, blocks, confidence),
-            )
-        )
-    return tuple(found)
-
-
-def _more_blocks(difference: float, deviation: float, blocks: int, confidence: float) -> int | None:
+def _more_blocks(difference: float, deviation: float, blocks: int) -> int | None:
     """Return the blocks to add until the confidence is reached, at least one; none if the indices are equal [-]."""
     if difference <= 0:
         return None
-    needed = blocks * (float(norm.ppf(confidence)) * deviation / difference) ** 2
+    needed = blocks * (float(norm.ppf(_CONFIDENCE)) * deviation / difference) ** 2
     return max(1, int(np.ceil(needed)) - blocks)
 
 

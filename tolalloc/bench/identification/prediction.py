@@ -179,10 +179,6 @@ class StandIn:
     # Added to every reading, so that they are the model's at one point; 0 unless `anchored` [rad]
     offset: float | Float[np.ndarray, " datum"] = 0.0
 
-    def of(self, parameters: tuple[Parameter, ...]) -> StandIn:
-        """Return the stand-in for fewer unknowns, or with a bias."""
-        return replace(self, parameters=parameters)
-
     def anchored(self, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> StandIn:
         """Return the stand-in moved onto what the model predicts at one point."""
         return replace(self, offset=model.values - self.values(coordinates[np.newaxis])[0])

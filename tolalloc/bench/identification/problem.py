@@ -112,10 +112,6 @@ class IdentificationProblem:
         """Return the same data asked for other parameters."""
         return replace(self, parameters=tuple(parameters), predictor=predictor)
 
-    def weighed(self, weight: Float[np.ndarray, " unit"]) -> IdentificationProblem:
-        """Return the problem with other weights of the units."""
-        return replace(self, weight=weight)
-
 
 def require_enough(problem: IdentificationProblem) -> None:
     """Refuse data that cannot fix so many parameters whatever they read.

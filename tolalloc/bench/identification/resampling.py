@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -29,7 +29,7 @@ def bootstrap(
     rows = []
     for draw in drawn:
         weight = np.bincount(units[draw], minlength=problem.weight.size).astype(float)
-        rows.append(gauss_newton(problem.weighed(weight), best[np.newaxis]).coordinates)
+        rows.append(gauss_newton(replace(problem, weight=weight), best[np.newaxis]).coordinates)
     return np.array(rows)
 
 
@@ -71,14 +71,14 @@ def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequen
     The stand-in holds polynomials of at least these parameters.
     """
     own = tuple(parameters)
-    asked, data = problem.of(own, stand_in.of(own)), problem.data
+    asked, data = problem.of(own, replace(stand_in, parameters=own)), problem.data
     everywhere = _left(asked, _fit(asked))
     unseen = np.empty(data.measured.size)
     for unit in data.units:
         weight = problem.weight.copy()
         weight[unit] = 0.0
         rows = data.unit == unit
-        unseen[rows] = _left(asked, _fit(asked.weighed(weight)))[rows]
+        unseen[rows] = _left(asked, _fit(replace(asked, weight=weight)))[rows]
     return ParameterChoice(parameters=own, left=everywhere, unseen=unseen, noise=data.noise, unit=data.unit)
 
 

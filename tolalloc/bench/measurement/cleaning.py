@@ -6,7 +6,7 @@ What cannot be mended without a guess is refused in one sentence that names the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -22,7 +22,7 @@ from tolalloc.bench.measurement.angles import (
     without_ends,
 )
 from tolalloc.bench.measurement.readings import RawReadings, counted, require_readings
-from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
+from tolalloc.bench.measurement.resampling import FULL, READINGS, Cleaned, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.units import DEGREE
 
@@ -37,17 +37,6 @@ LARGEST_RANGE = DEGREE
 
 SAME_TORQUE = 1e-9
 """Torques this close, over the largest, are one torque [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cleaned:
-    """Clean readings."""
-
-    along: Float[np.ndarray, " reading"]  # Angles or torques, ascending [rad or N·m]
-    values: Float[np.ndarray, " reading"]  # Readings without their mean [rad]
-    # Standard deviation of one of these over that of a reading of the instrument, root mean square [-]
-    noise_factor: float
-    repairs: tuple[str, ...]  # What was mended, a sentence each
 
 
 Step = Callable[[RawReadings], tuple[RawReadings, str]]
@@ -85,7 +74,7 @@ def clean_curve(readings: RawReadings, offset: float = 0.0, start_stop: float = 
     factor = sqrt(float(np.mean(1.0 / readings.averaged)))
     if angle.size > FULL:
         dense = resampled(angle, values, whole_turn=closes)
-        angle, values, factor = dense.angle, dense.values, factor * dense.noise_factor
+        angle, values, factor = dense.along, dense.values, factor * dense.noise_factor
         repairs += (f"{readings.along.size} readings resampled to {angle.size} by a least-squares cubic spline",)
         if angle.size < READINGS:
             repairs += (f"{counted(READINGS - angle.size, 'angle')} of {READINGS} in gaps of the readings left out",)

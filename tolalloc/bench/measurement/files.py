@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from tolalloc.bench.measurement.cleaning import LARGEST_RANGE, Cleaned, clean_curve, clean_loop
+from tolalloc.bench.measurement.cleaning import LARGEST_RANGE, clean_curve, clean_loop
 from tolalloc.bench.measurement.readings import (
     ANGLE,
     PEAK_TO_PEAK,
@@ -21,6 +21,7 @@ from tolalloc.bench.measurement.readings import (
     load_readings,
     read_column,
 )
+from tolalloc.bench.measurement.resampling import Cleaned
 from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, validated

@@ -25,19 +25,21 @@ WRAPPED = 24
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resampled:
-    """A curve on fewer angles."""
+class Cleaned:
+    """Clean readings."""
 
-    angle: Float[np.ndarray, " angle"]  # Angles, equally spaced but for gaps of the readings [rad]
-    values: Float[np.ndarray, " angle"]  # Spline at the angles [rad]
-    # Standard deviation of a value over that of a reading, root mean square; its square is near angles over readings
-    # [-]
+    # Angles or torques, ascending; resampled angles equally spaced but for gaps of the readings [rad or N·m]
+    along: Float[np.ndarray, " reading"]
+    values: Float[np.ndarray, " reading"]  # Readings without their mean, or the spline at resampled angles [rad]
+    # Standard deviation of one of these over that of a reading of the instrument, root mean square; resampled, its
+    # square is near angles over readings [-]
     noise_factor: float
+    repairs: tuple[str, ...] = ()  # What was mended, a sentence each
 
 
 def resampled(
     angle: Float[np.ndarray, " reading"], values: Float[np.ndarray, " reading"], *, whole_turn: bool
-) -> Resampled:
+) -> Cleaned:
     """Return a dense curve at `READINGS` angles, the knots of the spline.
 
     There are about as many values as the spline has coefficients, so that the curve weighs as much afterwards as its
@@ -60,7 +62,7 @@ def resampled(
     ]
     angles, smooth, variance = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     sure = variance <= 1.0
-    return Resampled(angle=angles[sure], values=smooth[sure], noise_factor=float(np.sqrt(variance[sure].mean())))
+    return Cleaned(along=angles[sure], values=smooth[sure], noise_factor=float(np.sqrt(variance[sure].mean())))
 
 
 def _piece(
