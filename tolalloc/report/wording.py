@@ -8,12 +8,21 @@ _UNDERSTOOD = " transmission error"
 
 
 def unit_of(name: str) -> str:
-    """Return the unit in the name of an output.
+    """Return the unit in the name of an output, which stands last in brackets.
 
     >>> unit_of("lost motion [arcmin]")
     'arcmin'
     """
-    return name.split("[")[-1].split("]")[0]
+    return name.split("[")[-1].split("]")[0] if "[" in name else "-"
+
+
+def sign_of(unit: str) -> str:
+    """Return what follows a number in a ranking: the unit's sign or, after a blank, the unit.
+
+    >>> sign_of("arcmin"), sign_of("N")
+    ('′', ' N')
+    """
+    return {**_SIGNS, "arcmin": "′", "deg": "°", "-": ""}.get(unit, f" {unit}")
 
 
 def quantity(name: str) -> str:

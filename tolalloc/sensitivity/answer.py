@@ -18,6 +18,7 @@ from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
+from tolalloc.report.wording import sign_of, unit_of
 from tolalloc.sensitivity.derivatives import (
     ClassicalEstimate,
     DerivativeMeasures,
@@ -38,18 +39,6 @@ from tolalloc.surrogate.choice import Choice
 
 if TYPE_CHECKING:
     import pandas as pd
-
-_SIGNS = {"arcsec": "″", "arcmin": "′", "deg": "°", "%": " %", "-": ""}
-
-
-def unit_of(output: str) -> str:
-    """Return the unit in an output's name, which stands last in brackets."""
-    return output.rsplit(" [", 1)[1].rstrip("]") if " [" in output else "-"
-
-
-def sign_of(unit: str) -> str:
-    """Return what follows a number in a sentence: the unit's sign or, after a blank, the unit."""
-    return _SIGNS.get(unit, f" {unit}")
 
 
 @dataclass(frozen=True, kw_only=True)

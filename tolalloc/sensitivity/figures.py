@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.sensitivity.answer import RankingAnswer, sign_of
+from tolalloc.report.wording import quantity, sign_of
+from tolalloc.sensitivity.answer import RankingAnswer
 
 _SHOWN = 24
 """Rows of a picture; the table has all [-]."""
@@ -43,7 +44,7 @@ def requirements_figure(answer: RankingAnswer) -> HeatMap:
     return HeatMap(
         name="requirements",
         title="Which error drives which requirement",
-        columns=[_broken(name.split(" [")[0]) for name in outputs],
+        columns=[_broken(quantity(name)) for name in outputs],
         rows=[sobol.sources[at] for at in rows],
         label="total Sobol index [-]",
         values=[[float(sobol.indices.total[sobol.position(name), at]) for name in outputs] for at in rows],

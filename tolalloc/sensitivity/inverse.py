@@ -14,6 +14,8 @@ from tolalloc.models import Response
 
 _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""
+_SAME = 1e-3
+"""Distance from the limit, over the limit, at which the quantile counts as equal to it [-]."""
 _MOST_STEPS = 30
 """Steps between two factors after which the quantile cannot be continuous; about four are usual [-]."""
 _SLOPE_STEP = 0.1
@@ -51,7 +53,6 @@ def inverse_sensitivity(
     target: float,
     units: int = 2048,
     largest_factor: float = 10.0,
-    tolerance: float = 1e-3,
 ) -> InverseSensitivity:
     """Return how far each zone may open, or must close, alone.
 
@@ -67,8 +68,6 @@ def inverse_sensitivity(
         Units of every trial [-].
     largest_factor
         Factor up to which a zone is opened [-].
-    tolerance
-        Distance from the limit, over the limit, at which the quantile counts as equal to it [-].
 
     Raises
     ------
@@ -102,7 +101,7 @@ def inverse_sensitivity(
     low, high = np.full((2, count), np.nan)
     own, bracket = _bracket(openings, now, limit, largest_factor)
     if own.size:
-        factor[own], quantiles = _crossings(openings, own, bracket, limit, tolerance)
+        factor[own], quantiles = _crossings(openings, own, bracket, limit)
         low[own], high[own] = _interval(openings, own, factor[own], quantiles, limit)
     return InverseSensitivity(
         sources=tuple(source.name for source in errors.active),
@@ -204,7 +203,6 @@ def _crossings(
     sources: Int[np.ndarray, " found"],
     bracket: Float[np.ndarray, "4 found"],
     limit: float,
-    tolerance: float,
 ) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
     """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
     stale, fresh, stale_excess, fresh_excess = bracket.copy()
@@ -218,7 +216,7 @@ def _crossings(
         other_side = (excess > 0.0) != (at_b > 0.0)
         stale[left], stale_excess[left] = np.where(other_side, b, a), np.where(other_side, at_b, at_a / 2.0)
         fresh[left], fresh_excess[left] = trial, excess
-        left = left[np.abs(excess) > tolerance * abs(limit)]
+        left = left[np.abs(excess) > _SAME * abs(limit)]
         if not left.size:
             return fresh, quantiles
     name = openings.errors.active[sources[left[0]]].name

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import proportion
-from tolalloc.sensitivity.answer import RankingAnswer, unit_of
+from tolalloc.report.wording import quantity, unit_of
+from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.units import MICROMETRE
 
 
@@ -21,7 +22,7 @@ def capability_table(answer: RankingAnswer) -> pd.DataFrame:
             answer.limits.get(output),
         )
         row: dict[str, object] = {
-            "requirement": output.rsplit(" [", 1)[0],
+            "requirement": quantity(output),
             "unit": unit_of(output),
             "Mean": float(values.mean()),
             "Sigma": float(values.std(ddof=1)),

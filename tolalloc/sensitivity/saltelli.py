@@ -95,12 +95,12 @@ class SaltelliIndices:
     # First-order and total index [-]
     first: Float[np.ndarray, "output source"]
     total: Float[np.ndarray, "output source"]
-    # Second-order index of the pairs in the order of ``pairs``, none if the design has no BA samples [-]
-    second: Float[np.ndarray, "output pair"] | None
+    # Second-order index of the pairs in the order of ``pairs``, no pairs if the design has no BA samples [-]
+    second: Float[np.ndarray, "output pair"]
     # The same from bootstrap resamples of the blocks, the same blocks for all outputs [-]
     first_resamples: Float[np.ndarray, "output resample source"]
     total_resamples: Float[np.ndarray, "output resample source"]
-    second_resamples: Float[np.ndarray, "output resample pair"] | None
+    second_resamples: Float[np.ndarray, "output resample pair"]
     # Variance of A and B together, of which the indices are shares [output²]
     variance: Float[np.ndarray, " output"]
     variance_resamples: Float[np.ndarray, "output resample"]
@@ -112,7 +112,7 @@ class SaltelliIndices:
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Positions of the two sources of every pair."""
-        return tuple(combinations(range(self.first.shape[1]), 2))
+        return tuple(combinations(range(self.first.shape[1]), 2)) if self.second.size else ()
 
 
 def saltelli_indices(
@@ -176,10 +176,10 @@ def saltelli_indices(
     return SaltelliIndices(
         first=first[:, 0],
         total=total[:, 0],
-        second=second[:, 0] if second_order else None,
+        second=second[:, 0],
         first_resamples=first[:, 1:],
         total_resamples=total[:, 1:],
-        second_resamples=second[:, 1:] if second_order else None,
+        second_resamples=second[:, 1:],
         variance=variance[:, 0],
         variance_resamples=variance[:, 1:],
         varies=varies,

@@ -24,6 +24,10 @@ from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
 
+_LEVELS = 4
+"""Levels of every uniform number, an even number; a step goes over half of them [-]."""
+_TRIM = 0.001
+"""Share of the distribution left out at either end, where a normal number would be infinite [-]."""
 _RESAMPLES = 400
 """Bootstrap resamples of the trajectories [-]."""
 _CURVE_POINTS = 100
@@ -73,28 +77,18 @@ class MomentIndependent:
         return percentile_interval(self.delta_resamples)
 
 
-def elementary_effects(
-    experiment: Experiment[Response],
-    trajectories: int,
-    *,
-    levels: int = 4,
-    trim: float = 0.001,
-) -> ElementaryEffects:
+def elementary_effects(experiment: Experiment[Response], trajectories: int) -> ElementaryEffects:
     """Return the elementary effects of all sources on all outputs.
 
     Parameters
     ----------
     trajectories
         Trajectories; the response is called (sources + 1) times as often [-].
-    levels
-        Levels of every uniform number, an even number; a step goes over half of them [-].
-    trim
-        Share of the distribution left out at either end, where a normal number would be infinite [-].
 
     Raises
     ------
     InputError
-        Fewer than two trajectories, an odd number of levels, or a trim outside 0 to 0.5.
+        Fewer than two trajectories.
     SolveError
         More trajectories hold a failed sample than allowed, or fewer than two are left.
 
@@ -104,10 +98,6 @@ def elementary_effects(
     """
     if trajectories < FEWEST_TRAJECTORIES:
         raise InputError.at("elementary effects", "trajectories", trajectories, f"{FEWEST_TRAJECTORIES} or more")
-    if levels < 2 or levels % 2:
-        raise InputError.at("elementary effects", "levels", levels, "an even number, 2 or more")
-    if not 0.0 < trim < 0.5:
-        raise InputError.at("elementary effects", "trim", trim, "a number between 0 and 0.5")
     errors, seeds = experiment.errors, experiment.seeds
     groups = errors.block_of_column
     names = tuple(dict.fromkeys(groups))
@@ -115,11 +105,11 @@ def elementary_effects(
         "num_vars": len(errors.columns),
         "names": list(errors.columns),
         "groups": list(groups),
-        "bounds": [[trim, 1.0 - trim]] * len(errors.columns),
+        "bounds": [[_TRIM, 1.0 - _TRIM]] * len(errors.columns),
     }
     from SALib.sample import morris
 
-    uniform = morris.sample(problem, trajectories, num_levels=levels, seed=seeds.child("sample").integer())
+    uniform = morris.sample(problem, trajectories, num_levels=_LEVELS, seed=seeds.child("sample").integer())
     evaluation = experiment.response(experiment.deviations(errors.standard_values(uniform)))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
     used = int(np.count_nonzero(whole))
@@ -133,7 +123,7 @@ def elementary_effects(
         uniform.reshape(trajectories, len(names) + 1, -1)[whole],
         evaluation.values.reshape(trajectories, len(names) + 1, -1)[whole],
         members,
-        levels / (2.0 * (levels - 1)),
+        _LEVELS / (2.0 * (_LEVELS - 1)),
     )
     counts = resample_counts(used, _RESAMPLES, seeds.child("resamples"))
     magnitudes = counts @ np.abs(effects) / used

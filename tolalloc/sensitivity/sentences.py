@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.sensitivity.answer import RankingAnswer, sign_of
+from tolalloc.report.wording import quantity, sign_of
+from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 _RARE = 1000.0
@@ -198,7 +199,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
 
 def assumptions(answer: RankingAnswer) -> tuple[str, ...]:
     """Return what no source states."""
-    settings = " and ".join(setting.name.split(" [")[0] for setting in answer.model.settings)
+    settings = " and ".join(quantity(setting.name) for setting in answer.model.settings)
     return (
         *answer.header.assumptions,
         "zones, distributions and Cp: as the tolerance table states them; its notes say where each comes from",

@@ -103,16 +103,15 @@ class SobolAnalysis:
         at, found = self.position(output), self.indices
         if not found.varies[at]:
             raise SolveError(f"Sobol indices: {self.outputs[at]} is the same for all samples; no source can be ranked.")
-        none = np.empty((len(found.first), 1 + found.first_resamples.shape[1], 0))
         return SobolIndices(
             sources=self.sources,
             first=found.first[at],
             total=found.total[at],
             first_resamples=found.first_resamples[at],
             total_resamples=found.total_resamples[at],
-            pairs=() if found.second is None else found.pairs,
-            second=(none[:, 0] if found.second is None else found.second)[at],
-            second_resamples=(none[:, 1:] if found.second_resamples is None else found.second_resamples)[at],
+            pairs=found.pairs,
+            second=found.second[at],
+            second_resamples=found.second_resamples[at],
             blocks=found.blocks,
             dropped=found.dropped,
             samples=self.samples,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import exp, inf, isfinite, log
 from typing import Any
 
@@ -131,26 +131,16 @@ def parameter(
     return Parameter(name=name, low=low, high=high, start=start, prior=prior)
 
 
-def with_parameters(
-    reducer: Reducer, parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]
-) -> Reducer:
-    """Return the reducer with the stiffnesses that coordinates stand for."""
-    values: dict[str, Any] = {
-        item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True) if item.is_stiffness
-    }
-    return replace(reducer, stiffness=replace(reducer.stiffness, **values))
+def values_at(
+    parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]
+) -> tuple[dict[str, Any], float, float]:
+    """Return stiffnesses by name [N/m], the bias [rad] and the torque over the stated one [-] at coordinates.
 
-
-def bias_of(parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]) -> float:
-    """Return the bias that coordinates stand for, 0 if it is not asked for [rad]."""
+    A bias that is not asked for is 0, a torque that is not asked for the stated one.
+    """
     found = {item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True)}
-    return found.get(BIAS, 0.0) * ARCSECOND
-
-
-def torque_factor_of(parameters: Sequence[Parameter], coordinates: Float[np.ndarray, " parameter"]) -> float:
-    """Return the torque over the stated one that coordinates stand for [-]."""
-    found = {item.name: item.value(float(at)) for item, at in zip(parameters, coordinates, strict=True)}
-    return found.get(TORQUE, 1.0)
+    bias, torque = found.pop(BIAS, 0.0) * ARCSECOND, found.pop(TORQUE, 1.0)
+    return found, bias, torque
 
 
 def box(parameters: Sequence[Parameter]) -> tuple[Float[np.ndarray, " parameter"], Float[np.ndarray, " parameter"]]:

@@ -14,10 +14,8 @@ from tolalloc.bench.identification.parameters import (
     BIAS,
     TORQUE,
     Parameter,
-    bias_of,
     box,
-    torque_factor_of,
-    with_parameters,
+    values_at,
 )
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.drawings.seeds import SeedTree
@@ -71,9 +69,9 @@ class KernelPredictor:
 
     def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
         """Return readings and derivatives at one point."""
-        factor = torque_factor_of(self.parameters, coordinates)
+        stiffness, bias, factor = values_at(self.parameters, coordinates)
         orders = sorted({order for unit in self.measurements.units for order in unit.orders})
-        reducer = with_parameters(self.reducer, self.parameters, coordinates)
+        reducer = replace(self.reducer, stiffness=replace(self.reducer.stiffness, **stiffness))
         model = EquivalentModel(reducer, orders=tuple(orders) or HARMONICS)
         deviations = reducer.modification.deviations
         errors = np.concatenate([unit.errors(model.columns, deviations) for unit in self.measurements.units])
@@ -82,28 +80,17 @@ class KernelPredictor:
         for blocks, found, by_coordinate in self._answers(model, errors, factor):
             rows = np.concatenate([np.arange(block.rows.start, block.rows.stop) for block in blocks])
             values[rows], slopes[rows] = found, by_coordinate
-        self._add_bias(coordinates, values, slopes)
+        rows_with_bias = self.data.peak_to_peak or slice(0)
+        values[rows_with_bias] += bias
+        for at, item in enumerate(self.parameters):
+            if item.name == BIAS:
+                slopes[rows_with_bias, at] = ARCSECOND
         self.observe(self.data.units.size)
         return Prediction(values=centred(values, self.data.blocks), by_coordinate=centred(slopes, self.data.blocks))
 
     def values(self, coordinates: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, "point datum"]:
         """Return the readings at many points [rad]."""
         return np.stack([self(point).values for point in coordinates])
-
-    def _add_bias(
-        self,
-        coordinates: Float[np.ndarray, " parameter"],
-        values: Float[np.ndarray, " datum"],
-        slopes: Float[np.ndarray, "datum parameter"],
-    ) -> None:
-        """Add the bias of the instrument to what it reads of the peak-to-peaks."""
-        rows = self.data.peak_to_peak
-        if rows is None:
-            return
-        values[rows] += bias_of(self.parameters, coordinates)
-        for at, item in enumerate(self.parameters):
-            if item.name == BIAS:
-                slopes[rows, at] = ARCSECOND
 
     def _answers(
         self, model: EquivalentModel, errors: Float[np.ndarray, "unit column"], factor: float
