@@ -13,7 +13,6 @@ from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.trajectory import foreseen, random_numbers
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.chunks import Mapper
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, SolveError
@@ -153,7 +152,6 @@ class OrientationResponse:
     chain: DatumFlowChain  # Its parts, and which columns of the model their orientations move
     torque: float  # Test torque on the carrier; negative resists the rotation [N·m]
     observe: Observer = KernelResponse.observe  # Told the statuses of each chunk
-    mapper: Mapper = map  # What solves the chunks, `tolalloc.chunks.map_chunks`
     readings: tuple[Reading, ...] = TRANSMISSION  # What is read
 
     def __post_init__(self) -> None:
@@ -200,7 +198,6 @@ class OrientationResponse:
             columns=names,
             fixed=others | self.model.reducer.modification.deviations,
             observe=self.observe,
-            mapper=self.mapper,
         )
 
     def _moved(self, x: Float[np.ndarray, "sample column"]) -> dict[str, Float[np.ndarray, " sample"]]:
