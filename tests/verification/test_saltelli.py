@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from SALib.analyze import sobol as salib
@@ -46,7 +48,7 @@ def indices(values: np.ndarray, second_order: bool = True, seed: int = 4, **opti
     found = saltelli_indices(
         evaluation(values), SOURCES, SeedTree(seed), second_order=second_order, resamples=RESAMPLES, **options
     )
-    assert found.pairs == tuple((j, k) for j in range(SOURCES) for k in range(j + 1, SOURCES))
+    assert found.pairs == (tuple(combinations(range(SOURCES), 2)) if second_order else ())
     return found
 
 
