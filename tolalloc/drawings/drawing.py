@@ -98,6 +98,8 @@ class Drawing:
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
+        Process costs are not in the table: whoever reads it gives them again by ``costs=``. Nor are correlations.
+
         Raises
         ------
         InputError
