@@ -278,7 +278,7 @@ def test_a_truncated_table_is_refused(tmp_path):
     refused(
         tolalloc("check", study_script(tmp_path, drawing={"table": str(tmp_path / "table.csv")})),
         "table.csv",
-        "missing",
+        "truncated",
     )
 
 

@@ -242,7 +242,11 @@ def test_bad_unit_tables_are_refused(folder, old, new, sentence):
             "6l",
             "peak_to_peak.csv, row 3: peak_to_peak [arcsec] is '6l'; allowed is a number with a decimal point",
         ),
-        ("61", "61,5", "peak_to_peak.csv, row 3: peak_to_peak [arcsec] is '61,5'; allowed is a number with a decimal"),
+        (
+            "61",
+            "6,1,5",
+            "peak_to_peak.csv, row 3: peak_to_peak [arcsec] is '6,1,5'; allowed is a number with a decimal",
+        ),
         ("61\n2;58.25", "50.5\n2;50.5", "all 3 values of column 'peak_to_peak [arcsec]' are 50.5; an instrument that"),
         ("[arcsec]", "", "the unit of column 'peak_to_peak' is ''; allowed is arcsec or arcmin or deg"),
     ],

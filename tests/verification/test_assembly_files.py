@@ -582,10 +582,11 @@ def test_errors_that_cannot_be_meant_are_refused(tmp_path, bx40e, old, new, sent
     assert str(refusal.value) == sentence.replace("FILE", str(tmp_path / "errors.csv"))
 
 
-def test_decimal_commas_are_refused(tmp_path, bx40e):
+def test_decimal_commas_are_read_between_semicolons_and_refused_between_commas(tmp_path, bx40e):
     text = ERRORS.replace(",", ";").replace(".", ",")
+    np.testing.assert_array_equal(errors_of(tmp_path, bx40e, text), errors_of(tmp_path, bx40e, ERRORS))
     with pytest.raises(InputError, match=r"y \[arcsec\] is '-20,5'; allowed is a number with a decimal point"):
-        errors_of(tmp_path, bx40e, text)
+        errors_of(tmp_path, bx40e, ERRORS.replace("-20.5", '"-20,5"'))
 
 
 def test_errors_in_degrees_are_asked_about(tmp_path, bx40e):

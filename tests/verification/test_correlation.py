@@ -207,11 +207,17 @@ def test_files_that_are_no_tables_are_refused(tmp_path):
     with pytest.raises(InputError, match="truncated"):
         load_correlations(whole, SIZES)
     text = tmp_path / "text.csv"
-    for content in (b"", b"\xff\xfe\x00", b"sources,correlation\na b,0.5,too,many\n", b',a,b\na,"1,0.5\n'):
+    for content, sentence in (
+        (b"", "the table is empty; a header and rows are needed"),
+        (b"\xff\xfe\x00", "row 1 looks like UTF-16; save it as CSV UTF-8"),
+        (b"sources,correlation\na b,0.5,too,many\n", "row 2: 4 cells stand under 2 headers; numbers have a decimal"),
+        (b',a,b\na,"1,0.5\n', "row 2: a quotation mark is not closed"),
+        (b",a,b\na,1,0.5\nb,0.5", r"row 3: 2 of 3 cells are there; is the file truncated\?"),
+    ):
         text.write_bytes(content)
-        with pytest.raises(InputError, match=r"truncated|no rows"):
+        with pytest.raises(InputError, match=sentence):
             load_correlations(text, SIZES)
-    text.write_text(",a,b\na,1,0.5\nb,0.5")
+    text.write_text(",a,b\na,1,0.5\nb,0.5\n")
     with pytest.raises(InputError, match=r"row 3 \(b with b\): correlation is ''"):
         load_correlations(text, SIZES)
 

@@ -112,8 +112,8 @@ def test_a_row_without_a_field_that_is_needed_is_refused_by_name():
     [
         ("id,plus,minus,unit,min,max,cost\n", "the table has no rows; one row per source is needed"),
         ("id,id,plus,minus,unit,min,max,cost\na,a,1,-1,mm,1,1,1\n", "the column 'id' is there twice"),
-        ('id,plus,minus,unit,min,max,cost\na,"1,-1,mm,1,1,1\n', "is the file truncated"),
-        ("id,plus,minus,unit,min,max,cost\na,0.1,-0.1,mm,0.1,0.3,1,9\n", "row 2 has 8 cells under 7 headers"),
+        ('id,plus,minus,unit,min,max,cost\na,"1,-1,mm,1,1,1\n', "row 2: a quotation mark is not closed"),
+        ("id,plus,minus,unit,min,max,cost\na,0.1,-0.1,mm,0.1,0.3,1,9\n", "row 2: 8 cells stand under 7 headers"),
         (" \n", "the table is empty"),
     ],
 )

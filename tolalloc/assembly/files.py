@@ -319,11 +319,10 @@ def _columns(table: TextTable) -> list[int]:
     """Return where part, x, y and z stand."""
     units = dict(map(split_header, HEADERS))
     stated = [split_header(header.lower()) for header in table.headers]
-    # Programs that close every row with a separator leave an empty header behind the last.
-    if sorted(name for name, _ in stated if name) != sorted(units):
+    if sorted(name for name, _ in stated) != sorted(units):
         raise InputError.at(table.path, "the header", ", ".join(table.headers), ", ".join(HEADERS))
     for (name, unit), header in zip(stated, table.headers, strict=True):
-        if name and unit != units[name]:
+        if unit != units[name]:
             allowed = f"{units[name]} in square brackets" if units[name] else "none"
             raise InputError.at(table.path, f"the unit of column {header!r}", unit, allowed)
     return [[name for name, _ in stated].index(name) for name in units]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeVar, get_args, get_origin
@@ -21,63 +22,127 @@ DATA = Path(__file__).parent / "data"
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
 
+_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
+"""Number with one decimal sign, whichever."""
+
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+"""Number that is a thousand times as large where the sign separates thousands."""
+
 
 def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
-    """Return the cells of a CSV (UTF-8) or XLSX file as text, the header first, blank rows left out.
+    """Return the cells of a CSV or XLSX file as text, the header first, blank rows left out.
 
-    Every row is filled up to the length of the first.
+    Every row is filled up to the length of the first: Excel leaves out separators behind the last cell.
 
     Raises
     ------
     InputError
-        The file is missing, or no complete table; a row that is longer than the first is an error.
+        The file is missing, no table, or cells stand under no header.
     """
+    rows = _sheet(path) if path.suffix.lower() in (".xlsx", ".xlsm") else _records(path)
+    if not rows:
+        raise InputError(f"{path}: the table is empty; a header and rows are needed.")
+    width = len(rows[0][1])
+    return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
+
+
+def _records(path: Path) -> list[NumberedRow]:
+    """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
+    text = _text(path)
+    lines = ["" if line.startswith("#") else line for line in StringIO(text)]
+    header = next((line for line in lines if line.strip()), "")
+    separator = next((mark for mark in ";\t" if mark in header), ",")
+    rows: list[tuple[str, ...]] = []
     try:
-        rows = _sheet(path) if path.suffix.lower() in (".xlsx", ".xlsm") else _records(path)
+        for record in csv.reader(lines, delimiter=separator, strict=True):
+            rows.append(tuple(cell.strip() for cell in record))
+    except csv.Error as error:
+        raise InputError(
+            f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
+        ) from None
+    hint = "numbers have a decimal point, and " if separator == "," else ""
+    kept = _under_headers(path, rows, f"{hint}cells are separated by {separator!r}")
+    if kept and len(kept[-1][1]) < len(kept[0][1]) and not text.endswith("\n"):
+        number, cells = kept[-1]
+        raise InputError(
+            f"{path}, row {number}: {len(cells)} of {len(kept[0][1])} cells are there; is the file truncated?"
+        )
+    return kept if separator == "," else kept[:1] + _with_decimal_points(path, kept[1:])
+
+
+def _text(path: Path) -> str:
+    """Return the text of a file."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file.") from None
-    except (OSError, zipfile.BadZipFile, KeyError, ValueError, csv.Error) as error:
-        reason = " ".join(str(error).split())
+    except UnicodeDecodeError as error:
+        other = "UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else "Windows-1252 (cp1252)"
+        row = error.object[: error.start].count(b"\n") + 1
         raise InputError(
-            f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? ({reason})."
+            f"{path}: cannot be read as a table in CSV (UTF-8), row {row} looks like {other}; save it as CSV UTF-8."
         ) from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a table in CSV (UTF-8) ({error}).") from None
+
+
+def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> list[NumberedRow]:
+    """Return the rows that are not blank without the columns behind the last header, in which no cell may stand."""
     kept = [(number, cells) for number, cells in enumerate(rows, start=1) if any(cells)]
     if not kept:
-        raise InputError(f"{path}: the table is empty, or the file truncated; a header and rows are needed.")
-    width = len(kept[0][1])
+        return []
+    header = kept[0][1]
+    width = max(at for at, name in enumerate(header, start=1) if name)
     for number, cells in kept:
+        if any(cells[width:]) and len(cells) > len(header):
+            raise InputError(f"{path}, row {number}: {len(cells)} cells stand under {width} headers; {hint}.")
         if any(cells[width:]):
+            at = next(at for at in range(width, len(cells)) if cells[at])
             raise InputError(
-                f"{path}: not a complete table in CSV (UTF-8) or XLSX; is the file truncated? (row {number} has "
-                f"{len(cells)} cells under {width} headers)."
+                f"{path}, row {number}: column {at + 1} has {cells[at]!r} under an empty header; allowed is a name."
             )
-    return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in kept)
+    return [(number, cells[:width]) for number, cells in kept]
 
 
-def _records(path: Path) -> list[tuple[str, ...]]:
-    """Return the records of a CSV file."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        return [tuple(cell.strip() for cell in row) for row in csv.reader(file, strict=True)]
+def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[NumberedRow]:
+    """Return rows whose numbers may have decimal commas with points; refused is what may separate thousands."""
+    decimals = {cell: number for number, cells in rows for cell in cells if _DECIMAL.fullmatch(cell)}
+    if any("," in cell for cell in decimals) and any("." in cell for cell in decimals):
+        for cell, number in decimals.items():
+            if _THOUSANDS.fullmatch(cell):
+                allowed = "decimal commas or decimal points in the whole file, and nothing between thousands"
+                raise InputError.at(f"{path}, row {number}", "a cell", cell, allowed)
+    return [
+        (number, tuple(cell.replace(",", ".") if cell in decimals else cell for cell in cells))
+        for number, cells in rows
+    ]
 
 
-def _sheet(path: Path) -> list[tuple[str, ...]]:
+def _sheet(path: Path) -> list[NumberedRow]:
     """Return the first sheet of a workbook, whole numbers without decimals."""
     from openpyxl import load_workbook
 
-    book = load_workbook(path, read_only=True, data_only=True)
     try:
-        sheet = book.worksheets[0]
-        sheet.reset_dimensions()  # what a program noted there need not be true
-        rows = list(sheet.iter_rows(values_only=True))
-    finally:
-        book.close()
+        book = load_workbook(path, read_only=True, data_only=True)
+        try:
+            sheet = book.worksheets[0]
+            sheet.reset_dimensions()  # what a program noted there need not be true
+            rows = list(sheet.iter_rows(values_only=True))
+        finally:
+            book.close()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file.") from None
+    except (OSError, zipfile.BadZipFile, KeyError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: not a complete workbook (XLSX); is the file truncated? ({reason}).") from None
     whole = ((int(cell) if isinstance(cell, float) and cell.is_integer() else cell for cell in row) for row in rows)
-    return [tuple("" if cell is None else str(cell).strip() for cell in row) for row in whole]
+    texts = [tuple("" if cell is None else str(cell).strip() for cell in row) for row in whole]
+    return _under_headers(path, texts, "each needs one")
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextTable:
-    """Cells of a CSV file as text."""
+    """Cells of a CSV file as text, numbers with a decimal point."""
 
     # Where it was read, and the first line that is not a comment
     path: Path
@@ -88,42 +153,25 @@ class TextTable:
 
 
 def read_text_table(path: Path) -> TextTable:
-    """Return the cells of a CSV file, separated by commas or semicolons; lines that start with # are comments.
+    """Return the cells of a CSV file; lines that start with # are comments.
 
     Raises
     ------
     InputError
         The file is missing, not text, without a row, or a row has too few or too many cells.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a table in CSV (UTF-8) ({error}).") from None
-    numbered = [(row, line) for row, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
-    if len(numbered) < 2:
+    rows = _records(path)
+    if len(rows) < 2:
         raise InputError(f"{path}: the table has no rows; a line of headers and one row or more are needed.")
-    separator = ";" if ";" in numbered[0][1] else ","
-    first, *others = [(row, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))])
-                      for row, line in numbered]  # fmt: skip
-    width = len(first[1])
+    (_, headers), *others = rows
     for row, cells in others:
-        if len(cells) < width:
+        if len(cells) < len(headers):
             raise InputError(
-                f"{path}, row {row}: {len(cells)} of {width} cells are there; the columns must be of equal length, "
-                "and a cell without a number is left empty between its separators."
-            )
-        if any(cells[width:]):  # nothing behind a closing separator is how some programs end their rows
-            raise InputError(
-                f"{path}, row {row}: {len(cells)} cells stand under {width} headers; numbers have a decimal point, and "
-                f"cells are separated by {separator!r}."
+                f"{path}, row {row}: {len(cells)} of {len(headers)} cells are there; the columns must be of equal "
+                "length, and a cell without a number is left empty between its separators."
             )
     return TextTable(
-        path=path,
-        headers=tuple(first[1]),
-        rows=tuple(row for row, _ in others),
-        cells=tuple(tuple(cells[:width]) for _, cells in others),
+        path=path, headers=headers, rows=tuple(row for row, _ in others), cells=tuple(cells for _, cells in others)
     )
 
 
@@ -132,8 +180,12 @@ def split_header(header: str) -> tuple[str, str]:
     match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
     if match is None:
         return header, ""
-    # Both characters for µ and both dots are typed, and look alike.
-    return match[1], match[2].strip().replace("\u03bc", "µ").replace("\u22c5", "·")
+    return match[1], usual_signs(match[2].strip())
+
+
+def usual_signs(unit: str) -> str:
+    """Return a unit with the one µ and the one dot that are meant; others are typed too, and look alike."""
+    return unit.replace("\u03bc", "µ").replace("\u22c5", "·")
 
 
 Row = TypeVar("Row", bound=Record)
@@ -156,16 +208,28 @@ def read_rows(
     stated = [split_header(header) for header in table.headers]
     headers = tuple(name for name, _ in stated)
     require_columns(path, headers, kind)
-    for name, unit in stated:
-        known = units.get(name, unit)
-        if unit and unit != known:
-            raise InputError.at(path, f"the unit of column {name}", unit, f"{known}; numbers are not converted")
+    require_units(path, stated, units)
     rows = []
     for number, texts in zip(table.rows, table.cells, strict=True):
         cells = dict(zip(headers, texts, strict=True))
         place = f"{path}, row {number} ({cells[named_by] or f'no {named_by}'})"
         rows.append((place, validated(kind, typed_cells(kind, cells, place), place)))
     return tuple(rows)
+
+
+def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> None:
+    """Raise if the header of a column states another unit than the one it has, empty where it has none.
+
+    Raises
+    ------
+    InputError
+        The column and its unit.
+    """
+    for name, unit in stated:
+        known = units.get(name, unit)
+        if unit and unit != known:
+            allowed = f"{known}; numbers are not converted" if known else "none"
+            raise InputError.at(path, f"the unit of column {name}", unit, allowed)
 
 
 def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Record]) -> None:
@@ -176,7 +240,9 @@ def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Recor
     InputError, UnknownNameError
         The column.
     """
-    for name in headers:
+    for at, name in enumerate(headers, start=1):
+        if not name:
+            raise InputError(f"{path}: the header of column {at} is empty; allowed is the name of a column.")
         if name not in kind.model_fields:
             raise UnknownNameError.among(path, "column", name, kind.model_fields)
         if headers.count(name) > 1:

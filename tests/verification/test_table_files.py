@@ -1,0 +1,123 @@
+"""Users' tables as spreadsheets write them: separators, decimal commas, and encodings."""
+
+from __future__ import annotations
+
+import csv
+
+import pandas as pd
+import pytest
+
+from tolalloc.drawings.table_file import read_table_file, read_text_table
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.exceptions import InputError, TolallocError
+
+ROWS = (
+    {"id": "a", "nominal": 55.29, "plus": 0.1, "minus": -0.05, "min": 0.02, "max": 0.5, "cost": 3.25, "Cp": 1.1},
+    {"id": "b", "plus": 12.5, "minus": -12.5, "unit": "µm", "min": 2, "max": 50, "cost": 1200, "note": 'Ø 5"; "x", #2'},
+    {"id": "c", "distribution": "mixture", "batches": "0.7:-0.3:0.8 0.3:0.5:0.6", "note": "one\nor two"},
+    {"id": "d", "feature": "pitch", "minus": 0, "spectrum": "1:9.2 2:4.3", "locked": "yes"},
+)
+USUAL = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3}
+FRAME = pd.DataFrame([USUAL | row for row in ROWS])
+HEADER = "id,plus,minus,unit,min,max,cost"
+ROW = "a,0.1,-0.1,mm,0.02,0.5,3"
+
+
+def written(folder, text, encoding="utf-8"):
+    (folder / "t.csv").write_text(text, encoding=encoding)
+    return folder / "t.csv"
+
+
+def refused(path, sentence, read=load_tolerance_table):
+    with pytest.raises(TolallocError, match=sentence) as caught:
+        read(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.fixture
+def sources(tmp_path):
+    FRAME.to_csv(tmp_path / "comma.csv", index=False)
+    return load_tolerance_table(tmp_path / "comma.csv")
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")], ids=repr
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_a_table_is_the_same_whatever_separates_its_cells(separator, decimal, encoding, ending, sources, tmp_path):
+    FRAME.to_csv(
+        tmp_path / "t.csv", index=False, sep=separator, decimal=decimal, encoding=encoding, lineterminator=ending
+    )
+    assert load_tolerance_table(tmp_path / "t.csv") == sources
+
+
+def test_a_table_is_the_same_in_a_workbook(sources, tmp_path):
+    FRAME.to_excel(tmp_path / "t.xlsx", index=False)
+    assert load_tolerance_table(tmp_path / "t.xlsx") == sources
+    assert [source.note for source in sources[1:3]] == ['Ø 5"; "x", #2', "one\nor two"]
+    assert sources[1].zone == pytest.approx(25e-6)
+
+
+def test_comments_blank_rows_and_empty_cells_behind_the_last_column_are_left_out(sources, tmp_path):
+    FRAME.to_csv(tmp_path / "t.csv", index=False, sep=";", quoting=csv.QUOTE_NONNUMERIC)
+    header, *rows = (tmp_path / "t.csv").read_text(encoding="utf-8").split("\n")
+    text = "\n".join(["# it isn't \"closed", f"{header};;", *rows[:2], "", ";;;", "#;", *rows[2:]])
+    assert load_tolerance_table(written(tmp_path, text)) == sources
+    # Excel leaves out the separators behind the last cell of some rows.
+    plain, short = (
+        load_tolerance_table(written(tmp_path, f"{HEADER},grade,note\n{row}\n")) for row in (f"{ROW},,", ROW)
+    )
+    assert plain == short
+
+
+def test_all_tables_are_read_alike(tmp_path):
+    for separator in ";\t":
+        path = written(tmp_path, "# c\nname;x [mm];\n\na;1,5;\nb;-2,5e-3\nc;,5;\n".replace(";", separator))
+        assert [cells for _, cells in read_table_file(path)][1:] == [("a", "1.5"), ("b", "-2.5e-3"), ("c", ".5")]
+        table = read_text_table(path)
+        assert table.headers == ("name", "x [mm]")
+        assert (table.rows, table.cells) == ((4, 5, 6), (("a", "1.5"), ("b", "-2.5e-3"), ("c", ".5")))
+
+
+@pytest.mark.parametrize("read", [read_table_file, read_text_table])
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("name,note\na,5 µm\n".encode("cp1252"), r"row 2 looks like Windows-1252 \(cp1252\); save it as CSV UTF-8\.$"),
+        ("x [µm]\n1\n".encode("utf-16"), r"row 1 looks like UTF-16; save it as CSV UTF-8\.$"),
+        (b"a,b\n1,2,3\n", "row 2: 3 cells stand under 2 headers; numbers have a decimal point, and .* by ','"),
+        (b"a;b\n1;2;3\n", "row 2: 3 cells stand under 2 headers; cells are separated by ';'"),
+        (b"a,b,\n1,2,3\n", "row 2: column 3 has '3' under an empty header; allowed is a name"),
+        (b'a,b\n1,"2\n', "row 2: a quotation mark is not closed"),
+        (b'a,b\n1,2\n"1"x,2\n', "row 3: a quotation mark is not closed, or not doubled within a cell"),
+        (b"a,b\n1,2\n1", r"row 3: 1 of 2 cells are there; is the file truncated\?$"),
+        (
+            b"a;b\n1.234;2\n0,5;3\n",
+            "row 2: a cell is '1.234'; allowed is decimal commas or decimal points in the whole",
+        ),
+        (b"a\tb\n0.5\t2\n1,234\t3\n", "row 3: a cell is '1,234'; allowed is decimal commas or decimal points"),
+    ],
+)
+def test_what_is_no_table_is_refused_in_one_sentence(read, content, sentence, tmp_path):
+    (tmp_path / "t.csv").write_bytes(content)
+    refused(tmp_path / "t.csv", sentence, read)
+
+
+def test_only_files_that_end_within_a_row_are_asked_about_truncation(tmp_path):
+    cases = (f"{HEADER}\n{ROW},9\n", f"{HEADER}\na,0.1\n", f'{HEADER}\n"{ROW}\n', "", f"{HEADER},\n{ROW},x\n")
+    for text in cases:
+        with pytest.raises(InputError) as caught:
+            load_tolerance_table(written(tmp_path, text))
+        assert "truncated" not in str(caught.value)
+    refused(written(tmp_path, f"{HEADER}\n{ROW}"[:-2]), r"row 2: 6 of 7 cells are there; is the file truncated\?")
+
+
+def test_an_empty_header_is_refused_by_its_number(tmp_path):
+    text = f"{HEADER}\n{ROW}\n"
+    refused(written(tmp_path, text.replace(",min,", ",,")), "the header of column 5 is empty; allowed is the name")
+    refused(written(tmp_path, text.replace("id,", " ,")), "the header of column 1 is empty")
+    FRAME.assign(other="x").rename(columns={"other": ""}).to_excel(tmp_path / "t.xlsx", index=False)
+    number = len(FRAME.columns) + 1
+    refused(tmp_path / "t.xlsx", f"row 2: column {number} has 'x' under an empty header; allowed is a name")
