@@ -1,4 +1,4 @@
-"""Users' tables as spreadsheets write them: separators, decimal commas, and encodings."""
+"""Users' tables as spreadsheets write them: separators, decimal commas, encodings and units in headers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import csv
 import pandas as pd
 import pytest
 
+from tolalloc.drawings.fields import COLUMNS, HEADERS
 from tolalloc.drawings.table_file import read_table_file, read_text_table
-from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.exceptions import InputError, TolallocError
 
 ROWS = (
@@ -121,3 +122,49 @@ def test_an_empty_header_is_refused_by_its_number(tmp_path):
     FRAME.assign(other="x").rename(columns={"other": ""}).to_excel(tmp_path / "t.xlsx", index=False)
     number = len(FRAME.columns) + 1
     refused(tmp_path / "t.xlsx", f"row 2: column {number} has 'x' under an empty header; allowed is a name")
+
+
+WRONG = {
+    "": ("[mm]", "none"),
+    "mm": ("[µm]", "mm; numbers are not converted"),
+    "unit": ("[inch]", "unit, where the column unit says it row by row; or µm, um or mm, the same as in all rows"),
+    "-": ("[%]", "-; numbers are not converted"),
+    "half zone": ("[µm]", "half zone; numbers are not converted"),
+    "weight:shift:spread": ("[µm]", "weight:shift:spread; numbers are not converted"),
+    "order:amplitude": ("[µm]", "order:amplitude; numbers are not converted"),
+    "cost units": ("[EUR]", "cost units; numbers are not converted"),
+}
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_header_with_another_unit_is_refused(column, sources, tmp_path):
+    unit, allowed = WRONG[COLUMNS[column].unit]
+    frame = table_frame(sources)
+    for header in (f"{column} {unit}", f"{column}{unit}"):
+        frame.rename(columns={HEADERS[column]: header}).to_csv(tmp_path / "t.csv", index=False)
+        sentence = f"the unit of column {column} is '{unit[1:-1]}'; allowed is {allowed}"
+        refused(tmp_path / "t.csv", sentence)
+    frame.rename(columns={HEADERS[column]: column}).to_csv(tmp_path / "t.csv", index=False)
+    assert load_tolerance_table(tmp_path / "t.csv")[0].name == "a"
+
+
+@pytest.mark.parametrize("column", [name for name, column in COLUMNS.items() if column.unit == "unit"])
+def test_the_header_of_a_zone_states_the_unit_of_all_rows_or_is_refused(column, sources, tmp_path):
+    written_frame = table_frame(sources)
+    written_frame.to_csv(tmp_path / "t.csv", index=False)
+    again = load_tolerance_table(tmp_path / "t.csv")
+    for unit in ("µm", "um", "\u03bcm"):
+        frame = written_frame.rename(columns={HEADERS[column]: f"{column} [{unit}]"})
+        frame.to_csv(tmp_path / "t.csv", index=False)
+        assert load_tolerance_table(tmp_path / "t.csv") == again
+    written_frame.rename(columns={HEADERS[column]: f"{column} [mm]"}).to_csv(tmp_path / "t.csv", index=False)
+    refused(tmp_path / "t.csv", rf"row 2 \(a\): unit is 'µm'; allowed is mm as in the header {column} \[mm\]; numbers")
+
+
+def test_the_unit_of_a_row_is_one_of_three(tmp_path):
+    text = f"{HEADER}\n{ROW}\n"
+    refused(written(tmp_path, text.replace("mm", "cm")), r"row 2 \(a\): unit is 'cm'; allowed is µm, um or mm\.$")
+    micro = text.replace("mm", "um"), text.replace("mm", "\u03bcm")
+    one, other = (load_tolerance_table(written(tmp_path, text)) for text in micro)
+    assert one == other
+    assert one[0].zone == pytest.approx(0.2e-6)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
 from tolalloc.drawings.mixtures import batches_text, parsed_batches
 from tolalloc.drawings.sources import ANGULAR, Source
+from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
 from tolalloc.files import Record
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -27,6 +28,9 @@ _WRITTEN_DECIMALS = 5
 """Decimals of a micrometre that a written table has: half a zone of four decimals [-]."""
 
 UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
+
+ALLOWED_UNITS = "µm, um or mm"
+"""`UNITS` in a sentence."""
 
 Cell = str | int | float | Path | None
 """What a source writes: a flag as yes or no, a path as seen from the table, nothing as an empty cell."""
@@ -64,6 +68,14 @@ def _plus(source: Source) -> float:
     return round(source.middle / MICROMETRE + zone / 2, _WRITTEN_DECIMALS)
 
 
+def _known_unit(text: str) -> str:
+    """Return the unit of a row."""
+    unit = usual_signs(text)
+    if unit not in UNITS:
+        raise ValueError(f"allowed is {ALLOWED_UNITS}")
+    return unit
+
+
 def _micrometres(length: float) -> float:
     """Return a length as a table writes it [µm]."""
     return round(length / MICROMETRE, _WRITTEN_DECIMALS)
@@ -97,7 +109,7 @@ class ToleranceRow(Record):
         ),
     ]
     unit: Annotated[
-        str, Field(pattern="^(µm|um|mm)$"), Column("µm or mm, for plus, minus, min and max", write=lambda _: "µm")
+        str, AfterValidator(_known_unit), Column("µm or mm, for plus, minus, min and max", write=lambda _: "µm")
     ]
     distribution: Annotated[
         Distribution,
@@ -147,9 +159,9 @@ class ToleranceRow(Record):
     process: Annotated[
         str,
         Column(
-            "how the feature is made today: row of a process capability library (`Study.processes`), which then gives "
-            "Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost table; "
-            "with Cp stated, the library need not know it",
+            "how the feature is made today: row of a process capability library (`ta.drawing(processes=)`), which then "
+            "gives Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost "
+            "table; with Cp stated, the library need not know it",
             attribute="process",
         ),
     ] = ""

@@ -10,10 +10,18 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tolalloc.drawings.fields import COLUMNS, HEADERS, Cell, ToleranceRow
+from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, HEADERS, UNITS, Cell, ToleranceRow
 from tolalloc.drawings.process_capability import load_process_capabilities, with_process
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import DATA, read_table_file, require_columns, typed_cells
+from tolalloc.drawings.table_file import (
+    DATA,
+    read_table_file,
+    require_columns,
+    require_units,
+    split_header,
+    typed_cells,
+    usual_signs,
+)
 from tolalloc.exceptions import InputError
 from tolalloc.files import shipped_or_path, validated
 from tolalloc.units import MICROMETRE
@@ -35,12 +43,31 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
     (_, first), *others = read_table_file(path)
-    headers = tuple(header.split(" [")[0].strip() for header in first)
+    stated = [split_header(header) for header in first]
+    headers = tuple(name for name, _ in stated)
     require_columns(path, headers, ToleranceRow)
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    rows = ((number, dict(zip(headers, cells, strict=True))) for number, cells in others)
+    rows = [(number, dict(zip(headers, cells, strict=True))) for number, cells in others]
+    _require_units(path, stated, rows)
     return sources_of_rows(rows, capabilities, str(path), path.parent)
+
+
+def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
+    """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows."""
+    units = {name: column.unit for name, column in COLUMNS.items()}
+    for column, unit in stated:
+        if units[column] != "unit" or unit in ("", "unit"):
+            continue
+        if unit not in UNITS:
+            allowed = f"unit, where the column unit says it row by row; or {ALLOWED_UNITS}, the same as in all rows"
+            raise InputError.at(path, f"the unit of column {column}", unit, allowed)
+        for number, row in rows:
+            if UNITS.get(usual_signs(row["unit"]), UNITS[unit]) != UNITS[unit]:
+                allowed = f"{unit} as in the header {column} [{unit}]; numbers are not converted"
+                raise InputError.at(f"{path}, row {number} ({row['id'] or 'no id'})", "unit", row["unit"], allowed)
+        units[column] = unit
+    require_units(path, stated, units)
 
 
 def sources_of_rows(
