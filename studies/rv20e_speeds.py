@@ -13,7 +13,7 @@ from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
-from tolalloc.rv.dynamics.speeds import Campbell, OrdersAgainstSpeed, campbell, modes, orders_against_speed
+from tolalloc.rv.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
@@ -31,11 +31,11 @@ STEPS = 4680
 MODE_ANGLES = 360
 
 
-def campbell_figure(found: Campbell, load: float) -> Figure:
+def campbell_figure(found: Modes, load: float) -> Figure:
     """Draw the lowest mode's band and the orders over the output speed."""
     speed = np.array([0.0, FASTEST])
     highest = 1.2 * ORDERS[-1] * FASTEST / (2 * np.pi)
-    band = (found.lowest[0], found.highest[0])
+    band = (found.frequency[:, 0].min(), found.frequency[:, 0].max())
     series = [
         Series(label=f"order {order}", kind="line", x=list(speed / RPM), y=list(order * speed / (2 * np.pi)))
         for order in ORDERS
@@ -74,7 +74,7 @@ def speed_figure(found: OrdersAgainstSpeed, load: float) -> Figure:
     )
 
 
-def critical_rows(found: Campbell, load: float) -> list[dict[str, object]]:
+def critical_rows(found: Modes, load: float) -> list[dict[str, object]]:
     """Return the critical speeds of the lowest mode."""
     return [
         {
@@ -84,7 +84,7 @@ def critical_rows(found: Campbell, load: float) -> list[dict[str, object]]:
             "to [rpm]": each.fastest / RPM,
             "carrier's share of the mode [-]": each.carrier_share,
         }
-        for each in found.critical
+        for each in critical_speeds(found, ORDERS, (0.0, FASTEST))
         if each.mode == 0
     ]
 
@@ -101,7 +101,7 @@ def build(quick: bool) -> Document:
     spans: list[dict[str, object]] = []
     for load in LOADS:
         inertia = inertia_of(reducer, output_inertia=load)
-        about = campbell(modes(model, errors[0], TORQUE, inertia, angles), ORDERS, (0.0, FASTEST))
+        about = modes(model, errors[0], TORQUE, inertia, angles)
         found = orders_against_speed(
             model, errors, TORQUE, inertia, DAMPING, generalised_alpha(0.8), speeds, ORDERS, STEPS
         )

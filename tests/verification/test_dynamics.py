@@ -63,7 +63,7 @@ def test_agrees_with_radau(rv20e, table4):
     for integrator in (newmark(), generalised_alpha(0.8)):
         found = run(rv20e, table4, motion, damping, integrator, np.arange(6) * steps // 5)
         assert len(np.unique(found.pins_in_contact, axis=1)[0]) > 1  # contacts open and close on the way
-        for derivative, state in enumerate((found.observed.displacement, found.observed.velocity)):
+        for derivative, state in enumerate((found.displacement, found.velocity)):
             largest = np.abs(expected[:, derivative]).max(axis=0)
             assert (np.abs(state[0] - expected[:, derivative]) <= (1e-6, 2e-5)[derivative] * largest).all()
 
@@ -92,7 +92,7 @@ def test_the_start_is_the_static_equilibrium(rv20e, table4):
 
 def test_average_acceleration_keeps_the_energy(rv20e, free_vibration):
     found, springs, _ = free_vibration
-    state, mass = found.observed, rv20e_mass(rv20e)
+    state, mass = found, rv20e_mass(rv20e)
     rest = springs.energy(state.displacement[0].mean(axis=0))
     kinetic = (mass * state.velocity[0] ** 2).sum(axis=1) / 2
     energy = np.array([springs.energy(q) - rest for q in state.displacement[0]]) + kinetic
@@ -102,7 +102,7 @@ def test_average_acceleration_keeps_the_energy(rv20e, free_vibration):
 def test_frequencies_are_those_of_the_eigenproblem(rv20e, free_vibration):
     """Every mode that moves obeys η(n+1) + η(n−1) = 2cos(ω̃h)·η(n), with tan(ω̃h/2) = ωh/2 for this integrator."""
     found, springs, motion = free_vibration
-    mass, state = rv20e_mass(rv20e), found.observed.displacement[0]
+    mass, state = rv20e_mass(rv20e), found.displacement[0]
     squares, shapes = eigh(springs.hessian(state[0]), np.diag(mass))
     rest = state[0] - np.linalg.solve(springs.hessian(state[0]), springs.gradient(state[0]))
     modes = (state - rest) @ (mass[:, np.newaxis] * shapes)
@@ -125,7 +125,7 @@ def energy_drift(model, errors, steps: int, integrator: Integrator) -> float:
     twin = MovingTwin(reducer, unit, inertia_of(reducer), speed, torque, angle=0.3)
     motion = motion_of(reducer, input_of(reducer, speed), torque, end, steps, 0.3)
     found = run(model, errors, motion, integrator=integrator, observe=np.arange(steps + 1))
-    q, velocity = found.observed.displacement[0], found.observed.velocity[0]
+    q, velocity = found.displacement[0], found.velocity[0]
     kinetic, elastic, power = (np.empty(steps + 1) for _ in range(3))
     for n, time in enumerate(motion.time):
         ahead, here, back = (
@@ -159,7 +159,7 @@ def test_forces_balance_at_every_step_whatever_law_tilt_and_play(seed):
     for number, unit in enumerate(case.units):
         twin = MovingTwin(reducer, unit, inertia, speed, torque, 30.0, 2e-7, float(case.carrier_angle[0]), case.orders)
         for slot, step in enumerate(chosen):
-            time, state = float(motion.time[step]), found.observed
+            time, state = float(motion.time[step]), found
             q, v, a = (part[number, slot] for part in (state.displacement, state.velocity, state.acceleration))
             springs = twin.springs(time)
             forces = springs.forces(q)
@@ -196,7 +196,7 @@ def test_bits_depend_neither_on_threads_nor_on_the_batch(rv20e, table4):
     for name in ("transmission_error", "output_speed", "output_acceleration", "input_torque", "pins_in_contact"):
         np.testing.assert_array_equal(getattr(before, name), getattr(one, name))
         np.testing.assert_array_equal(getattr(before, name)[3:4], getattr(alone, name))
-    np.testing.assert_array_equal(before.observed.pin_forces, one.observed.pin_forces)
+    np.testing.assert_array_equal(before.pin_forces, one.pin_forces)
 
 
 def test_a_failed_sample_is_a_status_and_never_a_number(rv20e, table4):
@@ -205,7 +205,7 @@ def test_a_failed_sample_is_a_status_and_never_a_number(rv20e, table4):
     motion = motion_of(rv20e.reducer, SpeedProfile.constant(10.0), SpeedProfile.constant(-5.0), 1e-3, 10)
     found = run(rv20e, errors, motion, observe=np.array([4]))
     assert (found.status == np.array([[Status.NOT_FINITE], [Status.CONVERGED]])).all()
-    for values in (found.transmission_error, found.output_speed, found.input_torque, found.observed.pin_forces):
+    for values in (found.transmission_error, found.output_speed, found.input_torque, found.pin_forces):
         assert np.isnan(values[0]).all()
         assert np.isfinite(values[1]).all()
     no_torque = motion_of(rv20e.reducer, SpeedProfile.constant(10.0), SpeedProfile.constant(0.0), 1e-3, 10)

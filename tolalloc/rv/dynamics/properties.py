@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -134,8 +135,7 @@ class Damping:
                 raise InputError.at("damping", "interface", name, f"one without play: {', '.join(allowed)}")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Integrator:
+class Integrator(NamedTuple):
     """Constants of a one-step integrator of second order, in the form of Arnold and Brüls (2007).
 
     The equations of motion hold exactly at every step:

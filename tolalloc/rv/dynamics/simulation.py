@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, UInt8, UInt16
 
 from tolalloc.rv.dynamics.motion import Motion
 from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator
-from tolalloc.rv.dynamics.solvers.stepping import Parts, Scheme, State, StepRecord, advance
+from tolalloc.rv.dynamics.solvers.stepping import Parts, State, StepRecord, advance
 from tolalloc.rv.dynamics.tables import Steps
 from tolalloc.rv.equivalent.model import EquivalentModel
 
@@ -20,19 +20,6 @@ Progress = Callable[[float], None]
 
 def _untold(share: float) -> None:
     """Tell nobody."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Observed:
-    """The whole state of every sample at chosen times."""
-
-    time: Float[np.ndarray, " observed"]  # These times [s]
-    # Deviations q from the nominal motion, in the order of `tolalloc.rv.equivalent.kinematics.Coordinates`, and their
-    # derivatives [m, rad, and per s, per s²]
-    displacement: Float[np.ndarray, "sample observed coordinate"]
-    velocity: Float[np.ndarray, "sample observed coordinate"]
-    acceleration: Float[np.ndarray, "sample observed coordinate"]
-    pin_forces: Float[np.ndarray, "sample observed disc pin"]  # Normal force between every pin and every disc [N]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +39,12 @@ class Simulated:
     pins_in_contact: UInt16[np.ndarray, "sample time disc"]
     status: UInt8[np.ndarray, "sample time"]
     residual: Float[np.ndarray, "sample time"]
-    observed: Observed  # The whole state at the times asked for
+    # At the times asked for: deviations q from the nominal motion, in the order of
+    # `tolalloc.rv.equivalent.kinematics.Coordinates`, and their derivatives [m, rad, and per s, per s²]
+    displacement: Float[np.ndarray, "sample observed coordinate"]
+    velocity: Float[np.ndarray, "sample observed coordinate"]
+    acceleration: Float[np.ndarray, "sample observed coordinate"]
+    pin_forces: Float[np.ndarray, "sample observed disc pin"]  # Normal force between every pin and every disc there [N]
 
 
 def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -> StepRecord:
@@ -110,9 +102,9 @@ def simulate(
     parts = Parts(
         steps.mass, steps.retained, rotation, float(scale[rotation]), steps.played_meshes, steps.sun_base_radius
     )
-    scheme = Scheme(integrator.alpha_m, integrator.alpha_f, integrator.beta, integrator.gamma, motion.step)
+    own = (columns.layout, columns.map, model.design, given)
     for first, angles, tables in steps.parts():
-        advance(first, angles, tables, parts, scheme, columns.layout, columns.map, model.design, given, state, record)
+        advance(first, angles, tables, parts, integrator, motion.step, *own, state, record)
         progress((first + len(angles.stiffness)) / motion.time.size)
     return Simulated(
         time=motion.time,
@@ -124,11 +116,8 @@ def simulate(
         pins_in_contact=record.touching,
         status=record.status,
         residual=record.residual,
-        observed=Observed(
-            time=motion.time[chosen],
-            displacement=record.coordinate * scale,
-            velocity=record.velocity * scale,
-            acceleration=record.second * scale,
-            pin_forces=record.pin_force,
-        ),
+        displacement=record.coordinate * scale,
+        velocity=record.velocity * scale,
+        acceleration=record.second * scale,
+        pin_forces=record.pin_force,
     )

@@ -124,21 +124,14 @@ class CriticalSpeed:
     carrier_share: float  # Share of the carrier's rotation in the mode's kinetic energy, mean over the angles [-]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Campbell:
-    """Natural frequencies against the orders that excite them."""
+def critical_speeds(
+    modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]
+) -> tuple[CriticalSpeed, ...]:
+    """Return where orders meet the frequencies of modes, slowest first.
 
-    # Frequency of every mode over the carrier angles [Hz]
-    lowest: Float[np.ndarray, " mode"]
-    highest: Float[np.ndarray, " mode"]
-    critical: tuple[CriticalSpeed, ...]  # Critical speeds inside the range asked for, slowest first
-
-
-def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, float]) -> Campbell:
-    """Return the frequency bands and where orders meet them between a slowest and a fastest output speed [rad/s].
-
-    An order n excites with n·Ω/2π at the output speed Ω. A mode is told by its rank in frequency at every angle, not by
-    its shape; where two frequencies cross over a turn, their bands share the crossing.
+    Looked at are output speeds between a slowest and a fastest one [rad/s]. An order n excites with n·Ω/2π at the
+    output speed Ω. A mode is told by its rank in frequency at every angle, not by its shape; where two frequencies
+    cross over a turn, their bands share the crossing.
 
     Raises
     ------
@@ -147,23 +140,17 @@ def campbell(modes: Modes, orders: tuple[int, ...], output_speeds: tuple[float, 
     """
     if min(orders, default=1) < 1:
         raise InputError.at("speeds", "orders", orders, "1 or more waves per output turn")
-    lowest, highest = modes.frequency.min(axis=0), modes.frequency.max(axis=0)
+    bands = np.stack([modes.frequency.min(axis=0), modes.frequency.max(axis=0)], axis=1)
     share, found = modes.carrier_share.mean(axis=0), []
     for order in orders:
-        for mode, band in enumerate(np.stack([lowest, highest], axis=1)):
+        for mode, band in enumerate(bands):
             slowest, fastest = (float(speed) for speed in 2 * pi * band / order)
             if slowest <= output_speeds[1] and fastest >= output_speeds[0]:
+                carrier = float(share[mode])
                 found.append(
-                    CriticalSpeed(
-                        order=order,
-                        mode=mode,
-                        slowest=slowest,
-                        fastest=fastest,
-                        carrier_share=float(share[mode]),
-                    )
+                    CriticalSpeed(order=order, mode=mode, slowest=slowest, fastest=fastest, carrier_share=carrier)
                 )
-    critical = tuple(sorted(found, key=lambda meeting: (meeting.slowest, meeting.fastest)))
-    return Campbell(lowest=lowest, highest=highest, critical=critical)
+    return tuple(sorted(found, key=lambda meeting: (meeting.slowest, meeting.fastest)))
 
 
 @dataclass(frozen=True, kw_only=True)

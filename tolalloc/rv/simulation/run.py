@@ -106,7 +106,7 @@ def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[fl
         output_acceleration=found.output_acceleration[0],
         transmission_error=found.transmission_error[0],
         input_torque=found.input_torque[0],
-        pin_forces=found.observed.pin_forces[0],
+        pin_forces=found.pin_forces[0],
     )
 
 

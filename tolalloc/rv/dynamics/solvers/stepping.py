@@ -21,16 +21,6 @@ from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sam
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 
 
-class Scheme(NamedTuple):
-    """The integrator with its step, as `tolalloc.rv.dynamics.properties.Integrator` has them [-, s]."""
-
-    alpha_m: float
-    alpha_f: float
-    beta: float
-    gamma: float
-    step: float
-
-
 class Parts(NamedTuple):
     """What is the same at every step.
 
@@ -104,14 +94,14 @@ class StepRecord(NamedTuple):
 
 
 @jit
-def _predict(scheme, x, v, acceleration, algorithmic):
+def _predict(integrator, h, x, v, acceleration, algorithmic):
     """Move the state of one sample to what the next step would be without further displacement."""
-    h, keep = scheme.step, 1.0 / (1.0 - scheme.alpha_f)
+    keep = 1.0 / (1.0 - integrator.alpha_f)
     for i in range(x.size):
         a = algorithmic[i]
-        x[i] += h * v[i] + h * h * (0.5 - scheme.beta) * a
-        v[i] += h * (1.0 - scheme.gamma) * a
-        acceleration[i] = keep * (scheme.alpha_m * a - scheme.alpha_f * acceleration[i])
+        x[i] += h * v[i] + h * h * (0.5 - integrator.beta) * a
+        v[i] += h * (1.0 - integrator.gamma) * a
+        acceleration[i] = keep * (integrator.alpha_m * a - integrator.alpha_f * acceleration[i])
         algorithmic[i] = 0.0
 
 
@@ -214,7 +204,7 @@ def _give_up(s, time, record):
 
 
 @jit
-def _advance_sample(s, first, angles, tables, parts, scheme, layout, mapped, design, errors, state, record):
+def _advance_sample(s, first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record):
     values = np.empty((1, layout.end))
     if not values_of(errors[s : s + 1], 0.0, layout, mapped, values)[0]:
         state.status[s] = NOT_FINITE
@@ -232,7 +222,7 @@ def _advance_sample(s, first, angles, tables, parts, scheme, layout, mapped, des
             for m in range(q.size):
                 q[m] = x[parts.retained[m]]  # where the step is looked for first: where the last one ended
             if time > 0:
-                _predict(scheme, x, v, acceleration, algorithmic)
+                _predict(integrator, step, x, v, acceleration, algorithmic)
             else:  # at the start springs and torque are in balance, so all parts but stay behind the nominal motion
                 acceleration[:] = -tables.acceleration[0]
                 algorithmic[:] = acceleration
@@ -263,9 +253,9 @@ def _advance_sample(s, first, angles, tables, parts, scheme, layout, mapped, des
 
 
 @parallel_jit
-def advance(first, angles, tables, parts, scheme, layout, mapped, design, errors, state, record):
+def advance(first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record):
     """Take all samples through the steps of the tables, the first of which is number ``first``."""
     for s in prange(errors.shape[0]):
         _advance_sample(
-            np.int64(s), first, angles, tables, parts, scheme, layout, mapped, design, errors, state, record
+            np.int64(s), first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record
         )
