@@ -119,8 +119,8 @@ class TransmissionErrorAnswer(Answer):
                 for order, amplitude, phase in self.orders.main(_SHOWN)
             ],
             "outputs": [
-                {"name": output.name, "unit": output.unit, "value": float(output.value(solved)[0])}
-                for output in OUTPUTS
+                {"name": name, "unit": unit, "value": float(value(solved)[0])}
+                for name, (unit, value) in OUTPUTS.items()
             ],
             "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
             "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),

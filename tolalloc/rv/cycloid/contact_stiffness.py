@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp
 
 import numpy as np
@@ -17,17 +16,14 @@ APPROACH = 2.0 / 3.0
 2/3 + ln(16·r·ρ/(2a)²) with Hertz's half width a [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactStiffness:
-    """What `tolalloc.rv.cycloid.solvers.contact_law.pin_force` takes, pin by pin."""
+def contact_stiffness(
+    stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles
+) -> tuple[Float[np.ndarray, "*angles"], Float[np.ndarray, "*angles"]]:
+    """Return what `tolalloc.rv.cycloid.solvers.contact_law.pin_force` takes of pins against the teeth that they meet.
 
-    # Of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]
-    stiffness: Float[np.ndarray, "*angles"]
-    log_length: Float[np.ndarray, "*angles"]  # ln(λ/1 m) of the logarithmic law [-]
-
-
-def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> ContactStiffness:
-    """Return the stiffness of pins against the teeth that they meet."""
+    First of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]. Then ln(λ/1 m)
+    of the logarithmic law [-].
+    """
     contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
     if law == "table2":
         contact = pin_contact_table2(stage, stiffness.pin_contact, pin_angle)
@@ -37,7 +33,7 @@ def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angl
         log_length = log_length + 2.0 * stiffness.pin_contact / stiffness.pin_bending
     else:
         contact = contact / (1.0 + contact / stiffness.pin_bending)
-    return ContactStiffness(stiffness=contact, log_length=log_length)
+    return contact, log_length
 
 
 def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:

@@ -95,11 +95,11 @@ def _iterated(
 def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
     """Return how far pin and tooth at φ0 approach each other under forces [m]."""
     stage, stiffness = reducer.cycloid_stage, reducer.stiffness
-    contact = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
+    contact, log_length = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
     if LAWS[stiffness.pin_contact_law] == LINEAR:
-        return np.asarray(force / contact.stiffness)
-    scale = 2 * contact.stiffness
-    return np.asarray(force / scale * (np.log(scale / force) + contact.log_length))
+        return np.asarray(force / contact)
+    scale = 2 * contact
+    return np.asarray(force / scale * (np.log(scale / force) + log_length))
 
 
 def _balanced(
@@ -110,12 +110,12 @@ def _balanced(
 
     stage, stiffness = discs.reducer.cycloid_stage, discs.reducer.stiffness
     lever = np.asarray(stage.disc_pitch_radius * normals(stage.shortening, pin_angle).lever)
-    contact, closing = contact_stiffness(stage, stiffness, pin_angle), discs.clearance.rotation
+    (contact, log_length), closing = contact_stiffness(stage, stiffness, pin_angle), discs.clearance.rotation
 
     def forces(deflection: float) -> Float[np.ndarray, " pin"]:
         rotation = closing + deflection / stage.disc_pitch_radius
         compression, force = -gap(pin_angle, rotation), np.empty(pin_angle.size)
-        pin_forces(LAWS[stiffness.pin_contact_law], contact.stiffness, contact.log_length, compression, force)
+        pin_forces(LAWS[stiffness.pin_contact_law], contact, log_length, compression, force)
         return force
 
     def surplus(deflection: float) -> float:

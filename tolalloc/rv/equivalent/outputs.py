@@ -12,7 +12,7 @@ from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.pins import PinContact, pin_contact
-from tolalloc.rv.equivalent.solvers.records import SolvedForces, design_of
+from tolalloc.rv.equivalent.solvers.records import design_of
 from tolalloc.rv.equivalent.springs import harmonic_waves
 from tolalloc.units import ARCSECOND
 
@@ -64,7 +64,9 @@ def forces(equilibria: Equilibria) -> Forces:
         equilibria.torque,
         equilibria.status,
         equilibria.retained,
-        SolvedForces(pins, rows, elements),
+        pins,
+        rows,
+        elements,
     )
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 
@@ -110,16 +112,6 @@ class Solved:
         return cls(equilibria=equilibria, forces=forces(equilibria))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Output:
-    """A number per sample."""
-
-    # What it is, and its unit of measurement
-    name: str
-    unit: str
-    value: Callable[[Solved], Float[np.ndarray, " sample"]]  # From a solve, the number of each sample
-
-
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
     """Return the share of all pin force that each disc carries, mean over the turn [-]."""
     total = pins.sum(axis=(1, 3))
@@ -150,18 +142,18 @@ def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
     return np.asarray(load_share(solved.forces.pins).max(axis=1))
 
 
-OUTPUTS = (
-    Output(name="mean transmission error", unit="arcsec", value=_mean),
-    Output(name="pins in contact, least", unit="-", value=_fewest),
-    Output(name="pins in contact, most", unit="-", value=_most),
-    Output(name="largest pin force", unit="N", value=_pin_force),
-    Output(name="largest mesh force", unit="N", value=_interface_force("gear_mesh")),
-    Output(name="largest crank–disc bearing force", unit="N", value=_interface_force("crank_disc_bearing")),
-    Output(name="largest crank–carrier bearing force", unit="N", value=_interface_force("crank_carrier_bearing")),
-    Output(name="largest carrier bearing force", unit="N", value=_interface_force("carrier_bearing")),
-    Output(name="share of the pin force on the most loaded disc", unit="-", value=_largest_share),
-)
-"""Every output of one solve; a new one is one function and one line here."""
+OUTPUTS: dict[str, tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]] = {
+    "mean transmission error": ("arcsec", _mean),
+    "pins in contact, least": ("-", _fewest),
+    "pins in contact, most": ("-", _most),
+    "largest pin force": ("N", _pin_force),
+    "largest mesh force": ("N", _interface_force("gear_mesh")),
+    "largest crank–disc bearing force": ("N", _interface_force("crank_disc_bearing")),
+    "largest crank–carrier bearing force": ("N", _interface_force("crank_carrier_bearing")),
+    "largest carrier bearing force": ("N", _interface_force("carrier_bearing")),
+    "share of the pin force on the most loaded disc": ("-", _largest_share),
+}
+"""Every output of one solve with its unit, a number per sample; a new one is one function and one line here."""
 
 
 def radial_clearance(

@@ -52,7 +52,7 @@ def pin_contact(at: Positions) -> PinContact:
     radius = np.hypot(along, across)
     # Unwrapped, so that a whole pin pitch of crank angle is a whole tooth; rounding must not change the tooth.
     turned = np.arctan2(across, along) - np.arctan2(sine, cosine) + at.pin_direction + direction / teeth
-    contact = contact_stiffness(stage, at.reducer.stiffness, pin_angle)
+    contact, log_length = contact_stiffness(stage, at.reducer.stiffness, pin_angle)
     return PinContact(
         by_disc=np.stack([-np.cos(normal), -np.sin(normal), stage.disc_pitch_radius * into.lever], axis=2),
         by_pin=np.stack([-into.along_radius, -into.across_radius], axis=2),
@@ -65,8 +65,8 @@ def pin_contact(at: Positions) -> PinContact:
         ),
         tooth=np.floor(turned * teeth / (2 * np.pi) + 1e-9).astype(np.int64) % teeth,
         tooth_angle=turned,
-        stiffness=contact.stiffness,
-        log_length=contact.log_length,
+        stiffness=contact,
+        log_length=log_length,
     )
 
 

@@ -94,7 +94,7 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
     ground = ToothProfile(stage=stage, modification=reducer.modification).ground
     angle = Positions(reducer, np.zeros(1)).pin_direction
     deviation = errors.pin[:, 0] + 1j * errors.pin[:, 1]
-    contact = contact_stiffness(stage, stiffness, np.linspace(0.0, np.pi, _TABULATED))
+    contact, log_length = contact_stiffness(stage, stiffness, np.linspace(0.0, np.pi, _TABULATED))
     return Mesh(
         teeth=float(stage.disc_teeth),
         circle=ground.pin_circle_radius,
@@ -106,6 +106,6 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
         angle=angle,
         radius=stage.pin_radius + errors.pin_radius,
         law=LAWS[stiffness.pin_contact_law],
-        stiffness=contact.stiffness,
-        log_length=contact.log_length,
+        stiffness=contact,
+        log_length=log_length,
     )

@@ -52,7 +52,7 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
 
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     solved = Solved.of(model.equilibria(errors, np.copysign(model.reducer.load.rated_torque, torque), _ANGLES))
-    own = [output.value(solved) for output in OUTPUTS if output.name in _FORCES]
+    own = [OUTPUTS[name][1](solved) for name in _FORCES]
     values = np.stack([*own, *_pin_stress(solved)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))
 
@@ -84,7 +84,7 @@ REQUIREMENTS = (
     Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop),
     Reading(
         outputs=(
-            *(f"{output.name}, rated torque [{output.unit}]" for output in OUTPUTS if output.name in _FORCES),
+            *(f"{name}, rated torque [{OUTPUTS[name][0]}]" for name in _FORCES),
             "largest line load, rated torque [N/mm]",
             "peak pressure, rated torque [MPa]",
         ),
@@ -93,10 +93,6 @@ REQUIREMENTS = (
     Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
 )
 """What a requirement may limit: transmission error, torque against twist, load at rated torque, gap at tip and root."""
-
-
-OTHER_OUTPUTS = tuple(name for reading in REQUIREMENTS[1:] for name in reading.outputs)
-"""Names of the outputs besides the peak-to-peak, with their units."""
 
 
 def wave_outputs(order: int) -> tuple[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 from tolalloc.compiled import jit, parallel_jit, prange
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory, solve_anywhere
 from tolalloc.rv.equivalent.solvers.problem import values_of
-from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile
 
 
@@ -22,7 +22,7 @@ def _gain(left, centre, right):
 
 
 @jit
-def _refine(sign, rotation, retained, halving, tables, layout, design, values, memory):
+def _refine(sign, rotation, retained, search, tables, layout, design, values, memory):
     """Return the largest sign·rotation, its position, the error that may be left, solves, and the worst outcome.
 
     ``rotation`` and ``retained`` begin and end one coarse angle outside the turn, so that every angle has two
@@ -30,16 +30,17 @@ def _refine(sign, rotation, retained, halving, tables, layout, design, values, m
     """
     inside = sign * rotation[1:-1]
     best_at = inside.argmax()
-    best, position = inside[best_at], halving.first + best_at * float(halving.stride)
+    first, stride = search.nodes_per_coarse + MARGIN, float(search.nodes_per_coarse)
+    best, position = inside[best_at], first + best_at * stride
     left_over, solves, worst_status, worst_residual = 0.0, 0, CONVERGED, 0.0
     sides, here, at_side = np.empty(2), np.empty(retained.shape[1]), np.empty((2, retained.shape[1]))
     peaks = np.flatnonzero((inside >= sign * rotation[:-2]) & (inside >= sign * rotation[2:]))
     for i in peaks[np.argsort(-inside[peaks])]:
         left, centre, right = sign * rotation[i], inside[i], sign * rotation[i + 2]
-        at, step = halving.first + i * float(halving.stride), float(halving.stride)
+        at, step = first + i * stride, stride
         here[:] = retained[i + 1]
-        for _ in range(halving.levels):
-            if centre + halving.safety * _gain(left, centre, right) <= best and centre < best:
+        for _ in range(search.levels):
+            if centre + search.safety * _gain(left, centre, right) <= best and centre < best:
                 break
             step *= 0.5
             for side in range(2):
@@ -64,14 +65,13 @@ def _refine(sign, rotation, retained, halving, tables, layout, design, values, m
 
 
 @jit
-def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, errors, torque, halving, found):
+def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, errors, torque, search, found):
     a, b = number * samples, min((number + 1) * samples, errors.shape[0])
-    size, angles = tables.load.shape[2], halving.coarse + 2
+    size, angles = tables.load.shape[2], search.coarse + 2
     values = np.empty((b - a, layout.end))
     finite = values_of(errors[a:b], torque, layout, mapped, values)
     memory, turn = make_memory(design.law, tables), make_turn(b - a, angles, size)
-    before = halving.first - halving.stride
-    solve_tile(discs, before, halving.stride, tables, layout, design, values, finite, memory, turn)
+    solve_tile(discs, MARGIN, search.nodes_per_coarse, tables, layout, design, values, finite, memory, turn)
     for s in range(a, b):
         own = s - a
         found.solves[s], found.left_over[s] = angles, 0.0
@@ -83,7 +83,7 @@ def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, er
         for side in range(2):
             sign = 1.0 - 2.0 * side
             best, at, left, count, worst_status, worst_residual = _refine(
-                sign, turn.rotation[own], turn.retained[own], halving, tables, layout, design, values[own], memory
+                sign, turn.rotation[own], turn.retained[own], search, tables, layout, design, values[own], memory
             )
             found.extreme[s, side], found.position[s, side] = sign * best, at
             found.left_over[s] += left
@@ -93,7 +93,7 @@ def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, er
 
 
 @parallel_jit
-def solve_extremes(size, discs, tables, layout, mapped, design, errors, torque, halving, found):
+def solve_extremes(size, discs, tables, layout, mapped, design, errors, torque, search, found):
     """Fill the extremes of every sample."""
     for number in prange((errors.shape[0] + size - 1) // size):
-        _extremes_of_tile(np.int64(number), size, discs, tables, layout, mapped, design, errors, torque, halving, found)
+        _extremes_of_tile(np.int64(number), size, discs, tables, layout, mapped, design, errors, torque, search, found)

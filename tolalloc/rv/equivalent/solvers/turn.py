@@ -140,11 +140,9 @@ def solve_curves(size, discs, first, stride, tables, layout, mapped, design, err
 
 
 @jit
-def _forces_of_sample(s, tables, layout, mapped, design, errors, torque, turn_status, turn_retained, out):
-    status, retained = turn_status[s], turn_retained[s]
-    pins, rows, elements = out.pins[s], out.rows[s], out.elements[s]
+def _forces_of_sample(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
     own = np.empty((1, layout.end))
-    values_of(errors[s : s + 1], torque, layout, mapped, own)
+    values_of(errors, torque, layout, mapped, own)
     values = own[0]
     memory = make_memory(design.law, tables)
     problem_memory, work = memory[0], memory[1]
@@ -175,7 +173,20 @@ def _forces_of_sample(s, tables, layout, mapped, design, errors, torque, turn_st
 
 
 @parallel_jit
-def solve_forces(tables, layout, mapped, design, errors, torque, status, retained, out):
-    """Fill the forces of all samples at all nodes of the tables."""
-    for s in prange(errors.shape[0]):
-        _forces_of_sample(np.int64(s), tables, layout, mapped, design, errors, torque, status, retained, out)
+def solve_forces(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
+    """Fill the forces of all samples at all nodes of the tables, those of `tolalloc.rv.equivalent.outputs.Forces`."""
+    for number in prange(errors.shape[0]):
+        s = np.int64(number)
+        _forces_of_sample(
+            tables,
+            layout,
+            mapped,
+            design,
+            errors[s : s + 1],
+            torque,
+            status[s],
+            retained[s],
+            pins[s],
+            rows[s],
+            elements[s],
+        )
