@@ -39,8 +39,6 @@ class LoadedContact:
     torque: Float[np.ndarray, "phase disc"]
     # First and last angle at which a pin would carry; where two places touch first, pins between may be free [rad]
     zone: Float[np.ndarray, "phase 2"]
-    iterations: int  # Steps of Li Lixing's iteration; 0 where a bracket was searched [-]
-    exact: bool  # Whether the clearances are exact distances
 
     @property
     def pins_in_contact(self) -> Int[np.ndarray, "phase disc"]:
@@ -142,6 +140,4 @@ def loaded(
         pressure=peak_pressure(stage, reducer.contact_modulus, angles, force),
         torque=stage.disc_pitch_radius * (lever * force).sum(axis=2),
         zone=_zones(gap, rotations, closed.first_contact),
-        iterations=0,
-        exact=closed.exact,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -60,21 +59,21 @@ def pressed_linear(
                 f"{discs.reducer.name}: a deflection of {deflection / MICROMETRE:.3g} µm reaches no pin; "
                 f"allowed is above {nearest.max() / MICROMETRE:.3g} µm."
             )
-        depth, steps = np.full(phase.size, deflection), 0
+        depth = np.full(phase.size, deflection)
         method = "Li Lixing's linear method, deflection given"
     else:
-        depth, steps = _iterated(discs, nearest, largest_force)
+        depth = _iterated(discs, nearest, largest_force)
         method = "Li Lixing's linear method"
     force = largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth)
-    return replace(loaded(discs, method, phase, depth, force), iterations=steps)
+    return loaded(discs, method, phase, depth, force)
 
 
 def _iterated(
     discs: PressedDiscs,
     nearest: Float[np.ndarray, " phase"],
     largest_force: Callable[[Float[np.ndarray, " phase"]], Float[np.ndarray, " phase"]],
-) -> tuple[Float[np.ndarray, " phase"], int]:
-    """Return the deflections that are the approach under their own largest force [m], and the steps it took.
+) -> Float[np.ndarray, " phase"]:
+    """Return the deflections that are the approach under their own largest force [m].
 
     The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
     middle of what brackets the answer where that mean leaves it and at every third step, as the mean may creep.
@@ -85,7 +84,7 @@ def _iterated(
     for step in range(1, _ITERATIONS + 1):
         wanted = _approach(discs.reducer, largest_force(depth))
         if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
-            return depth, step
+            return depth
         low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
         mean, middle = 0.5 * (depth + wanted), 0.5 * (low + np.minimum(high, 4 * depth))
         depth = np.where((low < mean) & (mean < high) & (step % 3 != 0), mean, middle)
