@@ -22,30 +22,14 @@ from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 
 
 class Parts(NamedTuple):
-    """What is the same at every step.
+    """What is the same at every step."""
 
-    Parameters
-    ----------
-    mass
-        Of every coordinate [kg].
-    retained
-        Which coordinates pins and play touch [-].
-    carrier
-        Which coordinate is the carrier's rotation [-].
-    carrier_scale
-        Its rotation per length [rad/m].
-    played_meshes
-        Number of meshes with play, the first of the elements with play [-].
-    sun_base_radius
-        Lever of the mesh forces on the sun [m].
-    """
-
-    mass: Float[np.ndarray, " coordinate"]
-    retained: Int[np.ndarray, " retained"]
-    carrier: int
-    carrier_scale: float
-    played_meshes: int
-    sun_base_radius: float
+    mass: Float[np.ndarray, " coordinate"]  # Of every coordinate [kg]
+    retained: Int[np.ndarray, " retained"]  # Which coordinates pins and play touch [-]
+    carrier: int  # Which coordinate is the carrier's rotation [-]
+    carrier_scale: float  # Its rotation per length [rad/m]
+    played_meshes: int  # Number of meshes with play, the first of the elements with play [-]
+    sun_base_radius: float  # Lever of the mesh forces on the sun [m]
 
 
 class State(NamedTuple):
@@ -59,38 +43,23 @@ class State(NamedTuple):
 
 
 class StepRecord(NamedTuple):
-    """What the steps leave, filled in by `advance`.
+    """What the steps leave, filled in by `advance`."""
 
-    Parameters
-    ----------
-    rotation, speed, acceleration
-        Of the carrier, beyond the nominal ones [rad, rad/s, rad/s²].
-    input_torque
-        Torque that the meshes ask of the sun [N·m].
-    touching
-        Pins in contact [-].
-    status, residual
-        Outcome; unbalanced force over the largest force [-].
-    slot
-        Place of each step among the observed ones, −1 for none [-].
-    coordinate, velocity, second
-        All coordinates and their derivatives at the observed steps [m, m/s, m/s²].
-    pin_force
-        Force of every pin there [N].
-    """
-
+    # Of the carrier, beyond the nominal ones [rad, rad/s, rad/s²]
     rotation: Float[np.ndarray, "sample time"]
     speed: Float[np.ndarray, "sample time"]
     acceleration: Float[np.ndarray, "sample time"]
-    input_torque: Float[np.ndarray, "sample time"]
-    touching: UInt16[np.ndarray, "sample time disc"]
+    input_torque: Float[np.ndarray, "sample time"]  # Torque that the meshes ask of the sun [N·m]
+    touching: UInt16[np.ndarray, "sample time disc"]  # Pins in contact [-]
+    # Outcome; unbalanced force over the largest force [-]
     status: UInt8[np.ndarray, "sample time"]
     residual: Float[np.ndarray, "sample time"]
-    slot: Int[np.ndarray, " time"]
+    slot: Int[np.ndarray, " time"]  # Place of each step among the observed ones, −1 for none [-]
+    # All coordinates and their derivatives at the observed steps [m, m/s, m/s²]
     coordinate: Float[np.ndarray, "sample observed coordinate"]
     velocity: Float[np.ndarray, "sample observed coordinate"]
     second: Float[np.ndarray, "sample observed coordinate"]
-    pin_force: Float[np.ndarray, "sample observed disc pin"]
+    pin_force: Float[np.ndarray, "sample observed disc pin"]  # Force of every pin there [N]
 
 
 @jit

@@ -12,34 +12,23 @@ from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 
 
 class Problem(NamedTuple):
-    """One sample at one angle, in the retained coordinates; the discs' come first.
+    """One sample at one angle, in the retained coordinates; the discs' come first."""
 
-    Parameters
-    ----------
-    law
-        One of `tolalloc.rv.cycloid.solvers.LAWS` [-].
-    stiffness, force
-        S [N/m] and f [N].
-    by_disc, undisturbed
-        D [m/m] and compression h at undisplaced discs [m].
-    contact, log_length, half_tilt
-        Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m].
-    play_by_retained, play_offset
-        Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m].
-    play_stiffness, clearance
-        Stiffness [N/m] and clearance [m] of every element with play.
-    """
-
-    law: int
+    law: int  # One of `tolalloc.rv.cycloid.solvers.LAWS` [-]
+    # S [N/m] and f [N]
     stiffness: Float[np.ndarray, "retained retained"]
     force: Float[np.ndarray, " retained"]
+    # D [m/m] and compression h at undisplaced discs [m]
     by_disc: Float[np.ndarray, "disc 3 pin"]
     undisturbed: Float[np.ndarray, " contact"]
+    # Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m]
     contact: Float[np.ndarray, " contact"]
     log_length: Float[np.ndarray, " contact"]
     half_tilt: Float[np.ndarray, " contact"]
+    # Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m]
     play_by_retained: Float[np.ndarray, "element 2 retained"]
     play_offset: Float[np.ndarray, "element 2"]
+    # Stiffness [N/m] and clearance [m] of every element with play
     play_stiffness: Float[np.ndarray, " element"]
     clearance: Float[np.ndarray, " element"]
 

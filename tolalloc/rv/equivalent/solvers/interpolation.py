@@ -15,20 +15,11 @@ from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sam
 
 
 class Nodes(NamedTuple):
-    """Loads of one sample at the four nodes around two neighbouring intervals, kept while the search stays there.
+    """Loads of one sample at the four nodes around two neighbouring intervals, kept while the search stays there."""
 
-    Parameters
-    ----------
-    first
-        First of the four nodes, per slot; −1 for an empty one [-].
-    rotation
-        Carrier rotation at fixed discs [rad].
-    force, undisturbed, play_offset
-        As in `Problem` [N, m, m].
-    """
-
-    first: Int[np.ndarray, "2"]
-    rotation: Float[np.ndarray, "2 4"]
+    first: Int[np.ndarray, "2"]  # First of the four nodes, per slot; −1 for an empty one [-]
+    rotation: Float[np.ndarray, "2 4"]  # Carrier rotation at fixed discs [rad]
+    # As in `Problem` [N, m, m]
     force: Float[np.ndarray, "2 4 retained"]
     undisturbed: Float[np.ndarray, "2 4 contact"]
     play_offset: Float[np.ndarray, "2 4 element 2"]

@@ -16,18 +16,10 @@ CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
 
 
 class SolverDesign(NamedTuple):
-    """What a reducer is to the solvers, next to its tables.
+    """What a reducer is to the solvers, next to its tables."""
 
-    Parameters
-    ----------
-    law
-        `tolalloc.rv.cycloid.solvers.LAWS` [-].
-    face_width
-        Loaded width of a disc [m].
-    """
-
-    law: int
-    face_width: float
+    law: int  # `tolalloc.rv.cycloid.solvers.LAWS` [-]
+    face_width: float  # Loaded width of a disc [m]
 
 
 def design_of(reducer: Reducer) -> SolverDesign:
@@ -68,69 +60,36 @@ class AngleSearch(NamedTuple):
 
 
 class SolvedTurn(NamedTuple):
-    """Equilibria of samples over angles, filled in by the solvers.
+    """Equilibria of samples over angles, filled in by the solvers."""
 
-    Parameters
-    ----------
-    rotation
-        Carrier rotation [rad].
-    retained
-        Retained coordinates at equilibrium [m].
-    status, residual, touching
-        Outcome, residual over the largest force, pins in contact [-].
-    """
-
-    rotation: Float[np.ndarray, "sample angle"]
-    retained: Float[np.ndarray, "sample angle coordinate"]
+    rotation: Float[np.ndarray, "sample angle"]  # Carrier rotation [rad]
+    retained: Float[np.ndarray, "sample angle coordinate"]  # Retained coordinates at equilibrium [m]
+    # Outcome, residual over the largest force, pins in contact [-]
     status: UInt8[np.ndarray, "sample angle"]
     residual: Float[np.ndarray, "sample angle"]
     touching: UInt16[np.ndarray, "sample angle"]
 
 
 class SolvedExtremes(NamedTuple):
-    """Extremes of samples, filled in by `solve_extremes`.
+    """Extremes of samples, filled in by `solve_extremes`."""
 
-    Parameters
-    ----------
-    extreme
-        Largest and smallest carrier rotation [rad].
-    position
-        Where they are, counted in nodes [-].
-    left_over
-        What finer angles may add to their difference [rad].
-    solves
-        Equilibria solved [-].
-    status, residual
-        Worst outcome, and largest residual over the largest force [-].
-    """
-
-    extreme: Float[np.ndarray, "sample 2"]
-    position: Float[np.ndarray, "sample 2"]
-    left_over: Float[np.ndarray, " sample"]
-    solves: Int[np.ndarray, " sample"]
+    extreme: Float[np.ndarray, "sample 2"]  # Largest and smallest carrier rotation [rad]
+    position: Float[np.ndarray, "sample 2"]  # Where they are, counted in nodes [-]
+    left_over: Float[np.ndarray, " sample"]  # What finer angles may add to their difference [rad]
+    solves: Int[np.ndarray, " sample"]  # Equilibria solved [-]
+    # Worst outcome, and largest residual over the largest force [-]
     status: UInt8[np.ndarray, " sample"]
     residual: Float[np.ndarray, " sample"]
 
 
 class SolvedDerivatives(NamedTuple):
-    """Derivatives, filled in by the solvers.
+    """Derivatives, filled in by the solvers."""
 
-    Parameters
-    ----------
-    rotation
-        What is derived: the carrier rotation, for a peak-to-peak the weighted branches together [rad].
-    by_value
-        By every value of `tolalloc.rv.equivalent.columns.Layout` [rad/m, rad/(N·m), rad/rad].
-    by_row
-        By the stiffness of every bilateral row, then of every element with play [rad/(N/m)].
-    by_pin
-        By the relative change of all pin contact stiffnesses together [rad].
-    status
-        Worst outcome of the equilibria [-].
-    """
-
+    # What is derived: the carrier rotation, for a peak-to-peak the weighted branches together [rad]
     rotation: Float[np.ndarray, " sample"]
+    # By every value of `tolalloc.rv.equivalent.columns.Layout` [rad/m, rad/(N·m), rad/rad]
     by_value: Float[np.ndarray, "sample value"]
+    # By the stiffness of every bilateral row, then of every element with play [rad/(N/m)]
     by_row: Float[np.ndarray, "sample row"]
-    by_pin: Float[np.ndarray, " sample"]
-    status: UInt8[np.ndarray, " sample"]
+    by_pin: Float[np.ndarray, " sample"]  # By the relative change of all pin contact stiffnesses together [rad]
+    status: UInt8[np.ndarray, " sample"]  # Worst outcome of the equilibria [-]

@@ -18,37 +18,25 @@ FOUR = 4 * WIDTH
 
 
 class Tile(NamedTuple):
-    """Loads, state and work space of a tile; samples are the last axis, so that a register holds eight of them.
+    """Loads, state and work space of a tile; samples are the last axis, so that a register holds eight of them."""
 
-    Parameters
-    ----------
-    values
-        What the tables take, `tolalloc.rv.equivalent.columns.Layout` [m, rad, N·m].
-    undisturbed, force, rotation
-        Pin compressions [m], forces on the discs [N] and carrier rotation [rad] at undisplaced discs.
-    q, last
-        Coordinates of the discs: guess, then equilibrium, and the equilibrium at the last angle [m].
-    ratio, touching
-        Residual over the largest force; pins in contact [-].
-    weighted
-        k·d of every contact at this angle [N/m].
-    pins, stiffness
-        Of one register's samples: sums over the pressed contacts of each disc, of forces [N] and of k·d_i·d_j [N/m].
-    gradient, step
-        The same: unbalanced force, Newton's step [N, m].
-    """
-
+    # What the tables take, `tolalloc.rv.equivalent.columns.Layout` [m, rad, N·m]
     values: Float[np.ndarray, "value sample"]
+    # Pin compressions [m], forces on the discs [N] and carrier rotation [rad] at undisplaced discs
     undisturbed: Float[np.ndarray, "contact sample"]
     force: Float[np.ndarray, "coordinate sample"]
     rotation: Float[np.ndarray, " sample"]
+    # Coordinates of the discs: guess, then equilibrium, and the equilibrium at the last angle [m]
     q: Float[np.ndarray, "coordinate sample"]
     last: Float[np.ndarray, "coordinate sample"]
+    # Residual over the largest force; pins in contact [-]
     ratio: Float[np.ndarray, " sample"]
     touching: Float[np.ndarray, " sample"]
-    weighted: Float[np.ndarray, "3 contact"]
+    weighted: Float[np.ndarray, "3 contact"]  # k·d of every contact at this angle [N/m]
+    # Of one register's samples: sums over the pressed contacts of each disc, of forces [N] and of k·d_i·d_j [N/m]
     pins: Float[np.ndarray, "coordinate 8"]
     stiffness: Float[np.ndarray, "entry 8"]
+    # The same: unbalanced force, Newton's step [N, m]
     gradient: Float[np.ndarray, "coordinate 8"]
     step: Float[np.ndarray, "coordinate 8"]
 

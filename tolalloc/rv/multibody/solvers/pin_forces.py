@@ -11,37 +11,19 @@ from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 
 
 class Mesh(NamedTuple):
-    """Teeth and pins.
+    """Teeth and pins."""
 
-    Parameters
-    ----------
-    teeth
-        Teeth of a disc [-].
-    circle, pin, eccentricity
-        Pin circle radius, pin radius and eccentricity of the grinding [m].
-    offset
-        Angle of the middle of a root on each disc [rad].
-    place
-        x + iy of the pins in the housing, [pin] [m].
-    angle
-        Their nominal directions, [pin] [rad].
-    radius
-        Their radii, [pin] [m].
-    law
-        One of `tolalloc.rv.cycloid.solvers.LAWS` [-].
-    stiffness, log_length
-        What its contacts take at equally spaced angles of a pin from the crank direction, 0 to π [N/m, -].
-    """
-
-    teeth: float
+    teeth: float  # Teeth of a disc [-]
+    # Pin circle radius, pin radius and eccentricity of the grinding [m]
     circle: float
     pin: float
     eccentricity: float
-    offset: np.ndarray
-    place: np.ndarray
-    angle: np.ndarray
-    radius: np.ndarray
-    law: int
+    offset: np.ndarray  # Angle of the middle of a root on each disc [rad]
+    place: np.ndarray  # x + iy of the pins in the housing, [pin] [m]
+    angle: np.ndarray  # Their nominal directions, [pin] [rad]
+    radius: np.ndarray  # Their radii, [pin] [m]
+    law: int  # One of `tolalloc.rv.cycloid.solvers.LAWS` [-]
+    # What its contacts take at equally spaced angles of a pin from the crank direction, 0 to π [N/m, -]
     stiffness: np.ndarray
     log_length: np.ndarray
 
