@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -27,16 +26,6 @@ def with_rigid_bearings(reducer: Reducer) -> Reducer:
     return replace(reducer, stiffness=rigid)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Prototype:
-    """The assembled system and where its answers are read."""
-
-    system: Any  # Of the engine, assembled
-    parts: list[tuple[Any, Any]]  # Sensors of places and of speeds: carrier, cranks, discs
-    carrier_acceleration: Any  # Sensor of the carrier's accelerations
-    gears: list[Any]  # Sensors of the moments that the first stage puts on the cranks
-
-
 def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
     """Return the centres of carrier, cranks and discs at the carrier angle 0 [m]."""
     at = Positions(reducer, np.zeros(1))
@@ -55,7 +44,7 @@ def assemble(
     mesh: Mesh,
     speed: TimeCourse,
     torque: TimeCourse,
-) -> Prototype:
+) -> System:
     """Return a reducer in the engine, at rest at the carrier angle 0."""
     exudyn, bearings = engine(), damping.stiffness_proportional
     new = System(exudyn, exudyn.SystemContainer().AddSystem())
@@ -82,7 +71,7 @@ def assemble(
     new.pin_contacts([node for node, _ in discs], reference, mesh)
     new.output(reducer, carrier_rotation, speed, torque, damping.mass_proportional * inertia.carrier_moment)
     nodes = [node for node, _ in (carrier, *cranks, *discs)]
-    parts = [(new.sensor(node, "Coordinates"), new.sensor(node, "Coordinates_t")) for node in nodes]
+    parts = tuple((new.sensor(node, "Coordinates"), new.sensor(node, "Coordinates_t")) for node in nodes)
     acceleration = new.sensor(carrier[0], "Coordinates_tt")
     new.content.Assemble()
-    return Prototype(system=new.content, parts=parts, carrier_acceleration=acceleration, gears=gears)
+    return replace(new, parts=parts, carrier_acceleration=acceleration, gears=tuple(gears))

@@ -13,9 +13,9 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.dynamics.properties import Damping, Inertia
 from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
-from tolalloc.rv.multibody.prototype import Prototype, assemble, reference_places
+from tolalloc.rv.multibody.prototype import assemble, reference_places
 from tolalloc.rv.multibody.solvers.pin_forces import Mesh, fill_pin_forces
-from tolalloc.rv.multibody.system import engine
+from tolalloc.rv.multibody.system import System, engine
 from tolalloc.rv.reducer.design import Reducer
 
 
@@ -104,16 +104,16 @@ def _settings(steps: TimeSteps) -> Any:
     return settings
 
 
-def _run(prototype: Prototype, steps: TimeSteps, progress: Progress) -> None:
+def _run(prototype: System, steps: TimeSteps, progress: Progress) -> None:
     def before_step(_system: Any, time: float) -> bool:
         progress(min(time / steps.duration, 1.0))
         return True
 
-    prototype.system.SetPreStepUserFunction(before_step)
+    prototype.content.SetPreStepUserFunction(before_step)
     exudyn = engine()
     exudyn.config.printToConsole = False  # its remarks are for those who build its models
     try:
-        prototype.system.SolveDynamic(_settings(steps), showHints=False)
+        prototype.content.SolveDynamic(_settings(steps), showHints=False)
     except exudyn.SolverError as failed:
         raise SolveError(
             "virtual prototype: the multibody engine found no solution of a time step; a shorter step may help."
@@ -124,9 +124,9 @@ def _run(prototype: Prototype, steps: TimeSteps, progress: Progress) -> None:
 
 
 def _answer(
-    prototype: Prototype, reducer: Reducer, inertia: Inertia, mesh: Mesh, sun_speed: TimeCourse, load: TimeCourse
+    prototype: System, reducer: Reducer, inertia: Inertia, mesh: Mesh, sun_speed: TimeCourse, load: TimeCourse
 ) -> PrototypeAnswer:
-    stored = prototype.system.GetSensorStoredData
+    stored = prototype.content.GetSensorStoredData
     time = stored(prototype.carrier_acceleration)[:, 0]
     moved, speed = (np.stack([stored(part[kind])[:, 1:] for part in prototype.parts], axis=1) for kind in (0, 1))
     first_disc = 1 + reducer.crank_count

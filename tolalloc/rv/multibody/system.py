@@ -33,10 +33,13 @@ def engine() -> Any:
 
 @dataclass(frozen=True)
 class System:
-    """A system of the engine under construction."""
+    """A system of the engine, and where its answers are read once it is assembled."""
 
     engine: Any  # Module of the engine
     content: Any  # What the engine solves
+    parts: tuple[tuple[Any, Any], ...] = ()  # Sensors of places and of speeds: carrier, cranks, discs
+    carrier_acceleration: Any = None  # Sensor of the carrier's accelerations
+    gears: tuple[Any, ...] = ()  # Sensors of the moments that the first stage puts on the cranks
 
     def body(self, place: Float[np.ndarray, " 2"], mass: float, inertia: float) -> tuple[Any, Any]:
         """Add a rigid body with its centre at a place; return its node and itself."""
