@@ -114,13 +114,10 @@ class ReducerChoice:
 
     reducer: Reducer  # The reducer with the stiffness in use
     identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
-    # Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m]
+    # As in `tolalloc.reducer` [N·m, µm, µm]
     torque: float | None = None
-    # Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
-    # as they are unless given [µm]
     flank_clearance: tuple[float, float] | None = None
     radial_clearance: tuple[float, float] | None = None
-    # Sources that a drawing may leave out, taken as zero; ``*`` stands for anything
     neglected: tuple[str, ...] = NEGLECTED
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
 
