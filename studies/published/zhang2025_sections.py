@@ -26,7 +26,8 @@ from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.equivalent.line_load import contact_pattern
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MICROMETRE

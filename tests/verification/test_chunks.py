@@ -10,7 +10,8 @@ import numpy as np
 
 from tests.random_units import random_units
 from tolalloc import chunks
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.response.kernel import KernelResponse
 
 

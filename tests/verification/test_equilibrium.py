@@ -18,7 +18,8 @@ from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.units import ARCSECOND
 
 CASES = 200

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.random_units import random_units
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.units import ARCSECOND
 
 

@@ -16,8 +16,9 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models import Response
 from tolalloc.rv.equivalent.line_load import peak_line_load
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 

@@ -14,8 +14,9 @@ from tolalloc.rv.equivalent.attribution import attribute
 from tolalloc.rv.equivalent.condensation import spring_groups
 from tolalloc.rv.equivalent.hysteresis import BACKLASH, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.reducer.design import Clearances
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND

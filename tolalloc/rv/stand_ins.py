@@ -11,7 +11,8 @@ from numpy.polynomial import polynomial
 
 from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation, Response
-from tolalloc.rv.equivalent.model import AngleSearch, EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCSECOND
 

@@ -84,7 +84,7 @@ def _iterated(
     for step in range(1, _ITERATIONS + 1):
         wanted = _approach(discs.reducer, largest_force(depth))
         if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
-            return depth
+            return np.asarray(depth)
         low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
         mean, middle = 0.5 * (depth + wanted), 0.5 * (low + np.minimum(high, 4 * depth))
         depth = np.where((low < mean) & (mean < high) & (step % 3 != 0), mean, middle)
