@@ -66,6 +66,10 @@ def calibrated(rigid):
     return answer, answer.time > 1.6
 
 
+def carrying(answer) -> np.ndarray:
+    return (answer.pin_forces > 0).sum(axis=2)
+
+
 def test_ratio_and_speeds(calibrated):
     answer, steady = calibrated
     assert answer.time[-1] == pytest.approx(2.0)
@@ -79,7 +83,8 @@ def test_ratio_and_speeds(calibrated):
 
 def test_power_closes(calibrated):
     answer, steady = calibrated
-    given, taken = answer.input_power[steady].mean(), answer.output_power[steady].mean()
+    given = (answer.input_torque * answer.input_speed)[steady].mean()
+    taken = -(answer.output_torque * answer.output_speed)[steady].mean()
     assert taken == pytest.approx(572.0 * SPEED / 81.0, rel=1e-3)
     assert given == pytest.approx(taken, rel=1e-3)
     assert np.ptp(answer.kinetic_energy[steady]) < 1e-3 * answer.kinetic_energy[steady].mean()
@@ -87,7 +92,7 @@ def test_power_closes(calibrated):
 
 def test_sixteen_teeth_carry_with_the_compliance_of_the_source(calibrated):
     answer, steady = calibrated
-    assert set(np.unique(answer.pins_in_contact[steady])) == {16, 17}
+    assert set(np.unique(carrying(answer)[steady])) == {16, 17}
 
 
 def exact_equilibrium(reducer: Reducer, sun_angle: float, torque: float):
@@ -120,7 +125,7 @@ def test_steady_run_passes_through_exact_equilibria(calibrated, rigid):
     assert abs(off.mean()) < 0.02
     assert off.std() < 0.03
     np.testing.assert_allclose(answer.pin_forces[late], pins, rtol=0, atol=0.003 * pins.max())
-    np.testing.assert_array_equal(answer.pins_in_contact[late], (pins > 0).sum(axis=2))
+    np.testing.assert_array_equal(carrying(answer)[late], (pins > 0).sum(axis=2))
 
 
 def static(reducer: Reducer, carrier_angle: np.ndarray, torque: float, errors=None):
@@ -142,7 +147,7 @@ def test_equivalent_model_agrees_where_its_gaps_are_exact(rigid):
     assert abs((answer.transmission_error[late] - error).mean()) < 0.02 * ARCSECOND
     at = -1
     np.testing.assert_allclose(answer.pin_forces[late[at]], pins[at], rtol=0, atol=0.01 * pins[at].max())
-    np.testing.assert_array_equal(answer.pins_in_contact[late[at]], (pins[at] > 0).sum(axis=1))
+    np.testing.assert_array_equal(carrying(answer)[late[at]], (pins[at] > 0).sum(axis=1))
 
 
 def test_bearings_yield_as_in_the_equivalent_model(rigid):
@@ -179,7 +184,7 @@ def test_an_ideal_first_stage_does_not_feel_that_planets_yield(rigid):
 
 def test_hertzian_line_contact_of_the_preset(rigid):
     answer, late = brief_run(with_stiffness(rigid, pin_contact_law="logarithmic"), -572.0)
-    assert set(np.unique(answer.pins_in_contact[late])) == {8, 9}
+    assert set(np.unique(carrying(answer)[late])) == {8, 9}
     error, _ = static(with_stiffness(rigid, pin_contact_law="logarithmic"), answer.input_angle[late] / 81, -572.0)
     assert abs((answer.transmission_error[late] - error).mean()) < 0.1 * ARCSECOND
 

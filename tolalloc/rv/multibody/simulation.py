@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.dynamics.properties import Damping, Inertia
@@ -36,21 +36,6 @@ class PrototypeAnswer:
     output_torque: Float[np.ndarray, " time"]  # On the carrier, as prescribed [N·m]
     pin_forces: Float[np.ndarray, "time disc pin"]  # Normal force of every pin [N]
     kinetic_energy: Float[np.ndarray, " time"]  # Of all bodies but the sun [J]
-
-    @property
-    def input_power(self) -> Float[np.ndarray, " time"]:
-        """Power that the sun brings in [W]."""
-        return np.asarray(self.input_torque * self.input_speed)
-
-    @property
-    def output_power(self) -> Float[np.ndarray, " time"]:
-        """Power that the carrier gives away, positive against a resisting torque [W]."""
-        return np.asarray(-self.output_torque * self.output_speed)
-
-    @property
-    def pins_in_contact(self) -> Int[np.ndarray, "time disc"]:
-        """Pins that carry, on each disc [-]."""
-        return np.asarray((self.pin_forces > 0).sum(axis=2))
 
 
 Progress = Callable[[float], None]

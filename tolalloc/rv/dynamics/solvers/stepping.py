@@ -16,8 +16,8 @@ from jaxtyping import Float, Int, UInt8, UInt16
 from tolalloc.compiled import jit, parallel_jit, prange
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
-from tolalloc.rv.equivalent.solvers.energy import Problem, along, compress, make_work, play_force
-from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, sample_constants, values_of
+from tolalloc.rv.equivalent.solvers.energy import along, compress, make_work, play_force
+from tolalloc.rv.equivalent.solvers.problem import fill_loads, make_problem, values_of, with_tables
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
 
 
@@ -96,22 +96,7 @@ def _problem(at, angles, tables, parts, layout, face_width, values, x, force, ow
     along(angles.contact_by_disc[at], angles.play_by_retained[at], moved.position, moved.compression, moved.play)
     own.undisturbed[:] += moved.compression
     own.play_offset[:] += moved.play
-    problem = Problem(
-        own.law,
-        angles.stiffness[at],
-        own.force,
-        angles.contact_by_disc[at],
-        own.undisturbed,
-        angles.contact_stiffness[at],
-        angles.contact_log_length[at],
-        own.half_tilt,
-        angles.play_by_retained[at],
-        own.play_offset,
-        angles.play_stiffness[at],
-        own.clearance,
-    )
-    sample_constants(problem, angles.turn[at], face_width, layout, values)
-    return problem
+    return with_tables(at, angles, layout, face_width, values, own)
 
 
 class Moved(NamedTuple):

@@ -104,9 +104,8 @@ def sample_constants(problem, turn, face_width, layout, values):
 
 
 @jit
-def problem_at_node(at, tables, layout, face_width, values, own):
-    """Return carrier rotation at fixed discs and the problem at a node; ``own`` lends the memory of the loads."""
-    rotation = fill_loads(at, tables, layout, values, own.force, own.undisturbed, own.play_offset)
+def with_tables(at, tables, layout, face_width, values, own):
+    """Return the problem whose loads ``own`` has, with the tables of a node."""
     problem = Problem(
         own.law,
         tables.stiffness[at],
@@ -122,7 +121,14 @@ def problem_at_node(at, tables, layout, face_width, values, own):
         own.clearance,
     )
     sample_constants(problem, tables.turn[at], face_width, layout, values)
-    return rotation, problem
+    return problem
+
+
+@jit
+def problem_at_node(at, tables, layout, face_width, values, own):
+    """Return carrier rotation at fixed discs and the problem at a node; ``own`` lends the memory of the loads."""
+    rotation = fill_loads(at, tables, layout, values, own.force, own.undisturbed, own.play_offset)
+    return rotation, with_tables(at, tables, layout, face_width, values, own)
 
 
 @jit
