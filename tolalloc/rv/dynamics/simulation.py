@@ -15,10 +15,10 @@ from tolalloc.rv.dynamics.tables import Steps
 from tolalloc.rv.equivalent.model import EquivalentModel
 
 Progress = Callable[[float], None]
-"""Told how much of the time is simulated, from 0 to 1."""
+"""Told which share of the time is simulated [-]."""
 
 
-def _untold(share: float) -> None:
+def untold(share: float) -> None:
     """Tell nobody."""
 
 
@@ -76,7 +76,7 @@ def simulate(
     damping: Damping,
     integrator: Integrator,
     observe: Int[np.ndarray, " observed"] | None = None,
-    progress: Progress = _untold,
+    progress: Progress = untold,
 ) -> Simulated:
     """Return what every sample does over time.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.dynamics.properties import Damping, Inertia
+from tolalloc.rv.dynamics.simulation import Progress, untold
 from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
 from tolalloc.rv.multibody.prototype import assemble, reference_places
@@ -38,16 +39,8 @@ class PrototypeAnswer:
     kinetic_energy: Float[np.ndarray, " time"]  # Of all bodies but the sun [J]
 
 
-Progress = Callable[[float], None]
-"""Told which share of the time is simulated [-]."""
-
-
 _RESIDUAL = 1e-2
 """Unbalanced force or moment at which a time step is solved, above the rounding in the stiffest bearings [N, N·m]."""
-
-
-def _untold(share: float) -> None:
-    """Tell nobody."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +143,7 @@ def simulate_prototype(
     torque: TimeCourse,
     steps: TimeSteps,
     errors: Mapping[str, float] | None = None,
-    progress: Progress = _untold,
+    progress: Progress = untold,
 ) -> PrototypeAnswer:
     """Return what the virtual prototype of a reducer does, from rest at the carrier angle 0.
 
