@@ -142,14 +142,18 @@ def _fields(kind: Any) -> dict[str, Any]:
 
 def _known_fields(kind: Any, location: list[int | str]) -> list[str]:
     """Return the dotted names of the fields beside an unknown one."""
-    prefix = ""
+    prefix, kinds = "", [kind]
     for part in location[:-1]:
-        one = _fields(kind).get(str(part))
-        inner = [own for own in (one, *get_args(one)) if _fields(own)]
+        inner = [own for one in kinds for own in _records(_fields(one).get(str(part)))]
         if not inner:
             break
-        kind, prefix = inner[0], f"{prefix}{part}."
-    return [prefix + name for name in _fields(kind)]
+        kinds, prefix = inner, f"{prefix}{part}."
+    return [prefix + name for one in kinds for name in _fields(one)]
+
+
+def _records(hint: Any) -> list[Any]:
+    """Return what a field's type may be that has fields of its own."""
+    return [hint] if _fields(hint) else [own for part in get_args(hint) for own in _records(part)]
 
 
 def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> Path:

@@ -241,7 +241,8 @@ def transmission_effect(
         The first assembly or too many others have no answer.
     """
     reducer = load_reducer(plan.reducer)
-    model, torque = EquivalentModel(reducer), reducer.load.test_torque
+    torque = reducer.load.test_torque
+    model = EquivalentModel(reducer.at_torque(torque))
     response = OrientationResponse(model=model, chain=plan.chain, torque=torque, observe=observe)
     final = _final_angles(plan, errors, precisions, seeds)
     perfect = response(np.zeros((1, final.shape[2])))

@@ -62,7 +62,8 @@ def bind(
     """
     require_small_zones(errors.sources, _LARGEST_ZONE, place)
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
-    model = EquivalentModel(reducer, orders=orders or HARMONICS)
+    carried = reducer.torque_on_carrier(torque, place)
+    model = EquivalentModel(reducer.at_torque(carried), orders=orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed}
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
     fixed: Mapping[str, float] = {
@@ -73,7 +74,7 @@ def bind(
     }
     kernel = KernelResponse(
         model=model,
-        torque=reducer.torque_on_carrier(torque, place),
+        torque=carried,
         columns=errors.columns,
         fixed=fixed,
     )

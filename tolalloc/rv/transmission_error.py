@@ -250,7 +250,7 @@ def transmission_error(
     SolveError
         An angle without equilibrium.
     """
-    model = EquivalentModel(reducer, orders=unit.orders or HARMONICS)
+    model = EquivalentModel(reducer.at_torque(torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
     worst = Status(max(extremes.status[0], equilibria.status.max()))

@@ -61,7 +61,9 @@ def hysteresis_loop(
     """Return torque against twist between minus and plus the rated torque at the carrier angles [rad]."""
     shares = np.array([BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0])
     torque = model.reducer.load.rated_torque * np.concatenate([-shares[::-1], shares])
-    twist = [model.equilibria(errors, float(level), carrier_angle).transmission_error for level in torque]
+    twist = [
+        model.at_torque(level).equilibria(errors, level, carrier_angle).transmission_error for level in torque.tolist()
+    ]
     return HysteresisLoop(torque=torque, twist=np.stack(twist, axis=1))
 
 
@@ -76,7 +78,7 @@ def both_directions(
     What reversing adds is the second minus the first. The sign of the torque does not matter, as it resists both ways.
     """
     forward, backward = (
-        model.equilibria(errors, resisting, carrier_angle).transmission_error
+        model.at_torque(torque).equilibria(errors, resisting, carrier_angle).transmission_error
         for resisting in (-abs(torque), abs(torque))
     )
     return forward, backward

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from math import pi
 from typing import Any
@@ -57,6 +57,10 @@ class EquivalentModel:
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process without tables; there, every chunk of work finds the same model again."""
         return _remembered, (self.reducer, self.search, self.orders)
+
+    def at_torque(self, torque: float) -> EquivalentModel:
+        """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
+        return replace(self, reducer=self.reducer.at_torque(torque)) if self.reducer.parts else self
 
     @cached_property
     def error_columns(self) -> Columns:

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.rv.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
 from tolalloc.rv.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -77,7 +78,7 @@ class ReducerRecord(Record):
         """Return the reducer in SI units."""
         disc, grinding = self.material, self.modification
         pin = self.pin_material or disc
-        return Reducer(
+        reducer = Reducer(
             name=self.name,
             source=self.source,
             crank_count=self.crank_count,
@@ -94,6 +95,19 @@ class ReducerRecord(Record):
             clearances=self.clearances,
             assumptions=self.assumptions,
         )
+        reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())
+        return reducer.at_torque(reducer.load.rated_torque)
+
+    def _clearances(self) -> Clearances:
+        """Return the clearances, those of bearings that are given by their dimensions included."""
+        own: dict[str, float] = {}
+        for name in vars(self.clearances):
+            bearing = getattr(self.stiffness, name)
+            if isinstance(bearing, RollingBearing) and bearing.play:
+                if getattr(self.clearances, name):
+                    raise ValueError(f"clearances.{name}_um is given twice: the bearing in [stiffness] has one too")
+                own[name] = bearing.play
+        return replace(self.clearances, **own)
 
 
 def load_reducer(name: str | Path) -> Reducer:
@@ -161,4 +175,5 @@ def write_identified_stiffness(identified: IdentifiedStiffness, path: Path) -> N
 def with_stiffness(reducer: Reducer, identified: IdentifiedStiffness) -> Reducer:
     """Return the reducer with the identified stiffnesses in place of its own."""
     values: dict[str, Any] = dict(identified.values)
-    return replace(reducer, stiffness=replace(reducer.stiffness, **values))
+    others = tuple(part for part in reducer.parts if part.interface not in values)
+    return replace(reducer, stiffness=replace(reducer.stiffness, **values), parts=others)

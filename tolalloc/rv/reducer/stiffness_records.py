@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from tolalloc.files import Record, times
-from tolalloc.rv.reducer.design import CycloidStage
+from tolalloc.rv.reducer.design import CycloidStage, Reducer
+from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
+from tolalloc.rv.reducer.series import Part
+from tolalloc.rv.reducer.shafts import Crankshaft, Pillars, bore_flexibility
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 from tolalloc.rv.reducer.table2 import (
     TAPER_ANGLE,
@@ -87,6 +90,27 @@ FORMULAS: Mapping[str, Callable[..., float]] = {
 """Stiffness → its formula, of the dimensions in the file and the elastic constants of the discs."""
 
 
+def _stated_as(given: object) -> str:
+    """Return how a bearing's stiffness is stated, so that messages are about what was meant."""
+    if not isinstance(given, Mapping):
+        return "number"
+    return "table 2" if {"loaded_length_mm", "ball_radius_mm"} & given.keys() else "bearing"
+
+
+RollerStiffness = Annotated[
+    Annotated[NewtonPerMetre, Tag("number")]
+    | Annotated[Rollers, Tag("table 2")]
+    | Annotated[RollerBearing, Tag("bearing")],
+    Discriminator(_stated_as),
+]
+BallStiffness = Annotated[
+    Annotated[NewtonPerMetre, Tag("number")]
+    | Annotated[Balls, Tag("table 2")]
+    | Annotated[BallBearing, Tag("bearing")],
+    Discriminator(_stated_as),
+]
+
+
 class StiffnessRecord(Record):
     """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE*/2.
 
@@ -95,9 +119,11 @@ class StiffnessRecord(Record):
 
     sun_support: NewtonPerMetre | Shaft
     gear_mesh: NewtonPerMetre | GearPair
-    crank_disc_bearing: NewtonPerMetre | Rollers
-    crank_carrier_bearing: NewtonPerMetre | Rollers
-    carrier_bearing: NewtonPerMetre | Balls
+    crank_disc_bearing: RollerStiffness
+    crank_carrier_bearing: RollerStiffness
+    carrier_bearing: BallStiffness
+    crankshaft: Crankshaft | None = None
+    pillars: Pillars | None = None
     pin_contact: NewtonPerMetre | None = None
     pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
     pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
@@ -107,7 +133,10 @@ class StiffnessRecord(Record):
         bearings: dict[str, Any] = {}
         for name, formula in FORMULAS.items():
             own = getattr(self, name)
-            bearings[name] = own if isinstance(own, float) else formula(**vars(own), **vars(disc))
+            if isinstance(own, RollingBearing):
+                bearings[name] = inf  # its parts say it, at the load that they carry
+            else:
+                bearings[name] = own if isinstance(own, float) else formula(**vars(own), **vars(disc))
         return Stiffness(
             **bearings,
             pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
@@ -116,6 +145,44 @@ class StiffnessRecord(Record):
             if self.pin_span_mm is None
             else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
         )
+
+    def parts(self, reducer: Reducer) -> tuple[Part, ...]:
+        """Return the parts of the interfaces that yield in series, a given stiffness as one of them.
+
+        Raises
+        ------
+        ValueError
+            A crankshaft whose journals stand outside its bearings.
+        """
+        disc, stage, found = reducer.disc_material, reducer.cycloid_stage, list[Part]()
+        if isinstance(self.crank_disc_bearing, RollerBearing):
+            bearing = self.crank_disc_bearing
+            edge = (bearing.pitch_diameter + bearing.diameter) / 2.0
+            ring = bore_flexibility(edge, stage.pin_circle_radius, stage.face_width, disc)
+            found += [
+                Part("crank_disc_bearing", "crank–disc bearing", bearing),
+                Part("crank_disc_bearing", "disc", ring),
+            ]
+        if isinstance(self.crank_carrier_bearing, RollerBearing):
+            both = replace(self.crank_carrier_bearing, rows=2 * self.crank_carrier_bearing.rows)
+            found.append(Part("crank_carrier_bearing", "crank–carrier bearings", both))
+        if isinstance(self.carrier_bearing, BallBearing):
+            found.append(Part("carrier_bearing", "carrier bearing", self.carrier_bearing))
+        if self.crankshaft:
+            own, shared = self.crankshaft.flexibilities(reducer.disc_count, stage.disc_spacing, disc)
+            found += [
+                Part("crank_disc_bearing", "crank bending, a journal alone", own),
+                Part("crank_carrier_bearing", "crank bending, all journals", shared),
+                Part("gear_mesh", "crank torsion", reducer.planet_base_radius**2 * self.crankshaft.twist(disc)),
+            ]
+        if self.pillars:
+            # Half the torque goes through the pillars, and a crank lies half on either flange.
+            each = reducer.crank_count * reducer.crank_circle_radius**2 / 4.0
+            found.append(Part("crank_carrier_bearing", "carrier twist", each * self.pillars.twist(disc)))
+        named = {part.interface for part in found}
+        given = [name for name in named if not isinstance(getattr(self, name), RollingBearing)]
+        found += [Part(name, name.replace("_", " "), 1.0 / getattr(reducer.stiffness, name)) for name in sorted(given)]
+        return tuple(found)
 
 
 class IdentifiedValue(Record):
@@ -134,5 +201,9 @@ class IdentifiedStiffnessRecord(Record):
     notes: tuple[str, ...] = ()
 
 
-IDENTIFIABLE = tuple(field for field in StiffnessRecord.model_fields if field not in ("pin_contact_law", "pin_span_mm"))
+IDENTIFIABLE = tuple(
+    field
+    for field in StiffnessRecord.model_fields
+    if field not in ("pin_contact_law", "pin_span_mm", "crankshaft", "pillars")
+)
 """Fields of `tolalloc.rv.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""

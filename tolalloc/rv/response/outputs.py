@@ -51,7 +51,8 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
 
 
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-    solved = Solved.of(model.equilibria(errors, np.copysign(model.reducer.load.rated_torque, torque), _ANGLES))
+    rated = float(np.copysign(model.reducer.load.rated_torque, torque))
+    solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, _ANGLES))
     own = [OUTPUTS[name][1](solved) for name in _FORCES]
     values = np.stack([*own, *_pin_stress(solved)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))

@@ -143,7 +143,7 @@ class PreparedSimulation:
     @cached_property
     def model(self) -> EquivalentModel:
         """The equivalent model."""
-        return EquivalentModel(self.reducer, orders=self.unit.orders or HARMONICS)
+        return EquivalentModel(self.reducer.at_torque(self.torque), orders=self.unit.orders or HARMONICS)
 
     @cached_property
     def errors(self) -> Float[np.ndarray, "1 column"]:
