@@ -23,7 +23,7 @@ RADIAL_CLEARANCE = 15 * MICROMETRE
 def ladder() -> pd.DataFrame:
     """Return closed form and reference for several reducers and radial clearances."""
     rows = []
-    for name in ("rv20e", "rv40e", "rv80e"):
+    for name in ("rv20e_liu2020", "rv40e_xi2015", "rv80e"):
         stage = load_reducer(name).cycloid_stage
         for clearance_um in (5.0, 15.0, 30.0):
             exact = closed_form(stage, clearance_um * MICROMETRE)
@@ -44,7 +44,7 @@ def ladder() -> pd.DataFrame:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE)
     with UnitProgress("searches") as progress:
         found = compared(study, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)

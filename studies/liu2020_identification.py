@@ -175,7 +175,7 @@ def renamed(sections: tuple[Section, ...], name: str, heading: str) -> tuple[Sec
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    given, seeds = load_reducer("rv20e"), SeedTree(2020)
+    given, seeds = load_reducer("rv20e_liu2020"), SeedTree(2020)
     true = replace(given, stiffness=replace(given.stiffness, **TRUTH))
     errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
     with UnitProgress() as progress:

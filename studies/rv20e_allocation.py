@@ -7,7 +7,7 @@ import tolalloc as ta
 
 study = ta.Study(
     ta.reducer(
-        "rv20e",
+        "rv20e_liu2020",
         stiffness="rv20e_table6",
         flank_clearance=(1.0, 5.0),
         radial_clearance=(5.0, 20.0),

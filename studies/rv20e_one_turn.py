@@ -150,7 +150,7 @@ def sources(model: EquivalentModel, unit: np.ndarray) -> Figure:
 
 def build(quick: bool) -> Document:  # noqa: ARG001 (one turn has nothing to shorten)
     """Return the report."""
-    reducer, table4 = load_reducer("rv20e"), load_unit("table4")
+    reducer, table4 = load_reducer("rv20e_liu2020"), load_unit("table4")
     model = EquivalentModel(reducer)
     unit = table4.errors(model.columns, reducer.modification.deviations)
     answer = transmission_error(reducer, table4, TORQUE, attributed=True)

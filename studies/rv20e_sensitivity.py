@@ -6,7 +6,7 @@ tolalloc rank studies/rv20e_sensitivity.py --quick
 import tolalloc as ta
 
 study = ta.Study(
-    ta.reducer("rv20e", neglected=("disc*.tilt",)),
+    ta.reducer("rv20e_liu2020", neglected=("disc*.tilt",)),
     ta.drawing("rv20e_all_sources"),
     limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0), ta.LOST_MOTION: ta.Limit(upper=1.0)},
     questions=[ta.Ranking()],

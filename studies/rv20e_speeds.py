@@ -91,7 +91,7 @@ def critical_rows(found: Modes, load: float) -> list[dict[str, object]]:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    reducer = load_reducer("rv20e")
+    reducer = load_reducer("rv20e_liu2020")
     model = EquivalentModel(reducer)
     errors = load_unit("table4").errors(model.columns, reducer.modification.deviations)
     angles = 2 * np.pi * np.arange(MODE_ANGLES) / MODE_ANGLES

@@ -46,7 +46,7 @@ POINTS = (10, 36, 100, 180, 5000)
 
 def reducer() -> Reducer:
     """Return an RV-40E with song2019's cycloid stage, so that its teeth can be loaded."""
-    base = load_reducer("rv40e")
+    base = load_reducer("rv40e_xi2015")
     return replace(
         base,
         name="song2019",

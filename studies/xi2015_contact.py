@@ -74,7 +74,7 @@ def force_figure(contacts: dict[str, LoadedContact]) -> Figure:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="logarithmic"))
     phase, torque = default_phases(reducer, 100 if quick else PHASES), SHARE * TORQUE
     discs = PressedDiscs(reducer=reducer, torque=torque)

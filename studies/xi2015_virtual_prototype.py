@@ -36,7 +36,7 @@ OTHERS = ((TORQUE, SPEED / 2), (TORQUE / 2, SPEED), (TORQUE / 4, SPEED))
 
 def readings() -> dict[str, Reducer]:
     """Return the reducer by what is supposed of its pin contacts; its first stage does not yield in either."""
-    reducer = with_ideal_gears(load_reducer("rv40e"))
+    reducer = with_ideal_gears(load_reducer("rv40e_xi2015"))
     law = replace(reducer.stiffness, pin_contact_law="logarithmic")
     soft = replace(reducer.stiffness, pin_contact=IMPLIED, pin_contact_law="constant", pin_bending=inf)
     steel = replace(reducer, stiffness=law)
@@ -50,7 +50,7 @@ def readings() -> dict[str, Reducer]:
 def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> SimulationAnswer:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
-    asked = SimulationStudy(reducer="rv40e", engine=name, torque_nm=torque, speed_rpm=speed, **times)
+    asked = SimulationStudy(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
     with UnitProgress("ms") as progress:
         return simulate(replace(prepare_simulation(asked), reducer=reducer), progress)
 

@@ -17,7 +17,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 @pytest.fixture(scope="session")
 def rv20e() -> EquivalentModel:
     """The RV-20E preset; its tables are made once for all tests."""
-    return EquivalentModel(load_reducer("rv20e"))
+    return EquivalentModel(load_reducer("rv20e_liu2020"))
 
 
 @pytest.fixture(scope="session")

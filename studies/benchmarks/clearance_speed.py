@@ -237,7 +237,7 @@ def measured_rounds(own: Workers, profiles: list[ToothProfile], rounds: int) -> 
 
 def answer(designs: int, rounds: int) -> dict[str, Any]:
     """Return everything that the run measured."""
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     pins, phases = stage.pin_count, np.arange(PHASES) / PHASES
     pin_angle = (2 * np.pi / pins * (np.arange(pins)[:, np.newaxis] + phases)).ravel() - np.pi
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")  # what others take away

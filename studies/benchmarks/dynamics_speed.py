@@ -119,7 +119,7 @@ def numpy_steps(steps: Steps, rows: list[Rows], accelerations: np.ndarray) -> np
 
 def answer(units: int, rounds: int) -> dict[str, Any]:
     """Return everything that the run measured."""
-    model = EquivalentModel(load_reducer("rv20e"))
+    model = EquivalentModel(load_reducer("rv20e_liu2020"))
     unit, reducer = load_unit("table4").errors(model.columns), model.reducer
     errors = random_units(unit, model.columns, np.random.default_rng(SEED), units)
     speed = SpeedProfile.constant(2 * np.pi / TURN * reducer.ratio)

@@ -144,7 +144,7 @@ def figures(rounds: np.ndarray) -> dict[str, float]:
 
 def answer(samples: int, rounds: int) -> dict[str, Any]:
     """Return everything that the run measured."""
-    model = EquivalentModel(load_reducer("rv20e"))
+    model = EquivalentModel(load_reducer("rv20e_liu2020"))
     unit = load_unit("table4").errors(model.columns)
     errors = random_units(unit, model.columns, np.random.default_rng(SEED), samples)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")  # what others take away

@@ -52,7 +52,7 @@ def timed(work: Callable[[], Answer]) -> tuple[float, Answer]:
 @lru_cache
 def numpy_kernel(angles: int) -> NumpyKernel:
     """Return the NumPy kernel for the first of the 936 angles; every process has its own."""
-    return NumpyKernel(load_reducer("rv20e"), 2 * pi * np.arange(ANGLES)[:angles] / ANGLES)
+    return NumpyKernel(load_reducer("rv20e_liu2020"), 2 * pi * np.arange(ANGLES)[:angles] / ANGLES)
 
 
 def _share(angles: int, batch: int, errors: Errors) -> Curves:

@@ -49,7 +49,7 @@ def random_errors(
 
 def measure(units: int, seed: int) -> dict[str, object]:
     """Return statuses, residuals, angles solved and the largest memory of the process."""
-    model = EquivalentModel(load_reducer("rv20e"))
+    model = EquivalentModel(load_reducer("rv20e_liu2020"))
     unit = load_unit("table4").errors(model.columns)[0]
     statuses: Counter[str] = Counter()
     solves, residual, largest, interfering = 0, 0.0, 0.0, 0

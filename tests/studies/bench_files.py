@@ -45,7 +45,7 @@ Change = Callable[[Path], None]
 
 def simulated(bench: Bench, count: int, folder: Path) -> Path:
     """Write what a bench reads of a few units whose crank–disc bearings are stiffer than the preset says."""
-    given, seeds = load_reducer("rv20e"), SeedTree(7)
+    given, seeds = load_reducer("rv20e_liu2020"), SeedTree(7)
     true = replace(given, stiffness=replace(given.stiffness, **{NAME: TRUTH}))
     units = random_units(ErrorModel(load_tolerance_table("rv20e_baseline")), count, seeds.child("units"))
     write_measurements(simulated_bench(true, units, bench).measured(seeds.child("noise")), folder)
@@ -53,7 +53,7 @@ def simulated(bench: Bench, count: int, folder: Path) -> Path:
 
 
 def identify(folder: Path, *options: object, name: str = NAME) -> subprocess.CompletedProcess[str]:
-    return tolalloc("identify", folder / "measurement.toml", "--reducer", "rv20e", "--parameter", name, *options)
+    return tolalloc("identify", folder / "measurement.toml", "--reducer", "rv20e_liu2020", "--parameter", name, *options)
 
 
 def answered(result: subprocess.CompletedProcess[str]) -> dict:

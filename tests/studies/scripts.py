@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-BASELINE = {"name": "rv20e", "flank_clearance": (1.0, 5.0), "radial_clearance": (5.0, 20.0)}
+BASELINE = {"name": "rv20e_liu2020", "flank_clearance": (1.0, 5.0), "radial_clearance": (5.0, 20.0)}
 LIMIT = "{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}"
 
 

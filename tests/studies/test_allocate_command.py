@@ -39,7 +39,7 @@ from tolalloc.allocation.effort import SearchEffort
 
 MOST = ta.AtYield(target=0.95)
 study = ta.Study(
-    ta.reducer("rv20e", neglected=("*",), flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0){reducer}),
+    ta.reducer("rv20e_liu2020", neglected=("*",), flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0){reducer}),
     ta.drawing("few.csv"{drawing}),
     limits={{ta.PEAK_TO_PEAK: ta.Limit({first}){others}}},
     questions=(ta.Allocation({asked}),),
@@ -297,7 +297,7 @@ def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
         ),
         ({"asked": "unit_price=ta.UnitPrice(inspection=-1.0)"}, ["inspection is -1.0", "0 or above"]),
         ({"asked": "unit_price=5.0"}, ["unit_price is 5.0", "UnitPrice"]),
-        ({"drawing": ", costs='rv20f'"}, ["rv20f", "rv20e"]),
+        ({"drawing": ", costs='rv20f'"}, ["rv20f", "rv20e_liu2020"]),
     ],
 )
 def test_bad_fields_are_refused_in_one_sentence(tmp_path, texts, words):

@@ -69,7 +69,7 @@ def set_cell(row: int, column: str, value: str):
 
 def test_te_of_table_4(tmp_path):
     folder = tmp_path / "report"
-    result = tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--torque", "-1", "--json", "--out", folder)
+    result = tolalloc("te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-1", "--json", "--out", folder)
     answer = json.loads(result.stdout)
     assert result.returncode == 0
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer
@@ -244,7 +244,7 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
 def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     from tolalloc.rv.reducer.files import PRESETS
 
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     path = tmp_path / "loose.toml"
     path.write_text(text + "\n[clearances]\ncrank_disc_bearing_um = 2\ncarrier_bearing_um = 1\n", encoding="utf-8")
     assert tolalloc("check", study_script(tmp_path, reducer={"name": str(path), "unit": "table4"})).returncode == 0
@@ -254,7 +254,7 @@ def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     assert answer["lost_motion_arcmin"]["this_unit"] > 2 * tight["lost_motion_arcmin"]["this_unit"]
 
 
-@pytest.mark.parametrize("reducer", ["rv20e", "rv40e", "rv80e", "bx40e"])
+@pytest.mark.parametrize("reducer", ["rv20e_liu2020", "rv40e_xi2015", "rv80e", "bx40e"])
 def test_every_preset_turns(reducer):
     answer = json.loads(tolalloc("te", "--reducer", reducer, "--attribute", "--json").stdout)
     assert answer["statuses"]["equilibrium found"] == 936
@@ -296,7 +296,7 @@ def test_a_truncated_table_is_refused(tmp_path):
 def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
     from tolalloc.rv.reducer.files import PRESETS
 
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new), encoding="utf-8")
@@ -304,7 +304,7 @@ def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
 
 
 def test_unknown_names_offer_the_nearest(tmp_path):
-    refused(tolalloc("te", "--reducer", "rv20"), "rv20", "rv20e")
+    refused(tolalloc("te", "--reducer", "rv20"), "rv20", "rv20e_liu2020")
     refused(tolalloc("te", "--unit", "tabel4"), "tabel4", "table4")
     path = tmp_path / "unit.toml"
     from tolalloc.rv.reducer.files import PRESETS

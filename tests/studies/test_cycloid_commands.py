@@ -16,7 +16,7 @@ from tolalloc.rv.reducer.files import PRESETS
 
 
 def reducer_with(tmp_path, *changes: tuple[str, str]):
-    text = (PRESETS / "rv40e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv40e_xi2015.reducer.toml").read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
@@ -26,7 +26,7 @@ def reducer_with(tmp_path, *changes: tuple[str, str]):
 
 
 def test_contact_of_the_rv40e():
-    result = tolalloc("contact", "--reducer", "rv40e", "--torque", "-572", "--phases", "1", "--json")
+    result = tolalloc("contact", "--reducer", "rv40e_xi2015", "--torque", "-572", "--phases", "1", "--json")
     assert result.returncode == 0, result.stderr
     answer = json.loads(result.stdout)
     assert answer["per tooth"]["largest pin force [N]"] == pytest.approx(1144, abs=1)
@@ -35,14 +35,14 @@ def test_contact_of_the_rv40e():
 
 
 def test_contact_for_a_person_names_units_and_takes_width_and_support():
-    result = tolalloc("contact", "--reducer", "rv40e", "--width", "16", "--support", "30.6", "--torque", "-572")
+    result = tolalloc("contact", "--reducer", "rv40e_xi2015", "--width", "16", "--support", "30.6", "--torque", "-572")
     assert "backlash [arcmin]" in result.stdout
     assert "16…17 pins" in result.stdout
 
 
 def test_contact_writes_report_and_profile(tmp_path):
     folder, file = tmp_path / "report", tmp_path / "disc.dxf"
-    result = tolalloc("contact", "--reducer", "rv40e", "--out", folder, "--profile", file, "--points", "100")
+    result = tolalloc("contact", "--reducer", "rv40e_xi2015", "--out", folder, "--profile", file, "--points", "100")
     assert result.returncode == 0, result.stderr
     assert "chord error at most 0.61 µm" in result.stderr
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
@@ -60,7 +60,7 @@ def test_contact_writes_report_and_profile(tmp_path):
 
 def test_profile_as_csv_carries_what_was_removed(tmp_path):
     file = tmp_path / "disc.csv"
-    assert tolalloc("contact", "--reducer", "rv40e", "--profile", file).returncode == 0
+    assert tolalloc("contact", "--reducer", "rv40e_xi2015", "--profile", file).returncode == 0
     frame = pd.read_csv(file)
     assert len(frame) == 39 * 200
     tip = frame["angle [deg]"] == -180
@@ -96,24 +96,24 @@ def test_a_stage_that_cannot_be_built_is_refused(tmp_path, changes, words):
         (["--profile", "disc.stl"], ["disc.stl", ".csv or .dxf"]),
         (["--profile", "nowhere/disc.csv"], ["cannot be made there", "nowhere"]),
         (["--profile", "disc.csv", "--points", "7"], ["points per tooth", "7"]),
-        (["--reducer", "rv41"], ["rv41", "rv40e"]),
+        (["--reducer", "rv41"], ["rv41", "rv40e_xi2015"]),
     ],
 )
 def test_contact_refuses_in_one_sentence(options, words):
-    refused(tolalloc("contact", *([] if "--reducer" in options else ["--reducer", "rv40e"]), *options), *words)
+    refused(tolalloc("contact", *([] if "--reducer" in options else ["--reducer", "rv40e_xi2015"]), *options), *words)
 
 
 def test_nothing_is_overwritten(tmp_path):
     file = tmp_path / "disc.csv"
     file.write_text("mine", encoding="utf-8")
-    refused(tolalloc("contact", "--reducer", "rv40e", "--profile", file, "--out", tmp_path / "report"), "exists")
+    refused(tolalloc("contact", "--reducer", "rv40e_xi2015", "--profile", file, "--out", tmp_path / "report"), "exists")
     assert file.read_text(encoding="utf-8") == "mine"
     assert not (tmp_path / "report").exists()
-    refused(tolalloc("contact", "--reducer", "rv40e", "--out", tmp_path), "not empty")
+    refused(tolalloc("contact", "--reducer", "rv40e_xi2015", "--out", tmp_path), "not empty")
     both = ("--profile", tmp_path / "new.csv", "--out", tmp_path / "report")
-    refused(tolalloc("contact", "--reducer", "rv40e", *both, "--points", "7"), "7")
+    refused(tolalloc("contact", "--reducer", "rv40e_xi2015", *both, "--points", "7"), "7")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["disc.csv"]
-    refused(tolalloc("modify", "li2018", "--reducer", "rv40e", "--profile", file), "exists")
+    refused(tolalloc("modify", "li2018", "--reducer", "rv40e_xi2015", "--profile", file), "exists")
 
 
 @pytest.mark.parametrize("written", [("contact", "--out", "report"), ("modify", "li2018", "--profile", "disc.csv")])
@@ -157,7 +157,7 @@ def test_studies_that_make_one_report(study, tmp_path):
 
 
 def test_modify_li2018_gives_the_closed_form():
-    result = tolalloc("modify", "li2018", "--reducer", "rv40e", "--radial", "15", "--json")
+    result = tolalloc("modify", "li2018", "--reducer", "rv40e_xi2015", "--radial", "15", "--json")
     assert result.returncode == 0, result.stderr
     answer = json.loads(result.stdout)
     assert answer["equidistant amount [µm]"] == pytest.approx(35.9679, abs=1e-4)
@@ -176,4 +176,4 @@ def test_modify_li2018_gives_the_closed_form():
     ],
 )
 def test_modify_refuses_in_one_sentence(arguments, words):
-    refused(tolalloc("modify", *arguments, "--reducer", "rv40e"), *words)
+    refused(tolalloc("modify", *arguments, "--reducer", "rv40e_xi2015"), *words)

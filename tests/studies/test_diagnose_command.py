@@ -15,7 +15,7 @@ from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.units import ARCSECOND
 
-REPORT = ("--reducer", "rv20e", "--out")
+REPORT = ("--reducer", "rv20e_liu2020", "--out")
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ CASES = (
         "parameter fewer than units, or measured curves and loops.",
         weak=True,
     ),
-    bad("unknown reducer", "--reducer rv21e", "rv21e", "rv20e"),
+    bad("unknown reducer", "--reducer rv21e", "rv21e", "rv20e_liu2020"),
     bad("negative seed", "--seed -1", "seed", "-1", "positive"),
     data(
         "noise missing beside noise",
@@ -218,7 +218,7 @@ def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.Completed
         if option not in options:
             options += [option, str(folder / name)]
     if "--reducer" not in options:
-        options += ["--reducer", "rv20e"]
+        options += ["--reducer", "rv20e_liu2020"]
     before = files(folder)
     result = tolalloc("identify", folder / "measurement.toml", *options)
     refused(result)
@@ -241,12 +241,12 @@ def test_bad_input_is_refused_in_one_sentence(curves, peak_to_peaks, tmp_path, c
 @pytest.mark.parametrize(("option", "name"), [("--out", "report"), ("--stiffness", "found.toml")])
 def test_no_file_is_about_a_reducer_that_nobody_named(curves, tmp_path, option, name):
     result = tolalloc("identify", curves / "measurement.toml", option, tmp_path / name)
-    refused(result, "--reducer is missing", "rv20e")
+    refused(result, "--reducer is missing", "rv20e_liu2020")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):
-    options = ("--parameter", NAME, "--seed", "-1", "--out", tmp_path / "report", "--reducer", "rv20e")
+    options = ("--parameter", NAME, "--seed", "-1", "--out", tmp_path / "report", "--reducer", "rv20e_liu2020")
     refused(process("identify", curves / "measurement.toml", *options), "seed is -1")
     refused(identify(tmp_path, "--stiffness", tmp_path / "found.toml"), "measurement.toml: no such file.")
     assert list(tmp_path.iterdir()) == []

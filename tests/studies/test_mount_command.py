@@ -19,7 +19,7 @@ def parts_file(folder, units, seed=5):
     """Write random parts of an RV-20E."""
     errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
     lines = ["part,kind,error,value,unit"]
-    for part in drawn_parts(errors, load_reducer("rv20e"), units, SeedTree(seed)):
+    for part in drawn_parts(errors, load_reducer("rv20e_liu2020"), units, SeedTree(seed)):
         lines += [f"{part.name},{part.kind},{name},{value / MICROMETRE},µm" for name, value in part.errors.items()]
     path = folder / "parts.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -40,7 +40,7 @@ def test_one_unit_is_mounted_in_the_best_of_all_ways(tmp_path):
 
 def test_two_units_share_their_parts_and_are_reported(tmp_path):
     folder = tmp_path / "report"
-    said = tolalloc("mount", str(parts_file(tmp_path, 2)), "--reducer", "rv20e", "--starts", "1", "--out", folder)
+    said = tolalloc("mount", str(parts_file(tmp_path, 2)), "--reducer", "rv20e_liu2020", "--starts", "1", "--out", folder)
     assert "who goes where" in said.stdout
     assert "no other one does is not proven" in " ".join(said.stdout.split())
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -21,7 +21,7 @@ INSTALLED = pytest.mark.skipif(find_spec("exudyn") is None, reason="the optional
 
 def test_a_run_is_reported_with_its_series(tmp_path):
     folder = tmp_path / "report"
-    said = tolalloc("simulate", "--reducer", "rv40e", *SHORT, "--torque", "-572", "--out", folder)
+    said = tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--torque", "-572", "--out", folder)
     assert said.returncode == 0, said.stderr
     words = " ".join(said.stdout.split())
     assert "ratio of 81.0000" in words
@@ -54,7 +54,7 @@ def test_a_run_is_reported_with_its_series(tmp_path):
 
 def test_the_compliance_decides_how_many_pins_carry():
     options = ("--pin-stiffness", "3.67e7", "--json")
-    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e", *SHORT, *options).stdout)
+    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, *options).stdout)
     assert answer["at rest"]["pins in contact, disc 1 [-]"] == "16…17"
     assert answer["torque on the carrier [N·m]"] == -572
     assert answer["lowest natural frequency [Hz]"] > 0
@@ -62,7 +62,7 @@ def test_the_compliance_decides_how_many_pins_carry():
 
 @INSTALLED
 def test_the_prototype_turns_with_the_same_ratio():
-    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e", *SHORT, "--engine", "exudyn", "--json").stdout)
+    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--engine", "exudyn", "--json").stdout)
     assert answer["in motion"]["ratio [-]"] == pytest.approx(81, rel=1e-5)
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
         answer["at rest"]["mean transmission error [arcsec]"], abs=1.5
@@ -87,7 +87,7 @@ neglected = ["*"]
 def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     path = tmp_path / "bored.toml"
     path.write_text(UNIT, encoding="utf-8")
-    run = ("simulate", "--reducer", "rv40e", *SHORT, "--unit", path, "--engine", "exudyn", "--json")
+    run = ("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--unit", path, "--engine", "exudyn", "--json")
     answer = json.loads(tolalloc(*run).stdout)
     assert answer["at rest"]["mean transmission error [arcsec]"] < -40  # the wider gap
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
@@ -107,7 +107,7 @@ def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     ],
 )
 def test_a_wrong_option_is_refused(options, words):
-    named = () if "--out" in options else ("--reducer", "rv40e")
+    named = () if "--out" in options else ("--reducer", "rv40e_xi2015")
     refused(tolalloc("simulate", *named, *options), *words)
 
 

@@ -32,7 +32,7 @@ def nothing(quick: bool):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("model", ta.reducer("rv20e")),
+        ("model", ta.reducer("rv20e_liu2020")),
         ("drawing", ta.drawing("rv20e_baseline")),
         ("limits", LIMITS),
         ("seed", 2),
@@ -70,7 +70,7 @@ def test_a_value_without_its_name_is_refused():
 
 
 def test_a_study_a_reducer_and_a_drawing_say_in_a_line_what_they_are():
-    study = ta.Study(ta.reducer("rv20e", stiffness="rv20e_table6"), ta.drawing("rv20e_baseline"), limits=LIMITS)
+    study = ta.Study(ta.reducer("rv20e_liu2020", stiffness="rv20e_table6"), ta.drawing("rv20e_baseline"), limits=LIMITS)
     assert repr(study).startswith("Study('study': RV-20E at rv20e_baseline; limits: peak-to-peak")
     assert repr(study.model) == "<reducer RV-20E: 2 cranks, 2 discs, stiffness of liu2020, Table 6>"
     assert repr(study.drawing) == "<drawing rv20e_baseline: 23 sources>"
@@ -119,7 +119,7 @@ def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path
     (script.parent / "own_helper_of_a_study.py").write_text("TABLE = 'tables/own.csv'\nUPPER = 55.0\n")
     script.write_text(
         "import tolalloc as ta\nfrom own_helper_of_a_study import TABLE, UPPER\n"
-        "study = ta.Study(ta.reducer('rv20e'), ta.drawing(TABLE), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)})\n"
+        "study = ta.Study(ta.reducer('rv20e_liu2020'), ta.drawing(TABLE), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)})\n"
     )
     environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "200"}
     words = command("check", script)
@@ -178,7 +178,7 @@ SETTING = {"name": "h [mm]", "value": 2, "lower": 1, "upper": 3, "step": 0.1}
 @pytest.mark.parametrize(
     ("made", "words"),
     [
-        (lambda: ta.Study("rv20e"), "model is 'rv20e'; allowed is ta.reducer"),
+        (lambda: ta.Study("rv20e_liu2020"), "model is 'rv20e_liu2020'; allowed is ta.reducer"),
         (lambda: ta.Study(MODEL, "rv20e_baseline"), "drawing is 'rv20e_baseline'; allowed is ta.drawing"),
         (lambda: ta.Study(ta.drawing("rv20e_baseline"), MODEL), "model is <drawing rv20e_baseline: 23 sources>"),
         (lambda: ta.Study(limits=[60]), "limits is .60.; allowed is a dictionary"),
@@ -204,8 +204,8 @@ SETTING = {"name": "h [mm]", "value": 2, "lower": 1, "upper": 3, "step": 0.1}
         (lambda: ta.Setting(**{**SETTING, "step": 0}), "step is 0; allowed is above 0"),
         (lambda: ta.QualityLoss(60.0), "quality loss: at_limit is missing"),
         (lambda: ta.UnitPrice(scrapp=3.0), "price of a unit: field 'scrapp' is not known; the nearest known is scrap"),
-        (lambda: ta.reducer("rv20e", flank_clearance=5), "flank_clearance is 5; allowed is two numbers"),
-        (lambda: ta.reducer("rv20e", torque=0.0), "reducer rv20e: torque is 0.0; allowed is -1670 to 1670"),
+        (lambda: ta.reducer("rv20e_liu2020", flank_clearance=5), "flank_clearance is 5; allowed is two numbers"),
+        (lambda: ta.reducer("rv20e_liu2020", torque=0.0), "reducer rv20e: torque is 0.0; allowed is -1670 to 1670"),
     ],
 )
 def test_a_slip_is_one_sentence_of_the_project(made, words):

@@ -16,8 +16,8 @@ from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 
-STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e", "rv40e", "rv80e")}
-RV40E, J = STAGES["rv40e"], 15 * MICROMETRE
+STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e_liu2020", "rv40e_xi2015", "rv80e")}
+RV40E, J = STAGES["rv40e_xi2015"], 15 * MICROMETRE
 
 
 def as_amounts(modification) -> np.ndarray:

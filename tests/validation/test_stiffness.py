@@ -128,7 +128,7 @@ def test_every_sound_row_is_a_force_over_a_length():
 
 
 def reducer_with(tmp_path, old: str, new: str):
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new), encoding="utf-8")
@@ -159,7 +159,7 @@ def test_a_shaft_too_short_to_bend_is_refused(tmp_path):
 
 
 def test_formulas_from_a_file(tmp_path):
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     text = text.replace("crank_disc_bearing = 1.09e10", "crank_disc_bearing = { loaded_length_mm = 122.6 }")
     text = text.replace("sun_support = 1e8 ", "sun_support = { diameter_mm = 20, length_mm = 100 } ")
     path = tmp_path / "mine.toml"
@@ -180,7 +180,7 @@ def test_table_6_is_the_mean_of_its_ten_rows():
         assert identified.values[field] == pytest.approx(np.mean(values) * 1e10, rel=1e-6)
         assert identified.standard_uncertainty[field] == pytest.approx(np.std(values, ddof=1) * 1e10, rel=0.02)
     assert (
-        with_stiffness(load_reducer("rv20e"), identified).stiffness.carrier_bearing
+        with_stiffness(load_reducer("rv20e_liu2020"), identified).stiffness.carrier_bearing
         == identified.values["carrier_bearing"]
     )
 

@@ -33,7 +33,7 @@ FORCES = np.array(
 @pytest.fixture(scope="module")
 def rv40e() -> Reducer:
     """The preset with Hertzian line contact."""
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     return replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="logarithmic"))
 
 
@@ -180,7 +180,7 @@ def test_sixteen_teeth_need_pins_that_bend_between_supports_31_mm_apart(rv40e, m
 
 def test_forty_disc_teeth_as_printed_are_refused(tmp_path):
     path = tmp_path / "printed.toml"
-    text = (PRESETS / "rv40e.reducer.toml").read_text(encoding="utf-8")
+    text = (PRESETS / "rv40e_xi2015.reducer.toml").read_text(encoding="utf-8")
     assert "disc_teeth = 39" in text
     path.write_text(text.replace("disc_teeth = 39", "disc_teeth = 40"), encoding="utf-8")
     with pytest.raises(InputError, match="disc_teeth must be pin_count − 1 = 39"):

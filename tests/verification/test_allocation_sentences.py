@@ -45,7 +45,7 @@ def results(tmp_path_factory):
     table_frame(sources).to_csv(table, index=False)
     shown = ta.AtYield(target=TARGET)
     study = ta.Study(
-        ta.reducer("rv20e", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), neglected=("*",)),
+        ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), neglected=("*",)),
         ta.drawing(table),
         limits={
             ta.PEAK_TO_PEAK: ta.Limit(upper=50.0, show=shown),

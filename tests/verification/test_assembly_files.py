@@ -140,7 +140,7 @@ def test_every_number_of_the_shipped_reducer_is_marked_as_an_assumption():
     assert reducer.stiffness.pin_contact_law == "constant"
     for number in ("21 and 42", "40 pins", "3 mm", "64 mm", "1.3 mm", "12 mm", "207", "208", "+8 µm", "−2 µm", "1 N·m"):
         assert number in said, number
-    same = load_reducer("rv40e")
+    same = load_reducer("rv40e_xi2015")
     assert (reducer.first_stage, reducer.cycloid_stage) == (same.first_stage, same.cycloid_stage)
     assert (reducer.modification, reducer.stiffness) == (same.modification, same.stiffness)
 

@@ -83,7 +83,7 @@ def test_flanks_turned_towards_the_middle_of_their_tooth(seed):
 @pytest.mark.parametrize("pin_angle", [0.0, 1.0, 2.0, 178.0, 180.0])
 def test_edges_at_root_and_tip_of_turned_flanks(pin_angle):
     """At the root both positions leave a ridge in the middle, which the pin meets 9.5 µm early."""
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     amounts = Modification(equidistant=0.0, shift=0.0, rotation=200 * MICROMETRE / stage.disc_pitch_radius)
     pins = np.array([pin_angle * DEGREE])
     found = exact_clearance([ToothProfile(stage=stage, modification=amounts)], pins)[0]
@@ -218,7 +218,7 @@ def test_opposite_signs_overlap_and_are_refused(seed, equidistant, shift, rotati
 
 def test_flanks_turned_away_from_the_middle_of_their_tooth():
     """The flank of a tooth made thicker by δ·r_d has that much less clearance, exactly as by the formula."""
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     amounts = Modification(equidistant=20e-6, shift=0.0, rotation=-10e-6 / stage.disc_pitch_radius)
     profile = ToothProfile(stage=stage, modification=amounts)
     require_sound(profile, "mine")
@@ -227,7 +227,7 @@ def test_flanks_turned_away_from_the_middle_of_their_tooth():
 
 def test_backlash_of_turned_flanks_alone():
     """Every pin of a flank touches when the disc has turned by δ, but for those without lever at root and tip."""
-    stage, turned = load_reducer("rv40e").cycloid_stage, 1e-4
+    stage, turned = load_reducer("rv40e_xi2015").cycloid_stage, 1e-4
     profile = ToothProfile(stage=stage, modification=Modification(equidistant=0.0, shift=0.0, rotation=turned))
     assert clearance_of(profile, exact=False).backlash == pytest.approx(2 * turned, rel=1e-9)
 
@@ -235,7 +235,7 @@ def test_backlash_of_turned_flanks_alone():
 @pytest.mark.parametrize("exact", [False, True])
 def test_backlash_of_turned_flanks_with_clearance_at_the_root(exact):
     """The ridge between two positions of a root is 9.5 µm high here; 10 µm all around leave room for it."""
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     amounts = Modification(equidistant=10e-6, shift=0.0, rotation=200e-6 / stage.disc_pitch_radius)
     found = clearance_of(ToothProfile(stage=stage, modification=amounts), exact=exact)
     assert found.backlash * stage.disc_pitch_radius == pytest.approx(420e-6, abs=0.1e-6)
@@ -248,7 +248,7 @@ def test_backlash_of_turned_flanks_with_clearance_at_the_root(exact):
 
 def test_conventions_of_the_sources():
     """xi2015 prints −2 and +8 µm: with its own Rp − Δr_p 6 µm of radial clearance, with Rp + Δr_p an interference."""
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     minus = Modification.from_convention("minus", equidistant=-2e-6, shift=8e-6)
     plus = Modification.from_convention("plus", equidistant=-2e-6, shift=8e-6)
     assert (minus.equidistant, minus.shift) == (-2e-6, -8e-6)
@@ -344,7 +344,7 @@ def _lever(angle: float) -> float:
 
 
 def test_rv40e_by_formula_and_exactly():
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     stage = reducer.cycloid_stage
     profile = ToothProfile(stage=stage, modification=reducer.modification)
     found, linear = clearance_of(profile, exact=True), clearance_of(profile)
@@ -365,7 +365,7 @@ def test_rv40e_by_formula_and_exactly():
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("amount", ["equidistant", "shift", "rotation"])
 def test_modifications_above_50_um_are_large(amount, sign):
-    stage = load_reducer("rv40e").cycloid_stage
+    stage = load_reducer("rv40e_xi2015").cycloid_stage
     unit = 1 / stage.disc_pitch_radius if amount == "rotation" else 1.0
     assert pytest.approx(50e-6, rel=1e-12) == LARGE
     for size, large in ((49.9e-6, False), (50.1e-6, True)):

@@ -240,7 +240,7 @@ def test_the_loaded_pins_of_these_cases_stand_on_both_parts_of_the_tooth():
 
 def test_pins_between_two_supports_are_beams():
     """A disc loads one half of the span evenly, its neighbour has the other; the pin gives way in the load's middle."""
-    reducer, span = load_reducer("rv40e"), 0.031
+    reducer, span = load_reducer("rv40e_xi2015"), 0.031
     rigidity = reducer.pin_material.elastic_modulus * pi * (2 * reducer.cycloid_stage.pin_radius) ** 4 / 64
 
     def moment(at: float) -> float:  # of the unit load on 0 … l/2; its support carries 3/4 of it
@@ -311,7 +311,7 @@ def test_pins_of_the_equivalent_model_with_rigid_bearings_are_pressed_alike(law,
 @pytest.mark.parametrize("torque", [0.01, 0.02, 0.1, 1.0, 2.0, 5.0, 10.0, 50.0])
 def test_li_lixings_method_under_a_small_torque(torque):
     """The constant law has an equilibrium for every torque, and with it the proportional method is the same."""
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     assert reducer.stiffness.pin_contact_law == "constant"
     discs = PressedDiscs(reducer=reducer, torque=torque)
     expected = pressed(discs, default_phases(reducer, 9))
@@ -322,7 +322,7 @@ def test_li_lixings_method_under_a_small_torque(torque):
 @pytest.mark.parametrize(("torque", "degrees"), [(0.0751397, 0.75), (0.396055, 6.25)])
 def test_li_lixings_iteration_settles(torque, degrees):
     """Where one or two pins carry, the approach falls three times as fast as the deflection grows."""
-    discs, phase = PressedDiscs(reducer=load_reducer("rv40e"), torque=torque), np.radians([degrees])
+    discs, phase = PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=torque), np.radians([degrees])
     expected = pressed(discs, phase).force
     np.testing.assert_allclose(pressed_linear(discs, phase).force, expected, rtol=1e-6, atol=1e-8 * expected.max())
 
@@ -344,7 +344,7 @@ def test_the_zone_is_where_a_pin_would_be_compressed(case):
 @pytest.mark.parametrize("exact", [False, True])
 def test_the_zone_holds_all_pins_that_carry(exact):
     """Where Δr_rp·q < Δr_p two places touch first, near root and tip; a small torque leaves the pins between free."""
-    reducer = replace(load_reducer("rv40e"), modification=Modification(equidistant=20e-6, shift=18e-6))
+    reducer = replace(load_reducer("rv40e_xi2015"), modification=Modification(equidistant=20e-6, shift=18e-6))
     found = pressed(PressedDiscs(reducer=reducer, torque=5.0, exact=exact), default_phases(reducer, 9))
     carrying = found.pin_angle[found.force > 0]
     assert carrying.min() < 0.2 < 1.7 < carrying.max()
@@ -357,7 +357,7 @@ def test_the_zone_holds_all_pins_that_carry(exact):
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_torque_beyond_any_contact_is_refused(law, exact):
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
     for torque in (1e8, 1e12, inf):
         discs = PressedDiscs(reducer=reducer, torque=torque, exact=exact)
@@ -368,11 +368,11 @@ def test_a_torque_beyond_any_contact_is_refused(law, exact):
 @pytest.mark.parametrize("torque", [0.0, -1.0, float("nan")])
 def test_no_torque_is_refused(torque):
     with pytest.raises(InputError, match=r"^RV-40E: torque on the discs is .*; allowed is above 0 N·m\.$"):
-        PressedDiscs(reducer=load_reducer("rv40e"), torque=torque)
+        PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=torque)
 
 
 def test_a_deflection_that_reaches_no_pin_is_refused():
-    reducer = load_reducer("rv40e")
+    reducer = load_reducer("rv40e_xi2015")
     discs = PressedDiscs(reducer=reducer, torque=1.0)
     with pytest.raises(InputError, match=r"^RV-40E: a deflection of .* µm reaches no pin; allowed is .*\.$"):
         pressed_linear(discs, default_phases(reducer, 9), deflection=1e-12)

@@ -104,7 +104,7 @@ def test_two_half_turns_are_none(prepared: Prepared) -> None:
 
 
 def test_a_half_turn_needs_two_cranks_two_discs_and_an_even_number_of_pins() -> None:
-    reducer, columns = load_reducer("rv20e"), ("disc1.bore1.position.x", "disc2.bore2.position.x")
+    reducer, columns = load_reducer("rv20e_liu2020"), ("disc1.bore1.position.x", "disc2.bore2.position.x")
     assert has_half_turn(reducer, columns)
     assert not has_half_turn(reducer, columns[:1])
     assert not has_half_turn(replace(reducer, crank_count=3), columns)
@@ -117,7 +117,7 @@ def test_a_half_turn_needs_two_cranks_two_discs_and_an_even_number_of_pins() -> 
 )
 def test_every_column_of_the_model_has_its_image_in_the_twin(kind: str) -> None:
     """Whatever a drawing may list, the unit turned by half a turn has the same curve."""
-    reducer = load_reducer("rv20e")
+    reducer = load_reducer("rv20e_liu2020")
     model = EquivalentModel(reducer)
     turn = half_turn(model.columns, reducer)
     assert has_half_turn(reducer, model.columns)
@@ -136,7 +136,7 @@ def test_every_column_of_the_model_has_its_image_in_the_twin(kind: str) -> None:
 
 
 def test_a_drawing_that_lists_one_of_two_has_no_twins() -> None:
-    reducer = load_reducer("rv20e")
+    reducer = load_reducer("rv20e_liu2020")
     both = ("planet1.eccentricity.x", "planet2.eccentricity.x", "disc1.tilt.x", "disc2.tilt.x")
     assert has_half_turn(reducer, both)
     for name in both:

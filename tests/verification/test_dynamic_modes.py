@@ -36,9 +36,9 @@ def heavy(model: EquivalentModel, output_inertia: float = 100.0):
 @pytest.mark.parametrize(
     ("preset", "law", "torque"),
     [
-        ("rv20e", "constant", -167.0),
-        ("rv20e", "table2", -3.0),
-        ("rv40e", "constant", -412.0),
+        ("rv20e_liu2020", "constant", -167.0),
+        ("rv20e_liu2020", "table2", -3.0),
+        ("rv40e_xi2015", "constant", -412.0),
         ("rv80e", "table2", -1.0),
     ],
 )

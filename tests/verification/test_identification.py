@@ -33,7 +33,7 @@ from tolalloc.surrogate.regression import fit_box_polynomial, total_degrees
 from tolalloc.units import ARCSECOND
 
 NONE = np.empty(0)
-RV20E = load_reducer("rv20e")
+RV20E = load_reducer("rv20e_liu2020")
 ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
 
 

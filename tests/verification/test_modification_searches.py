@@ -28,7 +28,7 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 SONG = CycloidStage(
     pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=0.0015, face_width=0.01
 )
-RV40E = load_reducer("rv40e").cycloid_stage
+RV40E = load_reducer("rv40e_xi2015").cycloid_stage
 FIT, GAP = rotated_profile_fit(SONG), residual_gap(RV40E, 15 * MICROMETRE)
 PROBLEMS = {
     "fit": FIT,

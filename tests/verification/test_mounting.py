@@ -86,7 +86,7 @@ def fits(reducer: Reducer, disc: int, bores: int) -> bool:
     ("cranks", "discs", "teeth"), [(2, 2, 39), (3, 2, 39), (2, 3, 39), (3, 3, 40), (2, 2, 40), (4, 2, 41)]
 )
 def test_discs_fit_where_their_teeth_meet_all_pins(cranks: int, discs: int, teeth: int) -> None:
-    base = load_reducer("rv20e")
+    base = load_reducer("rv20e_liu2020")
     stage = replace(base.cycloid_stage, disc_teeth=teeth, pin_count=teeth + 1)
     reducer = replace(base, crank_count=cranks, disc_count=discs, cycloid_stage=stage)
     for disc in range(discs):
@@ -95,7 +95,7 @@ def test_discs_fit_where_their_teeth_meet_all_pins(cranks: int, discs: int, teet
 
 
 def test_discs_of_an_rv20e_are_alike_and_the_second_stands_turned_by_half_a_turn() -> None:
-    reducer = load_reducer("rv20e")
+    reducer = load_reducer("rv20e_liu2020")
     places = {place.name: place for place in places_of(reducer)}
     assert [turn.number for turn in places["disc1"].turns] == [0]
     assert [(turn.number, turn.ring.by) for turn in places["disc2"].turns] == [(1, 20)]
@@ -107,12 +107,12 @@ def test_planets_that_meet_the_sun_unlike_keep_their_cranks_in_place() -> None:
     def kinds(name: str) -> list[str]:
         return [place.kind for place in places_of(load_reducer(name)) if place.name.startswith("crank")]
 
-    assert kinds("rv20e") == ["crank"] * 2
-    assert kinds("rv40e") == ["crank1", "crank2"]  # (21 + 42)/2 is not whole
+    assert kinds("rv20e_liu2020") == ["crank"] * 2
+    assert kinds("rv40e_xi2015") == ["crank1", "crank2"]  # (21 + 42)/2 is not whole
     assert kinds("rv80e") == ["crank"] * 3
 
 
-@pytest.mark.parametrize("name", ["rv20e", "rv80e"])
+@pytest.mark.parametrize("name", ["rv20e_liu2020", "rv80e"])
 def test_every_column_but_the_modification_belongs_to_one_place(name: str) -> None:
     reducer = load_reducer(name)
     for column in EquivalentModel(reducer).columns:
@@ -225,7 +225,7 @@ def test_counting_from_another_of_three_cranks_is_no_other_mounting(generator: n
     assert np.abs(curve(model, same, angles) - np.roll(before, -angles // 3)).max() < ROUNDING
     assert np.abs(curve(model, other, angles) - np.roll(before, -angles // 3)).max() > 0.01
     assert len(places["carrier"].turns) == 1
-    assert len(place(load_reducer("rv20e"), "carrier").turns) == 2
+    assert len(place(load_reducer("rv20e_liu2020"), "carrier").turns) == 2
 
 
 def test_a_unit_turned_by_half_a_turn_is_its_parts_turned_and_exchanged(
@@ -372,7 +372,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_a_parts_file_is_read_in_its_units(tmp_path: Path) -> None:
-    reducer = load_reducer("rv20e")
+    reducer = load_reducer("rv20e_liu2020")
     parts = load_parts(written(tmp_path, HEADER + ONE_UNIT), reducer)
     assert [(part.name, part.kind) for part in parts] == [
         ("C 1", "carrier"),
@@ -408,13 +408,13 @@ def test_a_wrong_parts_file_is_refused_in_one_sentence(
     tmp_path: Path, text: str, error: type[TolallocError], sentence: str
 ) -> None:
     with pytest.raises(error, match=sentence) as raised:
-        load_parts(written(tmp_path, text), load_reducer("rv20e"))
+        load_parts(written(tmp_path, text), load_reducer("rv20e_liu2020"))
     assert str(raised.value).count("\n") == 0
     assert str(tmp_path) in str(raised.value)
 
 
 def test_parts_of_three_cranks_name_the_place_that_a_disc_is_made_for(tmp_path: Path) -> None:
-    reducer = replace(load_reducer("rv20e"), name="own", crank_count=3)
+    reducer = replace(load_reducer("rv20e_liu2020"), name="own", crank_count=3)
     text = HEADER + ONE_UNIT + "K 3, crank, mesh.deviation, 1, µm\n"
     sentence = "row 5: kind is 'disc'; allowed is disc1 or disc2: made for one place of this reducer, a disc fits no"
     with pytest.raises(InputError, match=sentence):
@@ -424,7 +424,7 @@ def test_parts_of_three_cranks_name_the_place_that_a_disc_is_made_for(tmp_path: 
 
 
 def test_the_example_file_holds_two_units() -> None:
-    parts = load_parts(Path("studies/rv20e_two_units.parts.csv"), load_reducer("rv20e"))
+    parts = load_parts(Path("studies/rv20e_two_units.parts.csv"), load_reducer("rv20e_liu2020"))
     assert len(parts) == 12
 
 

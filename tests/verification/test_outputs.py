@@ -72,7 +72,7 @@ def test_orders_have_amplitude_and_phase():
     np.testing.assert_allclose([amplitude, phase, other, lag], [3.0, 0.7, 1.5, -2.0], atol=1e-12)
 
 
-@pytest.mark.parametrize("preset", ["rv20e", "rv40e", "rv80e", "bx40e"])
+@pytest.mark.parametrize("preset", ["rv20e_liu2020", "rv40e_xi2015", "rv80e", "bx40e"])
 def test_backlash_is_the_first_gap_that_closes_over_its_lever(preset):
     """Sun held and no load: a pin's gap closes by e·zp·i/(i−1)·|sin a| per radian of the carrier, on either side."""
     reducer = load_reducer(preset)

@@ -141,7 +141,7 @@ BEARINGS = f"crank_disc_bearing = {{ {JOURNAL} }}\ncrank_carrier_bearing = {{ {J
 
 
 def written(folder, bearings=BEARINGS, clearances=""):
-    preset = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    preset = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     before, after = preset.split("[stiffness]")[0], preset.split("[modification]")[1]
     path = folder / "own.reducer.toml"
     path.write_text(f"{before}[stiffness]{DIMENSIONS}{bearings}\n{clearances}\n[modification]{after}", "utf-8")

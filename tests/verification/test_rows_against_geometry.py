@@ -180,7 +180,7 @@ def exact_rows(name: str, at: DisplacedReducer) -> np.ndarray:
 
 @pytest.mark.parametrize("cranks", [2, 3])
 def test_rows_are_the_derivatives_of_exact_geometry(cranks, generator):
-    reducer = replace(load_reducer("rv20e"), crank_count=cranks)
+    reducer = replace(load_reducer("rv20e_liu2020"), crank_count=cranks)
     carrier_angles = generator.uniform(0, 2 * np.pi, ANGLES)
     groups = spring_groups(reducer, carrier_angles)
     assert {group.name for group in groups} == EXACT_ROWS.keys()

@@ -42,7 +42,7 @@ def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: f
     )
     return SimulationAnswer(
         header=Header(name="exact", model="RV-40E", assumptions=("steel",)),
-        reducer=load_reducer("rv40e"),
+        reducer=load_reducer("rv40e_xi2015"),
         engine="newmark",
         speed=SPEED,
         torque=-LOAD,

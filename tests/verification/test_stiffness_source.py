@@ -154,7 +154,7 @@ def test_a_stiffness_without_uncertainty_has_no_share(response):
 
 
 def test_source_of_the_shipped_file():
-    identified, reducer = load_identified_stiffness("rv20e_table6"), load_reducer("rv20e")
+    identified, reducer = load_identified_stiffness("rv20e_table6"), load_reducer("rv20e_liu2020")
     found = stiffness_source(identified, reducer)
     assert found.columns == tuple(f"stiffness.{name}" for name in identified.values)
     np.testing.assert_allclose(found.factor @ found.factor.T, identified.covariance, rtol=1e-12, atol=1e-20)

@@ -45,7 +45,7 @@ def with_stiffness(reducer: Reducer, **values) -> Reducer:
 
 @pytest.fixture(scope="module")
 def rigid() -> Reducer:
-    return with_rigid_bearings(load_reducer("rv40e"))
+    return with_rigid_bearings(load_reducer("rv40e_xi2015"))
 
 
 def brief_run(reducer: Reducer, torque: float, errors=None):
@@ -155,7 +155,7 @@ def test_bearings_yield_as_in_the_equivalent_model(rigid):
 
     An ideal first stage does not feel where the planets stand, so their bearings have to be rigid in both models.
     """
-    own = load_reducer("rv40e").stiffness
+    own = load_reducer("rv40e_xi2015").stiffness
     reducer = with_stiffness(rigid, crank_disc_bearing=own.crank_disc_bearing, carrier_bearing=own.carrier_bearing)
     answer, late = brief_run(reducer, -572.0)
     mean = answer.transmission_error[late].mean() / ARCSECOND
@@ -172,7 +172,7 @@ def test_an_ideal_first_stage_does_not_feel_that_planets_yield(rigid):
 
     Here r is the planet's pitch radius; the crank's turn reaches the output divided by zc + 1 + Z1/Z2.
     """
-    stiffness = load_reducer("rv40e").stiffness.crank_carrier_bearing
+    stiffness = load_reducer("rv40e_xi2015").stiffness.crank_carrier_bearing
     reducer = replace(rigid, modification=Modification(equidistant=1 * MICROMETRE, shift=0.0))
     reducer = with_stiffness(reducer, crank_carrier_bearing=stiffness)
     answer, late = brief_run(reducer, -572.0)

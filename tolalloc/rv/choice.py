@@ -192,7 +192,7 @@ def reducer(
 
     Examples
     --------
-    >>> reducer("rv20e", stiffness="rv20e_table6").reducer.crank_count
+    >>> reducer("rv20e_liu2020", stiffness="rv20e_table6").reducer.crank_count
     2
     """
     for field, own in (("flank_clearance", flank_clearance), ("radial_clearance", radial_clearance)):
