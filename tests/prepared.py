@@ -26,7 +26,12 @@ def prepared(
     changes
         Other fields of ``ta.Study``.
     """
-    chosen = {"name": "rv20e_liu2020", "flank_clearance": (1.0, 5.0), "radial_clearance": (5.0, 20.0), **(reducer or {})}
+    chosen = {
+        "name": "rv20e_liu2020",
+        "flank_clearance": (1.0, 5.0),
+        "radial_clearance": (5.0, 20.0),
+        **(reducer or {}),
+    }
     study = ta.Study(
         model=ta.reducer(**chosen),
         drawing=ta.drawing(**{"table": "rv20e_baseline", **(drawing or {})}),

@@ -53,7 +53,9 @@ def simulated(bench: Bench, count: int, folder: Path) -> Path:
 
 
 def identify(folder: Path, *options: object, name: str = NAME) -> subprocess.CompletedProcess[str]:
-    return tolalloc("identify", folder / "measurement.toml", "--reducer", "rv20e_liu2020", "--parameter", name, *options)
+    return tolalloc(
+        "identify", folder / "measurement.toml", "--reducer", "rv20e_liu2020", "--parameter", name, *options
+    )
 
 
 def answered(result: subprocess.CompletedProcess[str]) -> dict:

@@ -69,7 +69,9 @@ def set_cell(row: int, column: str, value: str):
 
 def test_te_of_table_4(tmp_path):
     folder = tmp_path / "report"
-    result = tolalloc("te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-1", "--json", "--out", folder)
+    result = tolalloc(
+        "te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-1", "--json", "--out", folder
+    )
     answer = json.loads(result.stdout)
     assert result.returncode == 0
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer

@@ -40,7 +40,9 @@ def test_one_unit_is_mounted_in_the_best_of_all_ways(tmp_path):
 
 def test_two_units_share_their_parts_and_are_reported(tmp_path):
     folder = tmp_path / "report"
-    said = tolalloc("mount", str(parts_file(tmp_path, 2)), "--reducer", "rv20e_liu2020", "--starts", "1", "--out", folder)
+    said = tolalloc(
+        "mount", str(parts_file(tmp_path, 2)), "--reducer", "rv20e_liu2020", "--starts", "1", "--out", folder
+    )
     assert "who goes where" in said.stdout
     assert "no other one does is not proven" in " ".join(said.stdout.split())
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

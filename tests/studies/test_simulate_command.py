@@ -62,7 +62,9 @@ def test_the_compliance_decides_how_many_pins_carry():
 
 @INSTALLED
 def test_the_prototype_turns_with_the_same_ratio():
-    answer = json.loads(tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--engine", "exudyn", "--json").stdout)
+    answer = json.loads(
+        tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--engine", "exudyn", "--json").stdout
+    )
     assert answer["in motion"]["ratio [-]"] == pytest.approx(81, rel=1e-5)
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
         answer["at rest"]["mean transmission error [arcsec]"], abs=1.5

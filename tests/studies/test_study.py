@@ -119,7 +119,8 @@ def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path
     (script.parent / "own_helper_of_a_study.py").write_text("TABLE = 'tables/own.csv'\nUPPER = 55.0\n")
     script.write_text(
         "import tolalloc as ta\nfrom own_helper_of_a_study import TABLE, UPPER\n"
-        "study = ta.Study(ta.reducer('rv20e_liu2020'), ta.drawing(TABLE), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)})\n"
+        "limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)}\n"
+        "study = ta.Study(ta.reducer('rv20e_liu2020'), ta.drawing(TABLE), limits=limits)\n"
     )
     environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "200"}
     words = command("check", script)

@@ -27,6 +27,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit
+from tolalloc.rv.rigidity import against_catalogue, twist_shares
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 if TYPE_CHECKING:
@@ -73,12 +74,13 @@ class TransmissionErrorAnswer(Answer):
             f"The transmission error spans {found['peak_to_peak_arcsec']:.2f}″ over one output turn, from "
             f"{found['smallest_arcsec']:.2f}″ at {found['smallest_at_deg']:.2f}° to {found['largest_arcsec']:.2f}″ at "
             f"{found['largest_at_deg']:.2f}°; its strongest orders are {strongest}.",
+            *((stated,) if (stated := against_catalogue(self.equilibria.reducer, self.loop)[0]) else ()),
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        return self.cautions
+        return (*self.cautions, *against_catalogue(self.equilibria.reducer, self.loop)[1])
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -96,6 +98,11 @@ class TransmissionErrorAnswer(Answer):
                 heading="One output turn",
                 figures=(self.curve_figure, self.order_figure),
                 tables=(("one turn", self.turn_table),),
+            ),
+            Section(
+                heading="Which part yields",
+                paragraphs=("The twist of the perfect reducer under its rated torque, part by part.",),
+                tables=(("twist", twist_shares(self.equilibria.reducer)),),
             ),
             *shares,
         )

@@ -13,7 +13,7 @@ from tolalloc.files import times
 from tolalloc.named_fields import is_number
 from tolalloc.rv.reducer.series import Part, stiffness_at
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
-from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
 
@@ -144,6 +144,18 @@ class Load:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Catalogue:
+    """What a maker's catalogue states of the size, to hold the model against; table ``[catalogue]``."""
+
+    torsional_rigidity: Annotated[
+        float, Field(alias="torsional_rigidity_nm_per_arcmin", ge=0.1, le=1e5), times(1 / ARCMINUTE)
+    ]  # Torque over twist between 3 % and 100 % of the rated torque [N·m/rad]
+    # Largest twist between both directions of 3 % of the rated torque, and largest error over a turn [rad]
+    lost_motion: Annotated[float, Field(alias="lost_motion_arcmin", gt=0, le=60), times(ARCMINUTE)]
+    transmission_error: Annotated[float, Field(alias="transmission_error_arcsec", gt=0, le=3600), times(ARCSECOND)]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Reducer:
     """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
 
@@ -161,6 +173,7 @@ class Reducer:
     clearances: Clearances = field(default_factory=Clearances)
     # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
     parts: tuple[Part, ...] = ()
+    catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = field(default=())
 
     def at_torque(self, torque: float) -> Reducer:

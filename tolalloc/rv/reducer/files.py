@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
-from tolalloc.rv.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.rv.reducer.design import Catalogue, Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
 from tolalloc.rv.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
@@ -67,6 +67,7 @@ class ReducerRecord(Record):
     modification: ModificationRecord
     load: Load
     clearances: Clearances = Clearances()
+    catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = ()
 
     @model_validator(mode="after")
@@ -93,6 +94,7 @@ class ReducerRecord(Record):
             ),
             load=self.load,
             clearances=self.clearances,
+            catalogue=self.catalogue,
             assumptions=self.assumptions,
         )
         reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())

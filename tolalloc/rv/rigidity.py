@@ -1,0 +1,78 @@
+"""How stiff a reducer is: against its catalogue, and which part yields how much of the twist."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.series import compliances
+from tolalloc.units import ARCMINUTE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FACTOR = 1.5
+"""Model over catalogue, or catalogue over model, from which on a difference is a warning [-]."""
+
+_PHASES = 16  # of one pin pitch, at which the twist is read
+_INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
+
+
+def twist_shares(reducer: Reducer) -> pd.DataFrame:
+    """Return which part yields how much of the twist of the perfect reducer at rated torque.
+
+    By virtual work T·θ is the sum of force times way over all springs, each interface divided among its parts by their
+    compliances; what is left is that of pins and teeth, their clearance included. Mean over a pin pitch.
+    """
+    import pandas as pd
+
+    torque = reducer.load.rated_torque
+    own = reducer.at_torque(torque)
+    model = EquivalentModel(own)
+    pitch = 2.0 * np.pi / own.cycloid_stage.pin_count
+    nominal = own.modification.deviations
+    errors = np.array([[nominal.get(name, 0.0) for name in model.columns]])
+    solved = model.equilibria(errors, torque, pitch * np.arange(_PHASES) / _PHASES)
+    found, twist = forces(solved), float(solved.transmission_error.mean())
+    rows, left = [], 1.0
+    parts = compliances(own, torque)
+    for interface in _INTERFACES:
+        stiffness = getattr(own.stiffness, interface)
+        share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / (torque * twist))
+        left -= share
+        plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}
+        for name, compliance in parts.get(interface, plain).items():
+            rows.append((name, 100.0 * share * compliance * stiffness, 1.0 / compliance))
+    rows.append(("pins and teeth, with their clearance", 100.0 * left, np.nan))
+    frame = pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/m]"])
+    return frame.sort_values("share of the twist [%]", ascending=False, ignore_index=True)
+
+
+def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
+    """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
+
+    The sample of the loop is the perfect reducer's; without a catalogue both are empty.
+    """
+    stated = reducer.catalogue
+    if stated is None:
+        return "", ()
+    rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
+    wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
+    sentence = (
+        f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
+        f"{wanted:.3g} ({100 * (rigidity / wanted - 1):+.0f} %), the lost motion {lost:.2g}′ where it allows "
+        f"{largest:.2g}′."
+    )
+    warnings = []
+    if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
+        off = rigidity / wanted
+        times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
+        warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
+    if lost > largest:
+        warnings.append(f"The perfect reducer's lost motion of {lost:.2g}′ is above the catalogue's {largest:.2g}′.")
+    return sentence, tuple(warnings)
