@@ -37,8 +37,10 @@ if TYPE_CHECKING:
     from tolalloc.report.answer import Answer as Answer
     from tolalloc.report.document import Section as Section
     from tolalloc.rv import BACKLASH as BACKLASH
+    from tolalloc.rv import FRICTION_TORQUE as FRICTION_TORQUE
     from tolalloc.rv import LOST_MOTION as LOST_MOTION
     from tolalloc.rv import PEAK_TO_PEAK as PEAK_TO_PEAK
+    from tolalloc.rv import PRELOAD as PRELOAD
     from tolalloc.rv import RADIAL_CLEARANCE as RADIAL_CLEARANCE
     from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.rv.choice import reducer as reducer
@@ -66,7 +68,9 @@ _WHERE = {
     "LOST_MOTION": "rv",
     "Limit": "study.limit",
     "Model": "models",
+    "FRICTION_TORQUE": "rv",
     "PEAK_TO_PEAK": "rv",
+    "PRELOAD": "rv",
     "QualityLoss": "allocation.cost.unit_price",
     "Question": "study.questions",
     "RADIAL_CLEARANCE": "rv",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell
 from tolalloc.cli.contact import ProfileFile, ProfilePoints, require_writable, write_asked
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
@@ -27,12 +28,14 @@ def modify(
     torque: RatedTorqueOption = None,
     profile: ProfileFile = None,
     points: ProfilePoints = 200,
+    write: Annotated[Path | None, typer.Option(help="Reducer file to write: the reducer with these amounts.")] = None,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Choose equidistant and shift amount by a published objective, and say what they deliver."""
+    from tolalloc.files import require_new
     from tolalloc.rv.modification.study import ModificationStudy, choose
-    from tolalloc.rv.reducer.files import load_reducer
+    from tolalloc.rv.reducer.files import load_reducer, write_modified
     from tolalloc.units import MICROMETRE
 
     study = ModificationStudy(
@@ -45,9 +48,14 @@ def modify(
     )
     named = named_reducer(reducer, out, profile)
     require_writable(out, profile, points)
+    if write:
+        require_new(write)
     design = load_reducer(named)
     asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, "tolalloc modify")
     announce_compilation("cycloid")
     answer = choose(study, design, asked)
     write_asked(answer, out, answer.contact.assessment.profile, profile, points)
+    if write:
+        write_modified(named, answer.best.modification, write)
+        note(f"The reducer with these amounts is {write}.")
     tell(answer, as_json, (answer.delivered, f"{design.name}, {method}: what the amounts deliver"))

@@ -25,6 +25,7 @@ from tolalloc.rv.equivalent.hysteresis import (
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
+from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload, rated_pin_force
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.rigidity import against_catalogue, twist_shares
@@ -49,6 +50,7 @@ class TransmissionErrorAnswer(Answer):
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
     equilibria: Equilibria  # At equally spaced angles of one output turn
     extremes: Extremes  # Largest and smallest transmission error, refined
+    preload: Preload  # What presses in this unit without torque
     loop: HysteresisLoop  # Hysteresis loop of this unit and of the perfect reducer
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
@@ -80,7 +82,19 @@ class TransmissionErrorAnswer(Answer):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        return (*self.cautions, *against_catalogue(self.equilibria.reducer, self.loop)[1])
+        return (*self.jammed, *self.cautions, *against_catalogue(self.equilibria.reducer, self.loop)[1])
+
+    @cached_property
+    def jammed(self) -> tuple[str, ...]:
+        """Say that the unit presses itself without torque, if it does so by more than the rated torque would."""
+        found, rated = self.preload, rated_pin_force(self.equilibria.reducer)
+        if not found.pin_force[0] > rated:
+            return ()
+        return (
+            f"This unit is jammed: without torque its pins press with up to {found.pin_force[0]:.0f} N, where the "
+            f"rated torque makes {rated:.0f} N in a perfect reducer; turning it takes about "
+            f"{found.friction_torque[0]:.2g} N·m at the output.",
+        )
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -129,6 +143,8 @@ class TransmissionErrorAnswer(Answer):
                 {"name": name, "unit": unit, "value": float(value(solved)[0])}
                 for name, (unit, value) in OUTPUTS.items()
             ],
+            "pin_force_without_torque_n": float(self.preload.pin_force[0]),
+            "no_load_friction_torque_nm": float(self.preload.friction_torque[0]),
             "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
             "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),
             "torsional_stiffness_nm_per_arcmin": _pair(self.loop.torsional_stiffness, 1 / ARCMINUTE),
@@ -175,6 +191,8 @@ class TransmissionErrorAnswer(Answer):
             (f"smallest, at {found['smallest_at_deg']:.2f}° [arcsec]", f"{found['smallest_arcsec']:.2f}"),
             *waves,
             *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in found["outputs"]),
+            ("largest pin force without torque [N]", _short(found["pin_force_without_torque_n"])),
+            ("no-load friction torque of the pins [N·m]", _short(found["no_load_friction_torque_nm"])),
             *loops,
             ("reversing the direction adds, mean [arcsec]", f"{found['reversal_arcsec']['mean']:.2f}"),
             ("reversing the direction adds, peak-to-peak [arcsec]", f"{found['reversal_arcsec']['peak_to_peak']:.2f}"),
@@ -269,12 +287,13 @@ def transmission_error(
             name=unit.name,
             model=reducer.name,
             conditions={"torque on the carrier [N·m]": torque},
-            assumptions=(*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION),
+            assumptions=(*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION, PRELOAD_ASSUMPTION),
             statuses=dict(count_statuses(equilibria.status)),
         ),
         torque=torque,
         equilibria=equilibria,
         extremes=extremes,
+        preload=preload(model, errors),
         loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,

@@ -46,7 +46,8 @@ class ModificationAnswer(Answer):
             f"Equidistant amount {equidistant:.4f} µm, shift amount {shift:.4f} µm (pin radius and pin circle radius "
             f"plus these at grinding): the least {self.problem.description}, {self.best.objective / MICROMETRE:.6g} "
             "µm.",
-            f"In a reducer file: [modification] equidistant_um = {equidistant:.4f}, shift_um = {shift:.4f}.",
+            f"In a reducer file: [modification] equidistant_um = {equidistant:.4f}, shift_um = {shift:.4f}, "
+            'convention = "plus".',
             *self.contact.sentences,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import replace
 from math import pi
@@ -122,6 +123,31 @@ def load_reducer(name: str | Path) -> Reducer:
     """
     path = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
     return validated(ReducerRecord, read_toml(path), path).reducer()
+
+
+_MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
+
+
+def write_modified(name: str | Path, modification: Modification, path: Path) -> None:
+    """Write a reducer's file again with another modification, everything else of it as it was.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The new file is there already or cannot be made, or the old one has no table ``[modification]``.
+    """
+    source = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
+    table = (
+        "[modification] # pin radius + equidistant, pin circle radius + shift, at grinding\n"
+        f"equidistant_um = {as_toml(modification.equidistant / MICROMETRE)}\n"
+        f"shift_um = {as_toml(modification.shift / MICROMETRE)}\n"
+        'convention = "plus"\n\n'
+    )
+    text, found = _MODIFICATION.subn(table, source.read_text(encoding="utf-8"))
+    if found != 1:
+        raise InputError(f"{source}: no table [modification] of its own; without it nothing can be put in its place.")
+    validated(ReducerRecord, tomllib.loads(text), path)
+    write_new(path, text)
 
 
 def load_identified_stiffness(name: str | Path) -> IdentifiedStiffness:

@@ -10,12 +10,21 @@ from jaxtyping import Float, UInt8
 
 from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation
-from tolalloc.rv import BACKLASH, LOST_MOTION, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
+from tolalloc.rv import (
+    BACKLASH,
+    FRICTION_TORQUE,
+    LOST_MOTION,
+    PEAK_TO_PEAK,
+    PRELOAD,
+    RADIAL_CLEARANCE,
+    TORSIONAL_STIFFNESS,
+)
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
+from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
@@ -68,6 +77,11 @@ def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.n
     return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
 
 
+def _preload(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    found = preload(model, errors)
+    return np.stack([found.pin_force, found.friction_torque], axis=1), found.status
+
+
 def _radial_clearance(
     model: EquivalentModel,
     errors: Float[np.ndarray, "chunk column"],
@@ -91,9 +105,10 @@ REQUIREMENTS = (
         ),
         read=_rated_load,
     ),
+    Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
     Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
 )
-"""What a requirement may limit: transmission error, torque against twist, load at rated torque, gap at tip and root."""
+"""What a requirement may limit: transmission error, torque against twist, rated load, preload, gap at tip and root."""
 
 
 def wave_outputs(order: int) -> tuple[str, str]:

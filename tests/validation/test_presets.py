@@ -1,0 +1,132 @@
+"""The presets against what catalogues state of their sizes, and the printed reducers against them."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from tests.studies.command import refused, tolalloc
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import forces
+from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload, rated_pin_force
+from tolalloc.rv.reducer.files import PRESETS, load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.rv.rigidity import FACTOR, against_catalogue, twist_shares
+from tolalloc.units import ARCMINUTE
+
+SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
+
+
+def perfect_loop(reducer):
+    model = EquivalentModel(reducer)
+    return hysteresis_loop(model, np.zeros((1, len(model.columns))), LOOP_ANGLES[::5])
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_rigidity_is_the_catalogues_within_a_fifth(size):
+    reducer = load_reducer(size)
+    loop = perfect_loop(reducer)
+    assert loop.torsional_stiffness[0] == pytest.approx(reducer.catalogue.torsional_rigidity, rel=0.2)
+    assert 0.1 < loop.lost_motion[0] / ARCMINUTE < reducer.catalogue.lost_motion / ARCMINUTE
+    sentence, warnings = against_catalogue(reducer, loop)
+    assert "where the catalogue states" in sentence
+    assert not warnings
+
+
+def test_one_rule_gives_the_dimensions_of_all_sizes():
+    for size in SIZES:
+        table = tomllib.loads((PRESETS / f"{size}.reducer.toml").read_text(encoding="utf-8"))
+        stage, shaft = table["cycloid_stage"], table["stiffness"]["crankshaft"]
+        reducer, width = load_reducer(size), stage["face_width_mm"]
+        assert width == round(0.2 * stage["pin_circle_radius_mm"])
+        force = reducer.load.rated_torque / reducer.crank_count / reducer.crank_circle_radius
+        stress = (
+            32 * force / 2 * (shaft["span_mm"] - stage["disc_spacing_mm"]) / 2e3 / np.pi / shaft["diameter_mm"] ** 3
+        )
+        assert stress * 1e3 == pytest.approx(130, rel=0.02)  # MPa; the diameter is rounded to 0.1 mm
+        for name in ("crank_disc_bearing", "crank_carrier_bearing"):
+            bearing = table["stiffness"][name]
+            assert bearing["roller_diameter_mm"] == pytest.approx(shaft["diameter_mm"] / 4, abs=0.051)
+            assert bearing["roller_length_mm"] == pytest.approx(0.7 * width, abs=0.051)
+
+
+def test_the_printed_stiffness_is_said_to_be_far_from_any_catalogue():
+    from dataclasses import replace
+
+    printed = replace(load_reducer("rv20e_liu2020"), catalogue=load_reducer("rv20e").catalogue)
+    loop = perfect_loop(printed)
+    assert loop.torsional_stiffness[0] * ARCMINUTE == pytest.approx(2519, rel=1e-3)
+    sentence, warnings = against_catalogue(printed, loop)
+    assert "2.52e+03 N·m/arcmin" in sentence
+    assert warnings[0].startswith("The model is 51.4 times as stiff as the catalogue states")
+    assert printed.catalogue.torsional_rigidity * FACTOR < loop.torsional_stiffness[0]
+
+
+@pytest.mark.parametrize("size", ["rv20e", "rv80e", "rv20e_liu2020"])
+def test_the_shares_of_the_twist_are_the_whole(size):
+    shares = twist_shares(load_reducer(size)).set_index("part")["share of the twist [%]"]
+    assert shares.sum() == pytest.approx(100.0, abs=1e-9)
+    assert (shares > -0.5).all()
+    if size == "rv20e":
+        assert shares["crank–disc bearing"] > 10
+        assert shares["crank bending, all journals"] > 10
+
+
+def test_preload_is_what_presses_at_the_torque_of_backlash():
+    reducer, unit = load_reducer("rv20e"), load_unit("table4")
+    model = EquivalentModel(reducer, orders=unit.orders)
+    errors = unit.errors(model.columns, reducer.modification.deviations)
+    both = np.concatenate(
+        [errors, np.where(np.array(model.columns) == "modification.equidistant", 8e-6, 0.0)[np.newaxis]]
+    )
+    found = preload(model, both)
+    angles = 2 * np.pi * np.arange(37) / 37
+    torque = -1e-4 * reducer.load.rated_torque
+    pins = forces(model.at_torque(torque).equilibria(both, torque, angles)).pins
+    assert found.pin_force == pytest.approx(pins.max(axis=(1, 2, 3)))
+    # A disc turns about its pole at e·zp from the housing's centre: slower sliding, longer way, pin by pin.
+    stage, worst = reducer.cycloid_stage, np.zeros((2, 37))
+    for at, angle in enumerate(angles):
+        for disc in range(2):
+            crank = -stage.disc_teeth * angle + np.pi * disc
+            pole = stage.eccentricity * stage.pin_count * np.array([np.cos(crank), np.sin(crank)])
+            for pin in range(stage.pin_count):
+                direction = 2 * np.pi * pin / stage.pin_count
+                centre = stage.pin_circle_radius * np.array([np.cos(direction), np.sin(direction)])
+                lever = np.hypot(*(centre - pole)) - stage.pin_radius
+                worst[:, at] += SLIDING_FRICTION * pins[:, at, disc, pin] * lever
+    assert found.friction_torque == pytest.approx(worst.max(axis=1), rel=1e-9)
+    assert found.pin_force[0] > rated_pin_force(reducer) > 100 * found.pin_force[1]
+
+
+def test_te_says_that_the_unit_of_table_4_is_jammed():
+    answer = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--json").stdout)
+    assert answer["warnings"][0].startswith("This unit is jammed: without torque its pins press with up to")
+    assert answer["pin_force_without_torque_n"] > 1000
+    exact = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "exact", "--json").stdout)
+    assert not any("jammed" in warning for warning in exact["warnings"])
+
+
+def numbers(found):
+    """Every number of an answer, in its order."""
+    inner = found.values() if isinstance(found, dict) else found if isinstance(found, list) else ()
+    return [found] if isinstance(found, int | float) else [number for one in inner for number in numbers(one)]
+
+
+@pytest.mark.parametrize("method", ["li2018", "song2019"])
+@pytest.mark.parametrize("preset", [pytest.param(name, marks=pytest.mark.slow) for name in SIZES] + ["rv40e_xi2015"])
+def test_written_amounts_give_what_modify_promises(tmp_path, preset, method):
+    written = tmp_path / "new.reducer.toml"
+    given = ("--reducer", preset, "--rotation", "0.0005", "--radial", "12", "--json")
+    promised = json.loads(tolalloc("modify", method, *given, "--write", written).stdout)
+    found = json.loads(tolalloc("contact", "--reducer", written, "--json").stdout)
+    assert numbers(found) == pytest.approx(numbers(promised["contact"]), rel=1e-6, abs=1e-6)
+    old, new = load_reducer(preset), load_reducer(written)
+    assert new.modification.equidistant * 1e6 == pytest.approx(promised["equidistant amount [µm]"], rel=1e-12)
+    assert new.modification.shift * 1e6 == pytest.approx(promised["shift amount [µm]"], rel=1e-12)
+    assert (new.stiffness, new.load, new.parts) == (old.stiffness, old.load, old.parts)
+    refused(tolalloc("modify", method, *given, "--write", written), "the file exists", "nothing is overwritten")
