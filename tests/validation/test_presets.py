@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from tests.studies.command import refused, tolalloc
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
+from tolalloc.rv.equivalent.outputs import forces, order_spectrum
 from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload, rated_pin_force
 from tolalloc.rv.reducer.files import PRESETS, load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
@@ -55,8 +56,6 @@ def test_one_rule_gives_the_dimensions_of_all_sizes():
 
 
 def test_the_printed_stiffness_is_said_to_be_far_from_any_catalogue():
-    from dataclasses import replace
-
     printed = replace(load_reducer("rv20e_liu2020"), catalogue=load_reducer("rv20e").catalogue)
     loop = perfect_loop(printed)
     assert loop.torsional_stiffness[0] * ARCMINUTE == pytest.approx(2519, rel=1e-3)
@@ -64,6 +63,20 @@ def test_the_printed_stiffness_is_said_to_be_far_from_any_catalogue():
     assert "2.52e+03 N·m/arcmin" in sentence
     assert warnings[0].startswith("The model is 51.4 times as stiff as the catalogue states")
     assert printed.catalogue.torsional_rigidity * FACTOR < loop.torsional_stiffness[0]
+
+
+def test_without_a_catalogue_the_twist_under_rated_torque_is_judged():
+    for size, off in (("rv20e", False), ("rv20e_liu2020", True)):
+        reducer = replace(load_reducer(size), catalogue=None)
+        sentence, warnings = against_catalogue(reducer, perfect_loop(reducer))
+        assert sentence == ""
+        assert any("sizes in catalogues twist by 3 to 4′" in warning for warning in warnings) is off
+
+
+def test_orders_that_are_rounding_are_no_main_orders():
+    angle = 2 * np.pi * np.arange(360) / 360
+    assert [order for order, *_ in order_spectrum(np.cos(5 * angle)[np.newaxis]).main(4)] == [5]
+    assert order_spectrum(np.zeros((1, 360))).main(4) == []
 
 
 @pytest.mark.parametrize("size", ["rv20e", "rv80e", "rv20e_liu2020"])

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 FACTOR = 1.5
 """Model over catalogue, or catalogue over model, from which on a difference is a warning [-]."""
 
+USUAL_TWIST = 3.6
+"""Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
+
 _PHASES = 16  # of one pin pitch, at which the twist is read
 _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
@@ -56,12 +59,20 @@ def twist_shares(reducer: Reducer) -> pd.DataFrame:
 def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
     """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
 
-    The sample of the loop is the perfect reducer's; without a catalogue both are empty.
+    The sample of the loop is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
+    what all sizes of catalogues have in common.
     """
     stated = reducer.catalogue
-    if stated is None:
-        return "", ()
     rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
+    if stated is None:
+        twist = reducer.load.rated_torque / rigidity
+        if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
+            return "", ()
+        return "", (
+            f"The perfect reducer twists by {twist:.2g}′ under its rated torque; sizes in catalogues twist by 3 to 4′. "
+            "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
+            "with.",
+        )
     wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
     sentence = (
         f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "

@@ -75,7 +75,8 @@ class TransmissionErrorAnswer(Answer):
         return (
             f"The transmission error spans {found['peak_to_peak_arcsec']:.2f}″ over one output turn, from "
             f"{found['smallest_arcsec']:.2f}″ at {found['smallest_at_deg']:.2f}° to {found['largest_arcsec']:.2f}″ at "
-            f"{found['largest_at_deg']:.2f}°; its strongest orders are {strongest}.",
+            f"{found['largest_at_deg']:.2f}°; "
+            + (f"its strongest orders are {strongest}." if strongest else "it is flat."),
             *((stated,) if (stated := against_catalogue(self.equilibria.reducer, self.loop)[0]) else ()),
         )
 

@@ -71,6 +71,10 @@ def forces(equilibria: Equilibria) -> Forces:
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 
 
+_ROUNDING = 1e-9
+"""Amplitude over the largest one below which an order is none [-]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Orders:
     """Waves of the transmission error per output turn."""
@@ -80,8 +84,12 @@ class Orders:
     phase: Float[np.ndarray, "sample order"]  # Angle by which the wave, written as a cosine, leads [rad]
 
     def main(self, count: int, sample: int = 0) -> list[tuple[int, float, float]]:
-        """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first."""
-        strongest = np.argsort(-self.amplitude[sample])[:count]
+        """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first.
+
+        Those that are rounding beside the strongest are left out.
+        """
+        own = self.amplitude[sample]
+        strongest = [at for at in np.argsort(-own)[:count] if own[at] > _ROUNDING * own.max()]
         return [
             (int(self.order[at]), float(self.amplitude[sample, at]), float(self.phase[sample, at])) for at in strongest
         ]
