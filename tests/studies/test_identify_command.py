@@ -122,7 +122,7 @@ def test_the_stiffness_file_is_read_back_and_taken_by_te(run):
     assert identified.standard_uncertainty == {NAME: pytest.approx(found["value"] * relative)}
     assert identified.source == "simulated on the equivalent model"
     assert "identified by Gauss–Newton from 6 units of RV-20E" in identified.notes[0]
-    result = tolalloc("te", "--stiffness", run.stiffness, "--json")
+    result = tolalloc("te", "--reducer", "rv20e_liu2020", "--stiffness", run.stiffness, "--json")
     assert result.returncode == 0, result.stderr
     perfect = json.loads(result.stdout)["torsional_stiffness_nm_per_arcmin"]["perfect_reducer"]
     assert perfect > 2530  # 2519 with the preset's own bearing

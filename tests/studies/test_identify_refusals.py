@@ -117,7 +117,7 @@ CASES = (
         "parameter fewer than units, or measured curves and loops.",
         weak=True,
     ),
-    bad("unknown reducer", "--reducer rv21e", "rv21e", "rv20e_liu2020"),
+    bad("unknown reducer", "--reducer rv21e", "rv21e", "rv20e"),
     bad("negative seed", "--seed -1", "seed", "-1", "positive"),
     data(
         "noise missing beside noise",

@@ -105,7 +105,7 @@ def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
         (("--duration", "1.6"), ("--duration is 1.6; allowed is 1.737 s or more",)),
         (("--torque", "0"), ("--torque is 0.0; allowed is -5720 N·m to below 0",)),
         (("--torque", "572"), ("--torque is 572.0", "a load that drives it is not simulated")),
-        (("--out", "report"), ("--reducer is missing", "rv20e, rv40e, rv80e")),
+        (("--out", "report"), ("--reducer is missing", "rv40e, rv40e_xi2015, rv80e")),
     ],
 )
 def test_a_wrong_option_is_refused(options, words):

@@ -206,7 +206,7 @@ SETTING = {"name": "h [mm]", "value": 2, "lower": 1, "upper": 3, "step": 0.1}
         (lambda: ta.QualityLoss(60.0), "quality loss: at_limit is missing"),
         (lambda: ta.UnitPrice(scrapp=3.0), "price of a unit: field 'scrapp' is not known; the nearest known is scrap"),
         (lambda: ta.reducer("rv20e_liu2020", flank_clearance=5), "flank_clearance is 5; allowed is two numbers"),
-        (lambda: ta.reducer("rv20e_liu2020", torque=0.0), "reducer rv20e: torque is 0.0; allowed is -1670 to 1670"),
+        (lambda: ta.reducer("rv20e", torque=0.0), "reducer rv20e: torque is 0.0; allowed is -1670 to 1670"),
     ],
 )
 def test_a_slip_is_one_sentence_of_the_project(made, words):

@@ -135,7 +135,7 @@ def priced(tmp_path_factory):
     table_frame(sources).to_csv(table, index=False)
     results = allocated(
         name="priced",
-        drawing={"table": table, "costs": "rv20e_liu2020"},
+        drawing={"table": table, "costs": "rv20e"},
         limits={ta.PEAK_TO_PEAK: ta.Limit(upper=70.0), RADIAL: ta.Limit(lower=-20.0)},
         questions=(ta.Allocation(),),
     )
@@ -247,7 +247,7 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
 def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
     write_drawing(priced, tmp_path)
     read = load_tolerance_table(tmp_path / "allocation.csv")
-    again = load_process_costs("rv20e_liu2020", read)
+    again = load_process_costs("rv20e", read)
     made = priced.drawn.made_by(priced.chosen.design)
     assert set(again) == set(made)
     assert any(process.change > 0 for process in made.values())  # else nothing would be paid once

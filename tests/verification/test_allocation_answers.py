@@ -238,7 +238,7 @@ def test_a_reducer_that_breaks_the_limit_is_counted(prepared, allocation):
 
 @pytest.mark.slow
 def test_the_second_best_processes_are_other_ones_and_cost_more():
-    prepared = baseline(drawing={"costs": "rv20e_liu2020"})
+    prepared = baseline(drawing={"costs": "rv20e"})
     free, errors = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}, prepared.space.errors
     sources = tuple(replace(source, locked=source.group not in free) for source in errors.sources)
     space = replace(prepared.space, errors=replace(errors, sources=sources))

@@ -63,7 +63,7 @@ def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, mon
     assert drawing.sources[0].cp == 1.5
     assert drawing.correlation.source_matrix(drawing.sources)[0, 1] == 0.5
     assert drawing.costs == folder / "costs.csv"
-    assert load_drawing("rv20e_baseline", costs="rv20e_liu2020", folder=folder).costs == "rv20e_liu2020"
+    assert load_drawing("rv20e_baseline", costs="rv20e", folder=folder).costs == "rv20e"
     assert load_drawing(folder / "t.csv", folder / "own.csv").sources == drawing.sources
     with pytest.raises(InputError, match="no such file; shipped tolerance table files are rv20e_all_sources"):
         load_drawing("none.csv", folder=folder)

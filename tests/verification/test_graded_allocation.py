@@ -200,7 +200,7 @@ def test_an_unreachable_limit_ends_with_the_least_violating_choice(prepared):
 
 
 def test_every_step_is_made_by_a_process_that_holds_it():
-    space = with_shared_zones(baseline(drawing={"costs": "rv20e_liu2020"}).space)
+    space = with_shared_zones(baseline(drawing={"costs": "rv20e"}).space)
     for feature, first, options in zip(space.features, space.first_zones, group_options(space), strict=True):
         assert len({option.process for option in options}) == len(feature.processes) > 1
         for option in options:
@@ -215,7 +215,7 @@ def test_every_step_is_made_by_a_process_that_holds_it():
 
 
 def test_processes_that_hold_no_step_are_refused():
-    space = baseline(drawing={"costs": "rv20e_liu2020"}).space
+    space = baseline(drawing={"costs": "rv20e"}).space
     processes = {
         **space.processes,
         "pin.diameter": tuple(

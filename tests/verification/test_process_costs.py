@@ -56,7 +56,7 @@ def cost_at(process, micrometres):
 @pytest.mark.parametrize("table", ["rv20e_baseline", "rv20e_all_sources"])
 def test_todays_processes_of_the_shipped_table_cost_what_the_tolerance_table_says(table):
     sources = load_tolerance_table(table)
-    processes = load_process_costs("rv20e_liu2020", sources)
+    processes = load_process_costs("rv20e", sources)
     assert set(processes) == {source.name for source in sources if source.zone > 0 and not source.locked}
     for source in sources:
         if source.name in processes:
@@ -72,7 +72,7 @@ def test_todays_processes_of_the_shipped_table_cost_what_the_tolerance_table_say
 def test_every_alternative_of_the_shipped_table_pays_somewhere_and_is_marked_as_assumed():
     rows = read_rows(DATA / "rv20e.process_costs.csv", ProcessCostRow, "sources")
     assert all(row.note.startswith("assumed: ") for _, row in rows)
-    for processes in load_process_costs("rv20e_liu2020", SOURCES).values():
+    for processes in load_process_costs("rv20e", SOURCES).values():
         assert len(processes) >= 2
         for other in processes[1:]:
             zones = np.linspace(other.minimum, other.maximum, 501)
@@ -255,7 +255,7 @@ def test_costs_from_python_are_read_in_millimetres_and_given_in_metres(tolerance
     (rough,) = found["disc1.pitch"]
     assert cost_at(rough, 20) == pytest.approx(1 + factor / 0.02)
     assert (rough.minimum, rough.maximum) == pytest.approx((0.01e-3 * factor / 0.02, PITCH.maximum))
-    assert set(found) == set(load_process_costs("rv20e_liu2020", SOURCES))
+    assert set(found) == set(load_process_costs("rv20e", SOURCES))
     runout = next(source for source in SOURCES if source.name == "disc1.runout")
     assert found["disc1.runout"] == (today(runout),)
 
