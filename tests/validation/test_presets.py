@@ -82,7 +82,7 @@ def test_orders_that_are_rounding_are_no_main_orders():
 @pytest.mark.parametrize("size", ["rv20e", "rv80e", "rv20e_liu2020"])
 def test_the_shares_of_the_twist_are_the_whole(size):
     shares = twist_shares(load_reducer(size)).set_index("part")["share of the twist [%]"]
-    assert shares.sum() == pytest.approx(100.0, abs=1e-9)
+    assert shares.sum() == pytest.approx(100.0, abs=0.06)  # eleven rounded numbers
     assert (shares > -0.5).all()
     if size == "rv20e":
         assert shares["crank–disc bearing"] > 10

@@ -1,4 +1,4 @@
-"""From requirements to a verified allocation: steps of the convex program, and by hand beside it."""
+"""From requirements to a verified allocation: steps of the convex program, and proportional scaling beside it."""
 
 from __future__ import annotations
 
@@ -78,12 +78,12 @@ class ZoneAllocation:
 
     @property
     def saving(self) -> float:
-        """Cost saved against uniform scaling, as a share of its cost [-]."""
+        """Cost saved against proportional scaling, as a share of its cost [-]."""
         return 1 - self.chosen.cost / self.proportional.cost
 
     @property
     def saving_at_least(self) -> float:
-        """The same had uniform scaling used the limit to its last arcsecond: so its cost moved with it [-].
+        """The same had proportional scaling used the limit to its last arcsecond: so its cost moved with it [-].
 
         The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
         """
@@ -150,11 +150,11 @@ def allocate(
     effort
         How much may be spent.
     start
-        A verified design to start from, the best one by hand if there is none; with the reducer's own modification it
+        A verified design to start from, the best of proportional scaling if there is none; with the reducer's own modification it
         tells tolerances alone from tolerances and modification together.
     """
     first, space = start or answer(proportional_tried), verifier.space
-    # By hand no bounds are asked for; a start that keeps them is an answer like any other.
+    # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
     is_allowed = np.all(
         (first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING))
     )

@@ -17,13 +17,14 @@ from tolalloc.report.document import Section
 from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading, wave_outputs
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
+from tolalloc.rv.rigidity import against_catalogue
 from tolalloc.units import ARCMINUTE, MICROMETRE
 
 FLANK = "flank clearance [µm]"
@@ -187,9 +188,13 @@ class ReducerModel(Model):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
-        perfect = np.zeros((1, len(self.kernel.model.columns)))
-        stiffness = hysteresis_loop(self.kernel.model, perfect, LOOP_ANGLES).torsional_stiffness[0] * ARCMINUTE
+        stiffness = self._perfect_loop.torsional_stiffness[0] * ARCMINUTE
         return {"torsional stiffness of the perfect reducer [N·m/arcmin]": float(stiffness)}
+
+    @cached_property
+    def _perfect_loop(self) -> HysteresisLoop:
+        """Torque against twist of the reducer without any error."""
+        return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), LOOP_ANGLES)
 
     @property
     def drawn_amounts(self) -> DrawnAmounts:
@@ -290,5 +295,6 @@ class ReducerModel(Model):
         }
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
-        """Return what a reader must know of a large modification."""
-        return linear_model_warnings(self.reducer.cycloid_stage, self.modification(values))
+        """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
+        _, far = against_catalogue(self.reducer, self._perfect_loop)
+        return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)

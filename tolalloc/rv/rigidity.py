@@ -23,6 +23,7 @@ USUAL_TWIST = 3.6
 """Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
 
 _PHASES = 16  # of one pin pitch, at which the twist is read
+_PER_MICROMETRE = 1e-6  # N/µm per N/m
 _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 
@@ -50,9 +51,10 @@ def twist_shares(reducer: Reducer) -> pd.DataFrame:
         left -= share
         plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}
         for name, compliance in parts.get(interface, plain).items():
-            rows.append((name, 100.0 * share * compliance * stiffness, 1.0 / compliance))
-    rows.append(("pins and teeth, with their clearance", 100.0 * left, np.nan))
-    frame = pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/m]"])
+            part = 100.0 * share * compliance * stiffness
+            rows.append((name, round(part, 2), round(_PER_MICROMETRE / compliance, 1)))
+    rows.append(("pins and teeth, with their clearance", round(100.0 * left, 2), np.nan))
+    frame = pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/µm]"])
     return frame.sort_values("share of the twist [%]", ascending=False, ignore_index=True)
 
 

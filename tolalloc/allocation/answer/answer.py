@@ -209,8 +209,8 @@ class AllocationAnswer(Answer):
             "cost [cost units]": chosen.cost,
             "cost of the tolerance table [cost units]": free.baseline.cost,
             "tolerance table met": free.baseline.met,
-            "cost of uniform scaling [cost units]": free.proportional.cost,
-            "uniform scaling met": free.proportional.met,
+            "cost of proportional scaling [cost units]": free.proportional.cost,
+            "proportional scaling met": free.proportional.met,
             "saving [-]": 1 - chosen.cost / free.proportional.cost,
             "saving at least [-]": self.least_saving,
             "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
@@ -236,7 +236,7 @@ class AllocationAnswer(Answer):
 
     @property
     def least_saving(self) -> float:
-        """Saving against uniform scaling that uses the limit to its last unit, as a share of its cost [-]."""
+        """Saving against proportional scaling that uses the limit to its last unit, as a share of its cost [-]."""
         return 1 - (1 - self.free.saving_at_least) * self.chosen.cost / self.free.chosen.cost
 
     def add_files(self, folder: Path) -> None:

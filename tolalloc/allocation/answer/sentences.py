@@ -68,7 +68,7 @@ def _against(cost: float, other: float) -> str:
 
 
 def _cost(answer: AllocationAnswer) -> str:
-    """Return what the drawing costs, and what uniform scaling does."""
+    """Return what the drawing costs, and what proportional scaling does."""
     chosen, hand = answer.chosen, answer.free.proportional
     used = "" if hand.met else ", which missed a limit"
     as_it_is = f" with the {answer.model.settings_word} as it is" if answer.space.settings else ""
@@ -209,7 +209,7 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
             f"{missed(chosen)}."
         )
     if not answer.free.proportional.met:
-        found.append("Uniform scaling was not verified to meet the limits, so the saving is against a miss.")
+        found.append("Proportional scaling was not verified to meet the limits, so the saving is against a miss.")
     uncertain = answer.robustness.uncertain if answer.robustness else ()
     lost = sum(not variant.kept for variant in uncertain)
     if lost and answer.free.chosen.met:
