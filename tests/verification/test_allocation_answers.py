@@ -119,7 +119,7 @@ def test_far_from_the_chosen_clearances_the_kernel_has_the_last_word(prepared, a
 
 @pytest.mark.slow
 def test_the_cost_at_far_clearances_is_that_of_zones_whose_quantile_is_at_the_limit(prepared, allocation, response):
-    """Proportional scaling at the same clearances keeps the same quantile of the same units, so it cannot be cheaper."""
+    """Proportional scaling at the same clearances keeps the same quantile of the same units: it is not cheaper."""
     clearances = np.array([1.0, 12.0])
     trade = setting_trade(response, allocation, (clearances[:1], clearances[1:]))
     chosen, stack = allocation.chosen.design, allocation.stacks[0]

@@ -150,8 +150,8 @@ def allocate(
     effort
         How much may be spent.
     start
-        A verified design to start from, the best of proportional scaling if there is none; with the reducer's own modification it
-        tells tolerances alone from tolerances and modification together.
+        A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
+        modification it tells tolerances alone from tolerances and modification together.
     """
     first, space = start or answer(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
