@@ -385,7 +385,6 @@ SHOP = "process,tolerance,unit,cost\n"
         (HEAD + "housing.pitch,ground,reciprocal,0,,9,5,x\n", None, ["min must not be above max", "9, 5"]),
         (HEAD + "housing.pitch,ground,reciprocal,0,,150,190,x\n", None, ["no process can hold", "housing.pitch"]),
         (HEAD + "housing.pitch,ground,reciprocal,0,-3,,,x\n", None, ["factor is -3.0", "greater than 0"]),
-        ((HEAD + ROW).replace(",", ";").replace(";0;", ";0,5;"), None, ["fixed is '0,5'", "decimal point"]),
         (POINTED, None, ["row 2", "points shop.csv", "CSV file in"]),
         (POINTED, SHOP + "ground,10,µm,2\nground,20,µm,3\n", ["shop.csv", "costs that fall"]),
         (POINTED, SHOP + "ground,10,inch,3\nground,20,µm,2\n", ["unit is 'inch'", "mm"]),

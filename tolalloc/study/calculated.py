@@ -24,7 +24,13 @@ class CalculatedAnswer(Answer):
     warnings: tuple[str, ...] = ()
     sections: tuple[Section, ...] = ()
     assumptions: tuple[str, ...] = ()
-    summary: dict[str, Any] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
+    """The summary; a field with a factory cannot stand for an abstract property itself."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What the function's report says for a program."""
+        return self.numbers
 
     @classmethod
     def of(cls, made: Document, prepared: Prepared) -> CalculatedAnswer:
@@ -38,5 +44,5 @@ class CalculatedAnswer(Answer):
             warnings=made.warnings,
             sections=made.sections,
             assumptions=made.assumptions,
-            summary=made.summary,
+            numbers=made.summary,
         )
