@@ -70,6 +70,8 @@ def test_two_runs_side_by_side(runs, tmp_path):
     names = {"report.html", "results.xlsx", "summary.json", "manifest.json"}
     assert {path.name for path in (tmp_path / "report").iterdir()} == names | {"figures", "tables"}
     said = tolalloc("compare", *runs).stdout
+    assert "rankings" in said
+    assert "zones" in said
     assert "differ beyond their 90 % intervals: disc1.pitch." in " ".join(said.split())
 
 

@@ -23,4 +23,4 @@ def compare(
     answer = ComparisonAnswer.of(read_run(first), read_run(second))
     if out:
         answer.save(out)
-    tell(answer, as_json, (answer.to_frame("zones"), "zones"))
+    tell(answer, as_json, *((answer.to_frame(name), name) for name in ("rankings", "zones")))
