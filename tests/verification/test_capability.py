@@ -13,6 +13,7 @@ from tolalloc.capability.indices import (
     quantile_interval,
     wilson_interval,
 )
+from tolalloc.capability.monte_carlo import CONFIDENCE, proportion
 from tolalloc.exceptions import InputError
 
 SAMPLE = np.array([9.0, 11.0, 10.0, 12.0, 8.0, 10.0])
@@ -154,3 +155,11 @@ def test_arguments_out_of_range():
     ):
         with pytest.raises(InputError):
             call()
+
+
+@pytest.mark.parametrize(("units", "rejected"), [(100, 3), (1000, 1), (40, 20)])
+def test_the_ends_of_an_exact_interval_are_where_the_binomial_tails_are(units, rejected):
+    found, tail, accepted = proportion(units, rejected), (1 - CONFIDENCE) / 2, units - rejected
+    assert binom.cdf(accepted, units, found.high) == pytest.approx(tail)
+    assert binom.sf(accepted - 1, units, found.low) == pytest.approx(tail)
+    assert binom.sf(accepted - 1, units, found.bound) == pytest.approx(1 - CONFIDENCE)
