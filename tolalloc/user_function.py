@@ -20,6 +20,10 @@ _SAME = 1e-9
 """By how much a function of arrays may differ from itself called with numbers, over the largest value [-]."""
 
 
+_FEWEST = 30
+"""Samples from which on a function that raises for all of them has a fault rather than bad samples [-]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class UserFunction:
     """A function with the number of values that it returns for one sample, and whom messages name."""
@@ -40,7 +44,7 @@ class UserFunction:
         InputError
             The function takes another number of arguments, returns another number of values, or has a fault.
         SolveError
-            It raises for every one of several samples.
+            It raises for every one of many samples; a few without an answer are statuses.
         """
         self._require_arguments(arguments.shape[1])
         with np.errstate(all="ignore"):
@@ -52,7 +56,7 @@ class UserFunction:
                 row, reason = self._of_sample(sample)
                 rows.append(row)
                 reasons += [reason] * bool(reason)
-        if len(reasons) == len(rows) > 1:
+        if len(reasons) == len(rows) >= _FEWEST:
             raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
         return np.array(rows).reshape(-1, self.values)
 
@@ -117,28 +121,39 @@ def identity(thing: Any, deep: int = 9) -> Any:
     if deep == 0:
         return type(thing).__qualname__
     if isinstance(thing, partial):
-        return (
-            "partial",
-            identity(thing.func, deep - 1),
-            identity(thing.args, deep - 1),
-            identity(thing.keywords, deep - 1),
-        )
+        return identity((thing.func, thing.args, thing.keywords), deep - 1)
     if isinstance(thing, CodeType):
         return (thing.co_code.hex(), thing.co_names, identity(thing.co_consts, deep - 1))
     if isinstance(thing, np.ndarray):
         return (thing.shape, thing.tolist())
     if isinstance(thing, Mapping):
         return [(key, identity(value, deep - 1)) for key, value in thing.items()]
+    if isinstance(thing, set | frozenset):
+        return sorted(repr(identity(item, deep - 1)) for item in thing)
     if isinstance(thing, list | tuple):
         return [identity(item, deep - 1) for item in thing]
     if isinstance(thing, ModuleType):
         return thing.__name__
-    if code := getattr(thing, "__code__", None):
-        known, cells = thing.__globals__, [cell.cell_contents for cell in thing.__closure__ or ()]
-        plain = {name: known[name] for name in code.co_names if isinstance(known.get(name), int | float | str | tuple)}
-        own = getattr(thing, "__self__", None)
-        return identity((code, plain, cells, thing.__defaults__, own), deep - 1)
+    if hasattr(thing, "__code__"):
+        return identity(_made_of(thing), deep - 1)
     if callable(thing) or hasattr(thing, "__dict__"):
         own = vars(thing) if hasattr(thing, "__dict__") and not isinstance(thing, type) else {}
         return (getattr(thing, "__qualname__", type(thing).__qualname__), identity(own, deep - 1))
     return repr(thing)
+
+
+def _made_of(function: Any) -> tuple[Any, ...]:
+    """Return the code of a function, what it finds by name, what it encloses and what it was given."""
+    code, known = function.__code__, function.__globals__
+    named = {name: known[name] for name in code.co_names if _tells(known.get(name), function.__module__)}
+    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+    given = (function.__defaults__, function.__kwdefaults__, getattr(function, "__self__", None))
+    return (code, named, enclosed, given)
+
+
+_VALUES = (int, float, str, tuple, list, dict, set, frozenset, np.ndarray)
+
+
+def _tells(value: Any, module: str) -> bool:
+    """Return whether what a function finds by name tells it from others: a value, or a function of its own module."""
+    return isinstance(value, _VALUES) or (hasattr(value, "__code__") and value.__module__ == module)

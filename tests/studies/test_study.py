@@ -169,7 +169,7 @@ class Own(ta.Question):
     kind = "own"
 
     def answer(self, prepared, record, checkpoint):
-        raise NotImplementedError
+        return prepared
 
 
 MODEL = ta.model(lambda a: a, inputs=("a",), outputs=("y [mm]",))
@@ -225,7 +225,7 @@ def test_numbers_of_numpy_are_numbers_and_one_question_needs_no_list():
 def test_a_question_of_ones_own_and_a_model_without_a_name_are_shown():
     class Source:
         def bound(self, errors, place):
-            raise NotImplementedError
+            return errors
 
     assert repr(ta.Study(Source(), questions=[Own()])).startswith("Study('study': Source at none")
     with pytest.raises(UnknownNameError, match="question own: field 'units' is not known; it has none"):

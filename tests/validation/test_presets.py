@@ -13,10 +13,10 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces, order_spectrum
-from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload, rated_pin_force
+from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload
 from tolalloc.rv.reducer.files import PRESETS, load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.rigidity import FACTOR, against_catalogue, twist_shares
+from tolalloc.rv.rigidity import FACTOR, against_catalogue, rated_pin_force, twist_shares
 from tolalloc.units import ARCMINUTE
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")

@@ -77,8 +77,9 @@ def thin(height):
 
 
 def test_what_a_function_raises_is_said():
-    with pytest.raises(SolveError, match=r"each of 3 samples, first ValueError \(tooth too thin\) for \(0\.5\)"):
-        returned(thin, 1, np.full((3, 1), 0.5))
+    with pytest.raises(SolveError, match=r"each of 40 samples, first ValueError \(tooth too thin\) for \(0\.5\)"):
+        returned(thin, 1, np.full((40, 1), 0.5))
+    assert np.isnan(returned(thin, 1, np.full((3, 1), 0.5))).all()
     with pytest.raises(InputError, match=r"the function has a fault: unsupported operand") as caught:
         returned(lambda h: h + "a", 1, np.zeros((3, 1)))
     assert isinstance(caught.value.__cause__, TypeError)
@@ -113,11 +114,27 @@ def test_functions_are_told_apart(one, other):
     assert identity(one) != identity(other)
 
 
+def factor():
+    return SCALE
+
+
+SCALE = 2.0
+
+
+def test_what_a_function_calls_in_its_module_tells_it_too(monkeypatch):
+    def asks(x):
+        return factor() * x
+
+    before = identity(asks)
+    monkeypatch.setitem(globals(), "factor", lambda: 3.0)
+    assert identity(asks) != before
+
+
 def test_a_function_is_the_same_in_another_process():
     code = textwrap.dedent("""
         from tolalloc.user_function import identity
         def outer(k):
-            return lambda x: [k * y for y in (x, lambda: x)]
+            return lambda x: [k * y for y in (x, lambda: x) if y not in {"a", "b", "c", "d"}]
         print(identity(outer(2)))
     """)
     first, second = (subprocess.run([sys.executable, "-c", code], capture_output=True, check=True) for _ in range(2))

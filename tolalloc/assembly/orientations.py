@@ -86,6 +86,7 @@ def _unloaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"],
 
 def _loaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     rated = float(np.copysign(model.reducer.load.rated_torque, torque))
+    model = model.at_torque(rated)
     found = model.extremes(errors, rated)
     values, status = [], []
     for first in range(0, errors.shape[0], _AT_ONCE):

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
+from tolalloc.rv.equivalent.outputs import Forces, forces
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.series import compliances
 from tolalloc.units import ARCMINUTE
@@ -27,6 +28,22 @@ _PER_MICROMETRE = 1e-6  # N/µm per N/m
 _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 
+def _perfect(reducer: Reducer) -> tuple[Equilibria, Forces]:
+    """Return the perfect reducer at its modification under its rated torque, and its forces."""
+    torque = -reducer.load.rated_torque
+    model = EquivalentModel(reducer.at_torque(torque))
+    deviations = reducer.modification.deviations
+    errors = np.array([[deviations.get(name, 0.0) for name in model.columns]])
+    pitch = 2.0 * np.pi / reducer.cycloid_stage.pin_count
+    solved = model.equilibria(errors, torque, pitch * np.arange(_PHASES) / _PHASES)
+    return solved, forces(solved)
+
+
+def rated_pin_force(reducer: Reducer) -> float:
+    """Return the largest force of a pin of the perfect reducer under its rated torque [N]."""
+    return float(_perfect(reducer)[1].pins.max())
+
+
 def twist_shares(reducer: Reducer) -> pd.DataFrame:
     """Return which part yields how much of the twist of the perfect reducer at rated torque.
 
@@ -35,19 +52,13 @@ def twist_shares(reducer: Reducer) -> pd.DataFrame:
     """
     import pandas as pd
 
-    torque = reducer.load.rated_torque
-    own = reducer.at_torque(torque)
-    model = EquivalentModel(own)
-    pitch = 2.0 * np.pi / own.cycloid_stage.pin_count
-    nominal = own.modification.deviations
-    errors = np.array([[nominal.get(name, 0.0) for name in model.columns]])
-    solved = model.equilibria(errors, torque, pitch * np.arange(_PHASES) / _PHASES)
-    found, twist = forces(solved), float(solved.transmission_error.mean())
-    rows, left = [], 1.0
-    parts = compliances(own, torque)
+    solved, found = _perfect(reducer)
+    own, torque = solved.reducer, solved.torque
+    work = torque * float(solved.transmission_error.mean())
+    rows, left, parts = [], 1.0, compliances(own, torque)
     for interface in _INTERFACES:
         stiffness = getattr(own.stiffness, interface)
-        share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / (torque * twist))
+        share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / work)
         left -= share
         plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}
         for name, compliance in parts.get(interface, plain).items():

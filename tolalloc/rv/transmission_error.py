@@ -25,10 +25,10 @@ from tolalloc.rv.equivalent.hysteresis import (
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
-from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload, rated_pin_force
+from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.unit_file import BuiltUnit
-from tolalloc.rv.rigidity import against_catalogue, twist_shares
+from tolalloc.rv.rigidity import against_catalogue, rated_pin_force, twist_shares
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
 
 if TYPE_CHECKING:

@@ -49,7 +49,7 @@ def prepare_mounting(
         raise InputError.at("tolalloc mount", "--starts", starts, f"1 to {MOST_STARTS}")
     design = load_reducer(reducer)
     torque = design.torque_on_carrier(torque_nm, "tolalloc mount")
-    model, measured = EquivalentModel(design), load_parts(parts, design)
+    model, measured = EquivalentModel(design.at_torque(torque)), load_parts(parts, design)
     columns = tuple(name for name in model.columns if name not in design.modification.deviations)
     return MountingStudy(
         name=parts.stem,

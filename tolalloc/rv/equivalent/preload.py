@@ -11,7 +11,6 @@ from tolalloc.rv.cycloid.mesh import pin_angles
 from tolalloc.rv.equivalent.hysteresis import BACKLASH
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.reducer.design import Reducer
 
 SLIDING_FRICTION = 0.05
 """Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
@@ -50,13 +49,3 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
         friction_torque=SLIDING_FRICTION * np.einsum("sadp,adp->sa", found, lever).max(axis=1),
         status=np.asarray(solved.status.max(axis=1)),
     )
-
-
-def rated_pin_force(reducer: Reducer) -> float:
-    """Return the largest force of a pin of the perfect reducer under its rated torque, at its modification [N]."""
-    torque = -reducer.load.rated_torque
-    model = EquivalentModel(reducer.at_torque(torque))
-    nominal = reducer.modification.deviations
-    errors = np.array([[nominal.get(name, 0.0) for name in model.columns]])
-    pitch = 2.0 * np.pi / reducer.cycloid_stage.pin_count
-    return float(forces(model.equilibria(errors, torque, pitch * np.arange(16) / 16)).pins.max())

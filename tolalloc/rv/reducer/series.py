@@ -58,15 +58,15 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     }
 
 
-SMALLEST = 1e-3
+_SMALLEST = 1e-3
 """Share of the rated torque whose forces a secant stiffness is taken at for smaller ones [-]."""
 
 
 def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
     """Return what every part yields by interface, at the forces of a torque on the carrier [m/N]."""
-    least = SMALLEST * reducer.load.rated_torque
+    least = _SMALLEST * reducer.load.rated_torque
     forces = interface_forces(reducer, max(abs(torque), least))
-    unloaded = forces["crank_carrier_bearing"] * SMALLEST
+    unloaded = forces["crank_carrier_bearing"] * _SMALLEST
     found: dict[str, dict[str, float]] = {}
     for part in reducer.parts:
         force = forces[part.interface] or unloaded
