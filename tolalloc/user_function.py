@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import CodeType, ModuleType
@@ -113,33 +113,39 @@ def _flat(found: Any) -> list[Any]:
     return [item for part in found for item in (_flat(part) if isinstance(part, list | tuple) else [part])]
 
 
-def identity(thing: Any, deep: int = 9) -> Any:
+def identity(thing: Any, deep: int = 12) -> Any:
     """Return what tells a function from another one in any process: its code, and the values that it was made with.
 
     What other modules do is not seen, and of values within values only so many levels.
     """
     if deep == 0:
         return type(thing).__qualname__
-    if isinstance(thing, partial):
-        return identity((thing.func, thing.args, thing.keywords), deep - 1)
-    if isinstance(thing, CodeType):
-        return (thing.co_code.hex(), thing.co_names, identity(thing.co_consts, deep - 1))
-    if isinstance(thing, np.ndarray):
-        return (thing.shape, thing.tolist())
-    if isinstance(thing, Mapping):
-        return [(key, identity(value, deep - 1)) for key, value in thing.items()]
+    inside = _inside(thing)
+    if inside is not None:
+        return [identity(item, deep - 1) for item in inside]
     if isinstance(thing, set | frozenset):
         return sorted(repr(identity(item, deep - 1)) for item in thing)
-    if isinstance(thing, list | tuple):
-        return [identity(item, deep - 1) for item in thing]
     if isinstance(thing, ModuleType):
         return thing.__name__
-    if hasattr(thing, "__code__"):
-        return identity(_made_of(thing), deep - 1)
     if callable(thing) or hasattr(thing, "__dict__"):
         own = vars(thing) if hasattr(thing, "__dict__") and not isinstance(thing, type) else {}
         return (getattr(thing, "__qualname__", type(thing).__qualname__), identity(own, deep - 1))
     return repr(thing)
+
+
+def _inside(thing: Any) -> Sequence[Any] | None:
+    """Return what a thing is made of in its order; None for what is one thing, or has no order."""
+    if isinstance(thing, partial):
+        return (thing.func, thing.args, thing.keywords)
+    if isinstance(thing, CodeType):
+        return (thing.co_code.hex(), thing.co_names, thing.co_consts)
+    if isinstance(thing, np.ndarray):
+        return (thing.shape, thing.tolist())
+    if isinstance(thing, Mapping):
+        return tuple(thing.items())
+    if isinstance(thing, list | tuple):
+        return thing
+    return _made_of(thing) if hasattr(thing, "__code__") else None
 
 
 def _made_of(function: Any) -> tuple[Any, ...]:
