@@ -13,7 +13,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.reducer.files import PRESETS, load_reducer, with_stiffness
 from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing
-from tolalloc.rv.reducer.series import compliances, interface_forces
+from tolalloc.rv.reducer.series import at_torque, compliances, interface_forces
 from tolalloc.rv.reducer.shafts import Crankshaft, bore_flexibility, shaft_flexibility
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material
 
@@ -161,7 +161,7 @@ def test_a_file_of_dimensions_gives_springs_in_series(tmp_path):
     twist = compliances(reducer, 167.0)["crank_carrier_bearing"]["carrier twist"]
     assert 1 / reducer.stiffness.crank_carrier_bearing == pytest.approx(both + shared + twist, rel=1e-12)
     assert 0 < twist < both
-    assert reducer.at_torque(-5.0).stiffness.crank_disc_bearing < reducer.stiffness.crank_disc_bearing
+    assert at_torque(reducer, -5.0).stiffness.crank_disc_bearing < reducer.stiffness.crank_disc_bearing
 
 
 def test_forces_by_statics_are_those_of_the_model(tmp_path):
@@ -182,9 +182,9 @@ def test_an_identified_stiffness_takes_the_place_of_its_parts(tmp_path):
     )
     own = with_stiffness(reducer, identified)
     for torque in (-1.0, -167.0):
-        assert own.at_torque(torque).stiffness.crank_disc_bearing == 2.5e8
-        assert own.at_torque(torque).stiffness.crank_carrier_bearing == pytest.approx(
-            reducer.at_torque(torque).stiffness.crank_carrier_bearing
+        assert at_torque(own, torque).stiffness.crank_disc_bearing == 2.5e8
+        assert at_torque(own, torque).stiffness.crank_carrier_bearing == pytest.approx(
+            at_torque(reducer, torque).stiffness.crank_carrier_bearing
         )
 
 

@@ -25,6 +25,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
 from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
@@ -243,7 +244,7 @@ def transmission_effect(
     """
     reducer = load_reducer(plan.reducer)
     torque = reducer.load.test_torque
-    model = EquivalentModel(reducer.at_torque(torque))
+    model = EquivalentModel(at_torque(reducer, torque))
     response = OrientationResponse(model=model, chain=plan.chain, torque=torque, observe=observe)
     final = _final_angles(plan, errors, precisions, seeds)
     perfect = response(np.zeros((1, final.shape[2])))

@@ -33,9 +33,9 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def _version(version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False) -> None:
     if version:
-        import tolalloc
+        from importlib.metadata import version as installed
 
-        typer.echo(f"tolalloc {tolalloc.__version__}")
+        typer.echo(f"tolalloc {installed('tolalloc')}")
         raise typer.Exit
 
 

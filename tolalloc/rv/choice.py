@@ -16,6 +16,7 @@ from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import KernelResponse
@@ -63,7 +64,7 @@ def bind(
     require_small_zones(errors.sources, _LARGEST_ZONE, place)
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
     carried = reducer.torque_on_carrier(torque, place)
-    model = EquivalentModel(reducer.at_torque(carried), orders=orders or HARMONICS)
+    model = EquivalentModel(at_torque(reducer, carried), orders=orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed}
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
     fixed: Mapping[str, float] = {

@@ -11,7 +11,7 @@ from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Forces, forces
 from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.series import compliances
+from tolalloc.rv.reducer.series import at_torque, compliances
 from tolalloc.units import ARCMINUTE
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_
 def _perfect(reducer: Reducer) -> tuple[Equilibria, Forces]:
     """Return the perfect reducer at its modification under its rated torque, and its forces."""
     torque = -reducer.load.rated_torque
-    model = EquivalentModel(reducer.at_torque(torque))
+    model = EquivalentModel(at_torque(reducer, torque))
     deviations = reducer.modification.deviations
     errors = np.array([[deviations.get(name, 0.0) for name in model.columns]])
     pitch = 2.0 * np.pi / reducer.cycloid_stage.pin_count

@@ -27,6 +27,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
 from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force, twist_shares
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
@@ -276,7 +277,7 @@ def transmission_error(
     SolveError
         An angle without equilibrium.
     """
-    model = EquivalentModel(reducer.at_torque(torque), orders=unit.orders or HARMONICS)
+    model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
     worst = Status(max(extremes.status[0], equilibria.status.max()))

@@ -15,6 +15,7 @@ from tolalloc.report.answer import Header
 from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.response.kernel import KernelResponse
 
 MOST_STARTS = 64
@@ -49,7 +50,7 @@ def prepare_mounting(
         raise InputError.at("tolalloc mount", "--starts", starts, f"1 to {MOST_STARTS}")
     design = load_reducer(reducer)
     torque = design.torque_on_carrier(torque_nm, "tolalloc mount")
-    model, measured = EquivalentModel(design.at_torque(torque)), load_parts(parts, design)
+    model, measured = EquivalentModel(at_torque(design, torque)), load_parts(parts, design)
     columns = tuple(name for name in model.columns if name not in design.modification.deviations)
     return MountingStudy(
         name=parts.stem,

@@ -25,6 +25,7 @@ from tolalloc.rv.equivalent.solvers.records import (
     design_of,
 )
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.series import at_torque
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class EquivalentModel:
 
     def at_torque(self, torque: float) -> EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
-        return replace(self, reducer=self.reducer.at_torque(torque)) if self.reducer.parts else self
+        return replace(self, reducer=at_torque(self.reducer, torque)) if self.reducer.parts else self
 
     @cached_property
     def error_columns(self) -> Columns:

@@ -11,7 +11,7 @@ from pydantic import Field
 from tolalloc.exceptions import InputError
 from tolalloc.files import times
 from tolalloc.named_fields import is_number
-from tolalloc.rv.reducer.series import Part, stiffness_at
+from tolalloc.rv.reducer.parts import Part
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 
@@ -175,10 +175,6 @@ class Reducer:
     parts: tuple[Part, ...] = ()
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = field(default=())
-
-    def at_torque(self, torque: float) -> Reducer:
-        """Return the reducer with the stiffness that its parts have under a torque on the carrier [N·m]."""
-        return replace(self, stiffness=stiffness_at(self, torque)) if self.parts else self
 
     @property
     def crank_circle_radius(self) -> float:

@@ -16,6 +16,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.rv.reducer.design import Catalogue, Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
 from tolalloc.rv.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -99,7 +100,7 @@ class ReducerRecord(Record):
             assumptions=self.assumptions,
         )
         reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())
-        return reducer.at_torque(reducer.load.rated_torque)
+        return at_torque(reducer, reducer.load.rated_torque)
 
     def _clearances(self) -> Clearances:
         """Return the clearances, those of bearings that are given by their dimensions included."""

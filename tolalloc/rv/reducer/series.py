@@ -2,38 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from tolalloc.rv.reducer.rolling_bearing import RollingBearing
-from tolalloc.rv.reducer.stiffness import Stiffness
-
-if TYPE_CHECKING:
-    from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.design import Reducer
 
 _PHASES = 2.0 * np.pi * np.arange(64) / 64
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part that yields in an interface: a rolling bearing, or a body with a constant compliance."""
-
-    interface: str  # Field of `tolalloc.rv.reducer.stiffness.Stiffness` that it belongs to
-    name: str  # What it is, such as ``crank bending``
-    yields: RollingBearing | float  # The bearing, or what the body yields [m/N]
-
-    def compliance(self, force: float) -> float:
-        """Return the way over the force [m/N]."""
-        return _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
-
-
-@lru_cache(maxsize=256)
-def _bearing(bearing: RollingBearing, force: float) -> float:
-    """Return what a bearing yields; loops of torque ask the same few forces again and again."""
-    return bearing.compliance(force)
 
 
 def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
@@ -74,9 +50,11 @@ def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
     return found
 
 
-def stiffness_at(reducer: Reducer, torque: float) -> Stiffness:
-    """Return the reducer's stiffness with the secant of its parts at the forces of a torque on the carrier."""
+def at_torque(reducer: Reducer, torque: float) -> Reducer:
+    """Return the reducer with the secant stiffness of its parts at the forces of a torque on the carrier [N·m]."""
+    if not reducer.parts:
+        return reducer
     own: dict[str, Any] = {
         interface: 1.0 / sum(parts.values()) for interface, parts in compliances(reducer, torque).items()
     }
-    return replace(reducer.stiffness, **own)
+    return replace(reducer, stiffness=replace(reducer.stiffness, **own))

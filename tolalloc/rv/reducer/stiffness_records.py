@@ -11,8 +11,8 @@ from pydantic import Discriminator, Field, Tag
 
 from tolalloc.files import Record, times
 from tolalloc.rv.reducer.design import CycloidStage, Reducer
+from tolalloc.rv.reducer.parts import Part
 from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
-from tolalloc.rv.reducer.series import Part
 from tolalloc.rv.reducer.shafts import Crankshaft, Pillars, bore_flexibility
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 from tolalloc.rv.reducer.table2 import (

@@ -19,6 +19,7 @@ from tolalloc.rv.multibody.prototype import RIGID
 from tolalloc.rv.multibody.system import engine as multibody_engine
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.units import RPM
 
@@ -143,7 +144,7 @@ class PreparedSimulation:
     @cached_property
     def model(self) -> EquivalentModel:
         """The equivalent model."""
-        return EquivalentModel(self.reducer.at_torque(self.torque), orders=self.unit.orders or HARMONICS)
+        return EquivalentModel(at_torque(self.reducer, self.torque), orders=self.unit.orders or HARMONICS)
 
     @cached_property
     def errors(self) -> Float[np.ndarray, "1 column"]:

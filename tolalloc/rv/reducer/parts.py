@@ -1,0 +1,27 @@
+"""A part that yields in an interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from tolalloc.rv.reducer.rolling_bearing import RollingBearing
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part that yields in an interface: a rolling bearing, or a body with a constant compliance."""
+
+    interface: str  # Field of `tolalloc.rv.reducer.stiffness.Stiffness` that it belongs to
+    name: str  # What it is, such as ``carrier twist``
+    yields: RollingBearing | float  # The bearing, or what the body yields [m/N]
+
+    def compliance(self, force: float) -> float:
+        """Return the way over the force [m/N]."""
+        return _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
+
+
+@lru_cache(maxsize=256)
+def _bearing(bearing: RollingBearing, force: float) -> float:
+    """Return what a bearing yields; loops of torque ask the same few forces again and again."""
+    return bearing.compliance(force)
