@@ -37,7 +37,7 @@ def test_contact_of_the_rv40e():
 def test_contact_for_a_person_names_units_and_takes_width_and_support():
     result = tolalloc("contact", "--reducer", "rv40e_xi2015", "--width", "16", "--support", "30.6", "--torque", "-572")
     assert "backlash [arcmin]" in result.stdout
-    assert "16…17 pins" in result.stdout
+    assert "16…17 of its pins" in result.stdout
 
 
 def test_contact_writes_report_and_profile(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, TURN_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces, order_spectrum
 from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload
@@ -97,12 +97,12 @@ def test_preload_is_what_presses_at_the_torque_of_backlash():
         [errors, np.where(np.array(model.columns) == "modification.equidistant", 8e-6, 0.0)[np.newaxis]]
     )
     found = preload(model, both)
-    angles = 2 * np.pi * np.arange(37) / 37
+    angles = TURN_ANGLES
     torque = -1e-4 * reducer.load.rated_torque
     pins = forces(model.at_torque(torque).equilibria(both, torque, angles)).pins
     assert found.pin_force == pytest.approx(pins.max(axis=(1, 2, 3)))
     # A disc turns about its pole at e·zp from the housing's centre: slower sliding, longer way, pin by pin.
-    stage, worst = reducer.cycloid_stage, np.zeros((2, 37))
+    stage, worst = reducer.cycloid_stage, np.zeros((2, TURN_ANGLES.size))
     for at, angle in enumerate(angles):
         for disc in range(2):
             crank = -stage.disc_teeth * angle + np.pi * disc

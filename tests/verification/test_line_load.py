@@ -13,7 +13,7 @@ from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
 from tolalloc.rv.cycloid.mesh import normals
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.rv.equivalent.line_load import LineContact, contact_pattern, line_contact, peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
@@ -133,7 +133,7 @@ def test_a_tilted_disc_loads_one_end_more_and_a_level_one_evenly(rv20e, table4):
     tilted = stress(rv20e, errors)
     assert tilted[load] > 1.1 * tilted[force] / width
     rated = -abs(rv20e.reducer.load.rated_torque)
-    solved = Solved.of(rv20e.equilibria(errors[np.newaxis], rated, LOOP_ANGLES[::9]))
+    solved = Solved.of(rv20e.equilibria(errors[np.newaxis], rated, TURN_ANGLES))
     own = peak_line_load(solved.equilibria, solved.forces)
     assert tilted[load] == pytest.approx(own.max() * MILLIMETRE, rel=1e-12)
     pressure, even = (unit_pressure(solved.equilibria) * np.sqrt(q) for q in (own, solved.forces.pins / width * 1e3))

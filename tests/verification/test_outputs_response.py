@@ -10,7 +10,7 @@ import pytest
 from tests.prepared import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.equivalent.answers import Status, count_statuses
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.outputs import order_spectrum
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 from tolalloc.units import ARCMINUTE, ARCSECOND
@@ -40,7 +40,7 @@ def test_every_output_is_that_of_its_own_function(prepared, response, x):
     assert found.good.all()
     values = dict(zip(response.outputs, found.values.T, strict=True))
     np.testing.assert_array_equal(values["peak-to-peak transmission error [arcsec]"], kernel(x).values[:, 0])
-    loop = hysteresis_loop(kernel.model, kernel.errors(x), LOOP_ANGLES[::9])
+    loop = hysteresis_loop(kernel.model, kernel.errors(x), TURN_ANGLES)
     np.testing.assert_array_equal(values["lost motion [arcmin]"], loop.lost_motion / ARCMINUTE)
     np.testing.assert_array_equal(values["torsional stiffness [N·m/arcmin]"], loop.torsional_stiffness * ARCMINUTE)
     curves = kernel.model.equilibria(kernel.errors(x), kernel.torque).transmission_error

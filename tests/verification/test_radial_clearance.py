@@ -12,7 +12,7 @@ from tolalloc.rv.cycloid.clearance import exact_clearance
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.rv.equivalent.outputs import forces, radial_clearance
 from tolalloc.rv.reducer.design import Modification
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
@@ -104,7 +104,7 @@ def test_line_load_and_pressure_are_those_of_the_most_loaded_pin(prepared, gener
     line_load = values["largest line load, rated torque [N/mm]"]
     np.testing.assert_allclose(line_load * stage.face_width / MILLIMETRE, force, rtol=1e-12)
     torque = -abs(prepared.model.reducer.load.rated_torque)
-    solved = kernel.model.equilibria(kernel.errors(x), torque, LOOP_ANGLES[::9])
+    solved = kernel.model.equilibria(kernel.errors(x), torque, TURN_ANGLES)
     pins = forces(solved).pins
     pressure = np.zeros(3)
     for angle, disc, pin in np.ndindex(pins.shape[1:]):

@@ -19,6 +19,8 @@ ProfileFile = Annotated[Path | None, typer.Option(help="Write the tooth profile 
 ProfilePoints = Annotated[int, typer.Option(help="Points per tooth of that file.")]
 MOST_PHASES = 3600
 PLACE = "tolalloc contact"
+SHOWN = ("quantity", "one disc, law at every pin", "all discs, bearings yielding")
+"""Columns of the loaded contact that a terminal has room for; the report has all."""
 
 
 def contact(
@@ -53,7 +55,8 @@ def contact(
     asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, PLACE)
     answer = contact_answer(design, asked, law=law, exact=True if exact else None, phases=phases)
     write_asked(answer, out, answer.assessment.profile, profile, points)
-    loaded = (answer.contact_table, f"{design.name}: {asked:g} N·m on the carrier")
+    shown = [name for name in SHOWN if name in answer.contact_table]
+    loaded = (answer.contact_table[shown], f"{design.name}: {asked:g} N·m on the carrier")
     tell(answer, as_json, (answer.profile_table, f"{design.name}: profile and clearance"), loaded)
 
 

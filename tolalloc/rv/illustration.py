@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,11 +13,11 @@ from jaxtyping import Float
 from tolalloc.exceptions import InputError
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.cycloid.assessment import Assessment, assess
 from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.reducer.design import Modification, Reducer
-from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.teeth.answer import contact_answer
+from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,15 +108,6 @@ def _order_table(curves: Mapping[str, Equilibria]) -> pd.DataFrame:
     return pd.DataFrame(found | {f"{label} [arcsec]": _amplitudes(curve) for label, curve in curves.items()})
 
 
-_CARRIED: dict[str, Callable[[Assessment], float]] = {
-    "backlash of teeth and pins [arcmin]": lambda found: found.clearance.backlash / ARCMINUTE,
-    "fewest pins in contact at rated torque [-]": lambda found: float(found.single.pins_in_contact.min()),
-    "largest pin force at rated torque [N]": lambda found: float(found.single.force.max()),
-    "peak pressure at rated torque [MPa]": lambda found: float(found.single.pressure.max()) / MEGAPASCAL,
-}
-"""What the more loaded disc does, exact parts and Hertzian line contact at every pin."""
-
-
 def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
     """Return amounts, clearances and how exact teeth carry, for the modification of every unit."""
     import pandas as pd
@@ -123,23 +115,37 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
     columns: dict[str, dict[str, float]] = {}
     for label, (settings, _) in units.items():
         amounts = model.modification(settings)
-        found = _assessed(model.reducer, amounts)
         columns[label] = {
             "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
             "shift Δr_p [µm]": amounts.shift / MICROMETRE,
             "flank clearance, smallest nominal gap [µm]": amounts.flank_clearance(model.reducer.cycloid_stage)
             / MICROMETRE,
             "radial clearance at tip and root [µm]": amounts.radial_clearance / MICROMETRE,
-            **{name: value(found) if found else np.nan for name, value in _CARRIED.items()},
+            **_carried(replace(model.reducer, modification=amounts)),
         }
     shown = {label: f"{label.removeprefix('median unit ')} [unit of the amount]" for label in columns}
     frame = pd.DataFrame(columns).rename(columns=shown)
     return frame.rename_axis("amount").reset_index()
 
 
-def _assessed(reducer: Reducer, modification: Modification) -> Assessment | None:
-    """Return how the exact teeth carry the rated torque; none where they interfere before any load."""
-    try:
-        return assess(replace(reducer, modification=modification), reducer.load.rated_torque)
-    except InputError:
-        return None
+def _carried(reducer: Reducer) -> dict[str, float]:
+    """Return how the parts without errors carry the rated torque; not a number where they interfere before any load."""
+    values = [np.nan] * len(_CARRIED)
+    with suppress(InputError):
+        found = contact_answer(reducer, -reducer.load.rated_torque, law=reducer.stiffness.pin_contact_law).summary
+        if own := found["bearings yielding"]:
+            values = [
+                found["profile"]["backlash [arcmin]"],
+                own["pins in contact on a disc [-]"][0],
+                own["largest pin force [N]"],
+                own["peak pressure [MPa]"],
+            ]
+    return dict(zip(_CARRIED, values, strict=True))
+
+
+_CARRIED = (
+    "backlash of teeth and pins [arcmin]",
+    "fewest pins in contact on a disc at rated torque [-]",
+    "largest pin force at rated torque [N]",
+    "peak pressure at rated torque [MPa]",
+)

@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolalloc.rv.equivalent.answers import Equilibria
 from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import Forces, forces
+from tolalloc.rv.equivalent.perfect import perfect_reducer
 from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.series import at_torque, compliances
+from tolalloc.rv.reducer.series import compliances
 from tolalloc.units import ARCMINUTE
 
 if TYPE_CHECKING:
@@ -23,25 +21,13 @@ FACTOR = 1.5
 USUAL_TWIST = 3.6
 """Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
 
-_PHASES = 16  # of one pin pitch, at which the twist is read
 _PER_MICROMETRE = 1e-6  # N/µm per N/m
 _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 
-def _perfect(reducer: Reducer) -> tuple[Equilibria, Forces]:
-    """Return the perfect reducer at its modification under its rated torque, and its forces."""
-    torque = -reducer.load.rated_torque
-    model = EquivalentModel(at_torque(reducer, torque))
-    deviations = reducer.modification.deviations
-    errors = np.array([[deviations.get(name, 0.0) for name in model.columns]])
-    pitch = 2.0 * np.pi / reducer.cycloid_stage.pin_count
-    solved = model.equilibria(errors, torque, pitch * np.arange(_PHASES) / _PHASES)
-    return solved, forces(solved)
-
-
 def rated_pin_force(reducer: Reducer) -> float:
     """Return the largest force of a pin of the perfect reducer under its rated torque [N]."""
-    return float(_perfect(reducer)[1].pins.max())
+    return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
 
 
 def twist_shares(reducer: Reducer) -> pd.DataFrame:
@@ -52,7 +38,8 @@ def twist_shares(reducer: Reducer) -> pd.DataFrame:
     """
     import pandas as pd
 
-    solved, found = _perfect(reducer)
+    perfect = perfect_reducer(reducer, -reducer.load.rated_torque)
+    solved, found = perfect.equilibria, perfect.forces
     own, torque = solved.reducer, solved.torque
     work = torque * float(solved.transmission_error.mean())
     rows, left, parts = [], 1.0, compliances(own, torque)

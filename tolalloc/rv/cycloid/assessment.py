@@ -26,7 +26,7 @@ class Assessment:
     exact_clearance: Clearance  # Clearance by exact distances, to compare with
     linear: LoadedContact  # The more loaded disc by Li Lixing's linear method
     single: LoadedContact  # The more loaded disc by the contact law at every pin
-    together: LoadedContact  # All discs turning by the same angle under the whole torque
+    together: LoadedContact  # All discs turning by the same angle, their bearings rigid
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -65,6 +65,16 @@ def disc_share(discs: int) -> float:
     return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
 
 
+def pin_moment(reducer: Reducer, torque: float) -> float:
+    """Return the moment of all pin forces about the centres of their discs under a torque on the carrier [N·m].
+
+    The housing holds what the sun does not, T·(1 − 1/i). All pin forces pass through the pole, e·zp from the housing's
+    centre and e·zc from the disc's, so of that moment zc/zp is left about the disc.
+    """
+    stage = reducer.cycloid_stage
+    return torque * (1.0 - 1.0 / reducer.ratio) * stage.disc_teeth / stage.pin_count
+
+
 def assess(
     reducer: Reducer, torque: float, *, law: str = "logarithmic", exact: bool | None = None, phases: int = 72
 ) -> Assessment:
@@ -84,7 +94,7 @@ def assess(
     require_sound(profile, reducer.name)
     share, phase = disc_share(reducer.disc_count), default_phases(reducer, phases)
     one = PressedDiscs(reducer=reducer, torque=share * torque, exact=exact)
-    every = PressedDiscs(reducer=reducer, torque=torque, discs=reducer.disc_count, exact=exact)
+    every = PressedDiscs(reducer=reducer, torque=pin_moment(reducer, torque), discs=reducer.disc_count, exact=exact)
     return Assessment(
         reducer=reducer,
         torque=torque,

@@ -21,6 +21,13 @@ LOOP_ASSUMPTION = "backlash: loop width at ±0.01 % of rated torque; no friction
 LOOP_ANGLES = 2.0 * np.pi * np.arange(180) / 180
 """Angles of one output turn at which a loop is read unless asked otherwise [rad]."""
 
+TURN_ANGLES = 2.0 * np.pi * np.arange(23) / 23
+"""Angles of one output turn at which outputs of many units are read [rad].
+
+23 is prime, so no usual number of pins or teeth divides it and every angle is another phase of both: at 20 angles all
+of 40 pins would be met at one phase of the crank.
+"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class HysteresisLoop:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tolalloc.rv.cycloid.mesh import pin_angles
-from tolalloc.rv.equivalent.hysteresis import BACKLASH
+from tolalloc.rv.equivalent.hysteresis import BACKLASH, TURN_ANGLES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 
@@ -16,9 +16,6 @@ SLIDING_FRICTION = 0.05
 """Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
 
 PRELOAD_ASSUMPTION = f"no-load friction torque: discs sliding on pins alone, coefficient {SLIDING_FRICTION:g}"
-
-_ANGLES = 2.0 * np.pi * np.arange(37) / 37
-"""Angles of one output turn; 37 shares no divisor with usual numbers of pins and teeth, so all phases are met [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,9 +35,9 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     """
     reducer, stage = model.reducer, model.reducer.cycloid_stage
     torque = -BACKLASH * reducer.load.rated_torque
-    solved = model.at_torque(torque).equilibria(errors, torque, _ANGLES)
+    solved = model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES)
     found = forces(solved).pins
-    crank, apart = -stage.disc_teeth * _ANGLES, 2.0 * np.pi / reducer.disc_count
+    crank, apart = -stage.disc_teeth * TURN_ANGLES, 2.0 * np.pi / reducer.disc_count
     angle = np.stack([pin_angles(stage, -(crank + apart * disc)) for disc in range(reducer.disc_count)], axis=1)
     root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
     lever = stage.pin_circle_radius * root - stage.pin_radius

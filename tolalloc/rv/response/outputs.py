@@ -20,7 +20,7 @@ from tolalloc.rv import (
     TORSIONAL_STIFFNESS,
 )
 from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
@@ -29,10 +29,6 @@ from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
-
-_EVERY = 9
-"""The loop and the forces are read at every so many of the angles at which a single loop is drawn [-]."""
-_ANGLES = LOOP_ANGLES[::_EVERY]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +46,7 @@ def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk colum
 
 
 def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
-    loop = hysteresis_loop(model, errors, _ANGLES)
+    loop = hysteresis_loop(model, errors, TURN_ANGLES)
     values = np.stack(
         [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE], axis=1
     )
@@ -61,7 +57,7 @@ def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], tor
 
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     rated = float(np.copysign(model.reducer.load.rated_torque, torque))
-    solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, _ANGLES))
+    solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, TURN_ANGLES))
     own = [OUTPUTS[name][1](solved) for name in _FORCES]
     values = np.stack([*own, *_pin_stress(solved)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))

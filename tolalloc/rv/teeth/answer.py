@@ -10,13 +10,24 @@ import numpy as np
 
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
-from tolalloc.rv.cycloid.assessment import Assessment, assess
+from tolalloc.rv.cycloid.assessment import Assessment, assess, pin_moment
 from tolalloc.rv.cycloid.loaded_contact import LoadedContact
+from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.rv.equivalent.outputs import Solved, load_share
+from tolalloc.rv.equivalent.perfect import perfect_reducer
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_LAWS = {
+    "logarithmic": "steel line contact",
+    "constant": "a constant stiffness of a pin",
+    "table2": "the stiffness along the tooth of liu2020",
+}
+"""What a sentence calls the law of the pin forces."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +37,8 @@ class ContactAnswer(Answer):
     kind: ClassVar[str] = "contact"
     assessment: Assessment  # Clearance and contact; without errors they do not depend on the torque's direction
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
+    # The same reducer, its bearings yielding, as `te` and `run` solve it; none where distances must be exact
+    yielding: Solved | None
 
     @property
     def title(self) -> str:
@@ -45,15 +58,34 @@ class ContactAnswer(Answer):
     @property
     def sentences(self) -> tuple[str, ...]:
         """The answer in a few sentences."""
-        single, clearance = self.assessment.single, self.assessment.clearance
+        single, clearance, law = self.assessment.single, self.assessment.clearance, _LAWS[self._law]
         pins = single.pins_in_contact
         return (
             f"Backlash {clearance.backlash / ARCMINUTE:.2f} arcmin, radial clearance "
             f"{clearance.radial / MICROMETRE:.1f} µm; the first pin touches at "
             f"{clearance.first_contact / DEGREE:.1f}°.",
-            f"At {self.torque:g} N·m {span(pins.min(), pins.max())} pins of the more loaded disc carry, the most "
-            f"loaded one {single.force.max():.0f} N at {single.most_loaded / DEGREE:.0f}°, and the largest pressure is "
+            *self._yielding_sentence,
+            f"If one disc carries {self.assessment.share:.3g} of the torque and bearings are rigid, by {law}, "
+            f"{span(pins.min(), pins.max())} of its pins carry, the most loaded one {single.force.max():.0f} N at "
+            f"{single.most_loaded / DEGREE:.0f}°, and the largest pressure is "
             f"{single.pressure.max() / MEGAPASCAL:.0f} MPa at {single.most_pressed / DEGREE:.0f}°.",
+        )
+
+    @property
+    def _law(self) -> str:
+        return self.assessment.reducer.stiffness.pin_contact_law
+
+    @property
+    def _yielding_sentence(self) -> tuple[str, ...]:
+        """Return what `te` and `run` say of the reducer without errors."""
+        found = self.summary["bearings yielding"]
+        if found is None:
+            return ()
+        least, most = found["pins in contact on a disc [-]"]
+        return (
+            f"At {self.torque:g} N·m and with bearings that yield, by {_LAWS[self._law]}, {span(least, most)} pins of "
+            f"a disc carry, the most loaded one {found['largest pin force [N]']:.0f} N, and the largest pressure is "
+            f"{found['peak pressure [MPa]']:.0f} MPa.",
         )
 
     @property
@@ -98,6 +130,7 @@ class ContactAnswer(Answer):
             "linear": _contact_summary(found.linear),
             "per tooth": _contact_summary(found.single),
             "all discs together": _contact_summary(found.together),
+            "bearings yielding": _yielding_summary(self.yielding) if self.yielding else None,
             "warnings": list(self.warnings),
             "assumptions": list(self.assumptions),
         }
@@ -119,7 +152,7 @@ class ContactAnswer(Answer):
         for title, name, contact in (
             ("one disc, linear method", "linear", found.linear),
             ("one disc, law at every pin", "per tooth", found.single),
-            ("all discs together", "all discs together", found.together),
+            ("all discs, rigid bearings", "all discs together", found.together),
         ):
             own = self.summary[name]
             pins = own["share of phases with so many pins in contact [-]"]
@@ -133,7 +166,15 @@ class ContactAnswer(Answer):
                 "peak pressure [MPa], at [deg]": f"{pressure:.0f}, {own['peak pressure at [deg]']:.1f}",
                 "largest share of the torque on a disc [-]": f"{own['largest share of the torque on a disc [-]']:.3f}",
             }
-        frame = pd.DataFrame(columns)
+        if own := self.summary["bearings yielding"]:
+            columns["all discs, bearings yielding"] = {
+                "torque [N·m]": f"{own['moment about the discs [N·m]']:.4g}",
+                "pins in contact on a disc, share of phases": span(*own["pins in contact on a disc [-]"]),
+                "largest pin force [N], at [deg]": f"{own['largest pin force [N]']:.1f}",
+                "peak pressure [MPa], at [deg]": f"{own['peak pressure [MPa]']:.0f}",
+                "largest share of the torque on a disc [-]": f"{own['largest share of the torque on a disc [-]']:.3f}",
+            }
+        frame = pd.DataFrame(columns).fillna("–")
         frame.insert(0, "quantity", frame.index)
         return frame.reset_index(drop=True)
 
@@ -161,6 +202,7 @@ def contact_answer(
 ) -> ContactAnswer:
     """Return what the reducer's modification does under a torque on the carrier; see `assess` for the rest."""
     found = assess(reducer, torque, law=law, exact=exact, phases=phases)
+    linear = reducer.modification.rotation == 0.0 and not found.clearance.exact
     return ContactAnswer(
         header=Header(
             name=reducer.name,
@@ -170,6 +212,7 @@ def contact_answer(
         ),
         assessment=found,
         torque=torque,
+        yielding=perfect_reducer(found.reducer, torque) if linear else None,  # its gaps are the linear formula's
     )
 
 
@@ -215,6 +258,21 @@ def _contact_summary(contact: LoadedContact) -> dict[str, Any]:
         "peak pressure [MPa]": float(contact.pressure.max()) / MEGAPASCAL,
         "peak pressure at [deg]": contact.most_pressed / DEGREE,
         "largest share of the torque on a disc [-]": float(share.max()),
+    }
+
+
+def _yielding_summary(solved: Solved) -> dict[str, Any]:
+    """Return the reducer without errors, its bearings yielding, units in the names."""
+    pins, found = solved.forces.pins[0], solved.equilibria
+    reducer = found.reducer
+    carry = (pins > 0).sum(axis=2)
+    pressure = unit_pressure(found) * np.sqrt(peak_line_load(found, solved.forces))
+    return {
+        "pins in contact on a disc [-]": [int(carry.min()), int(carry.max())],
+        "largest pin force [N]": float(pins.max()),
+        "peak pressure [MPa]": float(pressure.max()) / MEGAPASCAL,
+        "moment about the discs [N·m]": pin_moment(reducer, abs(found.torque)),
+        "largest share of the torque on a disc [-]": float(load_share(solved.forces.pins).max()),
     }
 
 

@@ -1,0 +1,36 @@
+"""The reducer without part errors, its bearings yielding: the one answer on forces that every command gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+
+import numpy as np
+
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import Solved
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.series import at_torque
+
+PHASES = 72
+"""Phases of one pin pitch at which a reducer without errors is solved, for forces over the turn [-]."""
+
+
+def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
+    """Return equilibria and forces of the reducer without part errors over one pin pitch of the crank.
+
+    Its modification and the stiffness of its parts under the torque are in force. While the carrier turns by a pin
+    pitch over the teeth of a disc, the crank direction meets every phase of the pins, and all else repeats.
+
+    Parameters
+    ----------
+    reducer
+        The reducer.
+    torque
+        Torque on the carrier, negative where it resists the rotation [N·m].
+    """
+    model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
+    deviations: Mapping[str, float] = reducer.modification.deviations
+    errors = np.array([[deviations.get(name, 0.0) for name in model.columns]])
+    span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
+    return Solved.of(model.equilibria(errors, torque, span * np.arange(PHASES) / PHASES))
