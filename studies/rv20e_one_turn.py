@@ -13,7 +13,7 @@ import tolalloc as ta
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.equivalent.attribution import attribute
-from tolalloc.rv.equivalent.hysteresis import LOST_MOTION, both_directions, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import DRAWN, LOST_MOTION, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.reducer.files import load_reducer
@@ -95,7 +95,7 @@ def pin_forces(model: EquivalentModel, unit: np.ndarray) -> Figure:
 
 def loop(model: EquivalentModel, unit: np.ndarray) -> Figure:
     """Draw torque against twist at one angle, with and without errors."""
-    found = hysteresis_loop(model, np.concatenate([exact(model), unit]), np.array([2.5]))
+    found = hysteresis_loop(model, np.concatenate([exact(model), unit]), np.array([2.5]), DRAWN)
     share = LOST_MOTION * found.torque[-1]
     return Figure(
         name="torque_twist",

@@ -12,7 +12,7 @@ from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.rv.equivalent.attribution import attribute
 from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.hysteresis import BACKLASH, both_directions, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
 from tolalloc.rv.equivalent.kinematics import Coordinates
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
@@ -89,7 +89,7 @@ def test_backlash_is_the_first_gap_that_closes_over_its_lever(preset):
     lever = contact.displacement[:, :, turn].sum(axis=2) / stage.disc_pitch_radius  # −sin a
     lever = lever * stage.eccentricity * stage.pin_count * reducer.ratio / (reducer.ratio - 1)
     free = sum(np.where(side * lever > 1e-9, gap / np.abs(lever), np.inf).min(axis=1) for side in (1, -1))
-    loop = hysteresis_loop(model, errors, angles)
+    loop = hysteresis_loop(model, errors, angles, DRAWN)
     np.testing.assert_allclose(loop.width(BACKLASH)[0], free, rtol=0, atol=0.01 * ARCSECOND)
     assert loop.lost_motion[0] > loop.backlash[0] > 0
     assert (np.diff(loop.twist, axis=1) > 0).all()  # more torque, more twist

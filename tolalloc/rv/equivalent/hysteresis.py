@@ -6,6 +6,7 @@ bearings and meshes and the elastic twist.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,12 +63,21 @@ class HysteresisLoop:
         return np.asarray(2.0 * (rated - low) / twist)
 
 
+READ = (BACKLASH, LOST_MOTION, 1.0)
+"""Torques over rated torque from which all numbers of a loop are read; more of them only draw it."""
+
+DRAWN = (BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0)
+"""Torques over rated torque at which a loop is drawn."""
+
+
 def hysteresis_loop(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"], carrier_angle: Float[np.ndarray, " angle"]
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "sample column"],
+    carrier_angle: Float[np.ndarray, " angle"],
+    shares: Sequence[float] = READ,
 ) -> HysteresisLoop:
-    """Return torque against twist between minus and plus the rated torque at the carrier angles [rad]."""
-    shares = np.array([BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0])
-    torque = model.reducer.load.rated_torque * np.concatenate([-shares[::-1], shares])
+    """Return torque against twist at shares of the rated torque in both directions and at the carrier angles [rad]."""
+    torque = model.reducer.load.rated_torque * np.array([*(-share for share in reversed(shares)), *shares])
     twist = [
         model.at_torque(level).equilibria(errors, level, carrier_angle).transmission_error for level in torque.tolist()
     ]
