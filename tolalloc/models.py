@@ -320,6 +320,20 @@ class Model(ABC):
         """Return what a reader must know of these settings."""
         return ()
 
+    @property
+    def own_limits(self) -> Mapping[str, float]:
+        """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
+        return {}
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What every report says of the model itself beside what is asked, in sentences."""
+        return ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:  # noqa: ARG002
+        """Return what a check of a study says of the model and of some random units, in sentences."""
+        return ()
+
     def illustrated(
         self,
         units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]],  # noqa: ARG002

@@ -14,6 +14,9 @@ from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
+    import numpy as np
+    from jaxtyping import Float
+
     from tolalloc.report.answer import Answer
     from tolalloc.study.prepared import Prepared
     from tolalloc.study.study import Study
@@ -96,7 +99,9 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
         return study
     if not study.limits:
         raise InputError(f"study {study.name}: it has no limits that --limit or --yield could change.")
-    leading, own = next(iter(study.limits.items()))
+    leading, own = next(((name, own) for name, own in study.limits.items() if own), ("", None))
+    if own is None:
+        return study
     if limit is not None and own.upper is None:
         raise InputError.at("tolalloc allocate", "--limit", limit, f"left out: {leading} has no upper limit to change")
     changed = own if limit is None else replace(own, upper=limit)
@@ -164,7 +169,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         "sources": len(errors.sources),
         "varying": len(errors.active),
         "groups": list(space.groups),
-        "limits": {name: [limit.lower, limit.upper] for name, limit in study.limits.items()},
+        "limits": {own.output: [own.limits.lower, own.limits.upper] for own in requirements},
         "questions": kinds,
     }
     lines = [
@@ -177,4 +182,20 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
         lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
-    return summary, lines
+    examined = model.examined(_random_units(prepared))
+    return {**summary, "examined": list(examined)}, [*lines, *examined]
+
+
+_CHECKED = 1000
+"""Random units that a check solves [-]."""
+
+
+def _random_units(prepared: Prepared) -> Float[np.ndarray, "unit column"]:
+    """Return the deviations of random units at the zones of the drawing."""
+    import numpy as np
+
+    from tolalloc.drawings.seeds import SeedTree
+
+    errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
+    chunks = seeds.uniform_chunks(_CHECKED, len(errors.columns))
+    return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])

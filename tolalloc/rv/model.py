@@ -14,17 +14,18 @@ from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
 from tolalloc.report.document import Section
-from tolalloc.rv import PEAK_TO_PEAK
+from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading, wave_outputs
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
-from tolalloc.rv.rigidity import against_catalogue
+from tolalloc.rv.rigidity import against_catalogue, rated_pin_force
 from tolalloc.units import ARCMINUTE, MICROMETRE
 
 FLANK = "flank clearance [µm]"
@@ -194,7 +195,7 @@ class ReducerModel(Model):
     @cached_property
     def _perfect_loop(self) -> HysteresisLoop:
         """Torque against twist of the reducer without any error."""
-        return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), LOOP_ANGLES)
+        return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), TURN_ANGLES)
 
     @property
     def drawn_amounts(self) -> DrawnAmounts:
@@ -293,6 +294,41 @@ class ReducerModel(Model):
             FLANK: float(values[0]),
             RADIAL: float(values[1]),
         }
+
+    @cached_property
+    def own_limits(self) -> Mapping[str, float]:
+        """No pin may press harder without torque than the rated torque makes it: such a unit is jammed.
+
+        Only where bearings are stated by their dimensions: printed stiffnesses, many times too large, jam nearly all.
+        """
+        return {PRELOAD: self._rated_pin_force} if self.reducer.parts else {}
+
+    @cached_property
+    def _rated_pin_force(self) -> float:
+        """Largest pin force of the perfect reducer under its rated torque [N]."""
+        return rated_pin_force(self.reducer)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Rigidity and lost motion beside the catalogue's."""
+        sentence, _ = against_catalogue(self.reducer, self._perfect_loop)
+        return (sentence,) if sentence else ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:
+        """Return nominal clearances, how many random units are jammed, and what is said of the catalogue."""
+        stage, (flank, radial) = self.reducer.cycloid_stage, self._clearances
+        found = preload(self.kernel.model, self.kernel.errors(x))
+        solved, rated = found.status == 0, self._rated_pin_force
+        jammed, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
+        unsolved = "" if solved.all() else f" ({(~solved).sum()} have no equilibrium)"
+        return (
+            f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
+            f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
+            f"Of {len(x)} random units {jammed.mean():.1%} are jammed{unsolved}: without torque their pins press with "
+            f"more than the {rated:.0f} N of the rated torque; half of all press with {median:.2g} N or more.",
+            *self.remarks,
+            *self.cautions(np.array(self._clearances)),
+        )
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""

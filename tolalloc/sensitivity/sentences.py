@@ -33,6 +33,7 @@ def sentences(answer: RankingAnswer) -> tuple[str, ...]:
         *_beyond(answer),
         _opening(answer),
         answer.choice.reason,
+        *answer.model.remarks,
     )
 
 
@@ -191,6 +192,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
             f"order is off by {error.root_mean_square:.2g}{answer.sign} where the effect is "
             f"{error.effect:.2g}{answer.sign}."
         )
+    found += answer.model.cautions(np.array([setting.value for setting in answer.model.settings]))
     failed = answer.header.failed
     if failed:
         found.append(f"{failed} units have no answer; no figure uses them, and yields count them as outside.")

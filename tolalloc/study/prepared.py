@@ -12,6 +12,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Model
 from tolalloc.report.answer import Header
+from tolalloc.study.limit import Limit
 
 if TYPE_CHECKING:
     from tolalloc.allocation.design_space import DesignSpace
@@ -69,9 +70,15 @@ class Prepared:
         for name in self.study.limits:
             if name not in self.model.outputs:
                 raise UnknownNameError.among(self.place, "limit of", name, self.model.outputs)
+        asked = {name: limit for name, limit in self.study.limits.items() if limit is not None}
+        if not asked:
+            raise InputError(f"{self.place}: every limit is None; limit one output at least, the leading one first.")
+        own = {
+            name: Limit(upper=upper) for name, upper in self.model.own_limits.items() if name not in self.study.limits
+        }
         return tuple(
             Requirement(output=name, limits=limit.limits, guarantee=limit.guarantee)
-            for name, limit in self.study.limits.items()
+            for name, limit in {**asked, **own}.items()
         )
 
     @property

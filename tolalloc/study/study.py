@@ -68,6 +68,7 @@ class Study(NamedFields):
         The tolerance table, ``ta.drawing(...)``.
     limits
         Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
+        None lifts a limit that the model has of its own: no unit of a reducer may be jammed, `PRELOAD`.
     questions
         What is asked, in the order of the report.
     name
@@ -96,7 +97,7 @@ class Study(NamedFields):
 
     model: ModelSource | None = None
     drawing: Drawing | None = None
-    limits: Mapping[str, Limit] = field(default_factory=dict)
+    limits: Mapping[str, Limit | None] = field(default_factory=dict)
     questions: Sequence[Question] = (Ranking(), Allocation())
     name: str = "study"
     seed: int = 1
@@ -127,8 +128,10 @@ class Study(NamedFields):
             if kinds.count(kind) > 1:
                 raise InputError(f"{place}: it asks {kind} {kinds.count(kind)} times; a study asks each question once.")
         for output, limit in self.limits.items():
-            if not isinstance(limit, Limit):
-                raise InputError.at(place, f"limits[{output!r}]", limit, "ta.Limit(...)")
+            if not isinstance(limit, Limit | None):
+                raise InputError.at(
+                    place, f"limits[{output!r}]", limit, "ta.Limit(...), or None to lift the model's own"
+                )
         self._require_read(place)
 
     def _require_read(self, place: str) -> None:

@@ -35,6 +35,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         *_prices(answer),
         *_good_unit(answer),
         *_settled(answer),
+        *answer.model.remarks,
     )
 
 
