@@ -13,6 +13,10 @@ from tolalloc.cli.options import ReducerOption, named_reducer
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolalloc.bench.identification.answer import IdentificationAnswer
+    from tolalloc.bench.identification.catalogue import CatalogueAnswer
     from tolalloc.bench.identification.parameters import Parameter
     from tolalloc.rv.reducer.design import Reducer
 
@@ -22,7 +26,9 @@ NAMES = "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carr
 
 
 def identify(
-    data: Annotated[Path, typer.Argument(help="Measurement file (TOML): units and their readings.")],
+    data: Annotated[
+        Path | None, typer.Argument(help="Measurement file (TOML): units and their readings; none with --catalogue.")
+    ] = None,
     reducer: ReducerOption = None,
     asked: Annotated[
         list[str] | None,
@@ -36,50 +42,93 @@ def identify(
         list[str] | None,
         typer.Option("--prior", help="Known beforehand, as NAME=RELATIVE standard deviation (bias: arcsec)."),
     ] = None,
+    catalogue: Annotated[
+        bool,
+        typer.Option("--catalogue", help="Instead of units: the rigidity in [catalogue], one factor on all bearings."),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of every random number.")] = 1,
     stiffness: Annotated[Path | None, typer.Option(help="Write the stiffnesses to this new .toml file.")] = None,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
+    answer: IdentificationAnswer | CatalogueAnswer
+    from tolalloc.report.folder import require_usable
+    from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
+
+    design = load_reducer(named_reducer(reducer, stiffness, out))
+    require_usable(out)
+    if stiffness:
+        _require_stiffness_file(stiffness, out)
+    if catalogue:
+        given = {"a measurement file": data, "--parameter": asked, "--prior": priors}
+        for name, value in given.items():
+            if value:
+                raise InputError(f"{PLACE}: --catalogue needs no units; leave out {name}.")
+        answer, tables = _from_catalogue(design)
+    elif data is None:
+        raise InputError(f"{PLACE}: a measurement file is missing; give one, or --catalogue.")
+    else:
+        answer, tables = _from_units(data, design, asked, priors, seed, stiffness)
+    write_report(answer, out)
+    if stiffness and answer.stiffness:
+        write_identified_stiffness(answer.stiffness, stiffness)
+        note(f"Stiffness file: {stiffness}")
+    tell(answer, as_json, *tables)
+
+
+def _require_stiffness_file(file: Path, out: Path | None) -> None:
+    """Refuse a stiffness file that could not be written, before anything long runs."""
+    from tolalloc.files import require_new
+
+    require_new(file)
+    if file.suffix != ".toml":
+        raise InputError.at(PLACE, "--stiffness", str(file), "a file that ends in .toml")
+    if out and (out.absolute() == file.absolute() or out.absolute() in file.absolute().parents):
+        raise InputError.at(PLACE, "--stiffness", str(file), "a file outside of the report's folder")
+
+
+def _from_catalogue(design: Reducer) -> tuple[CatalogueAnswer, list[tuple[pd.DataFrame, str]]]:
+    """Return the factor on all bearings that gives the rigidity of the catalogue."""
+    from tolalloc.bench.identification.catalogue import identify_from_catalogue
+
+    announce_compilation()
+    answer = identify_from_catalogue(design)
+    return answer, [(answer.shares, f"{design.name}: which part yields, with the factor")]
+
+
+def _from_units(
+    data: Path,
+    design: Reducer,
+    asked: list[str] | None,
+    priors: list[str] | None,
+    seed: int,
+    stiffness: Path | None,
+) -> tuple[IdentificationAnswer, list[tuple[pd.DataFrame, str]]]:
+    """Return the stiffnesses that measured units tell."""
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
     from tolalloc.bench.identification.exhibits import estimates_table
     from tolalloc.bench.identification.parameters import LIU2020
     from tolalloc.bench.identification.study import IdentificationStudy
     from tolalloc.bench.identification.study import identify as identified
     from tolalloc.bench.measurement.files import load_measurements
-    from tolalloc.files import require_new
-    from tolalloc.report.folder import require_usable
-    from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
 
-    design = load_reducer(named_reducer(reducer, stiffness, out))
     study = IdentificationStudy(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
         seed=seed,
         data=str(data),
     )
-    require_usable(out)
-    if stiffness:
-        require_new(stiffness)
-        if stiffness.suffix != ".toml":
-            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file that ends in .toml")
-        if out and (out.absolute() == stiffness.absolute() or out.absolute() in stiffness.absolute().parents):
-            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file outside of the report's folder")
-        if not any(item.is_stiffness for item in study.parameters):
-            raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
+    if stiffness and not any(item.is_stiffness for item in study.parameters):
+        raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
     announce_compilation()
     with UnitProgress() as progress:
         answer = identified(study, measurements, design, progress)
-    write_report(answer, out)
-    if stiffness and answer.stiffness:
-        write_identified_stiffness(answer.stiffness, stiffness)
-        note(f"Stiffness file: {stiffness}")
     tables = [(estimates_table(answer), f"{design.name}: {measurements.name}")]
     if answer.choices:
         short = ["fitted", "units left out, over noise [-]", "chosen"]
         tables.append((answer.to_frame("choices")[short], "Simpler explanations"))
-    tell(answer, as_json, *tables)
+    return answer, tables
 
 
 def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> tuple[Parameter, ...]:

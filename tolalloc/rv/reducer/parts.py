@@ -15,10 +15,12 @@ class Part:
     interface: str  # Field of `tolalloc.rv.reducer.stiffness.Stiffness` that it belongs to
     name: str  # What it is, such as ``carrier twist``
     yields: RollingBearing | float  # The bearing, or what the body yields [m/N]
+    stiffer: float = 1.0  # Stiffness over what the dimensions give, where it was identified [-]
 
     def compliance(self, force: float) -> float:
         """Return the way over the force [m/N]."""
-        return _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
+        own = _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
+        return own / self.stiffer
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,63 @@
+"""One factor on all rolling bearings: the rigidity it gives, what it leaves open, and the file that studies reuse."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from tests.studies.command import refused, tolalloc
+from tolalloc.bench.identification.catalogue import BEARINGS, identify_from_catalogue, perfect_loop, with_bearings
+from tolalloc.exceptions import InputError
+from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.units import ARCMINUTE
+
+
+@pytest.fixture(scope="module")
+def found():
+    return identify_from_catalogue(load_reducer("rv20e"))
+
+
+def test_the_factor_gives_the_rigidity_of_the_catalogue(found):
+    rigidity = perfect_loop(with_bearings(load_reducer("rv20e"), found.factor)).torsional_stiffness[0]
+    assert rigidity * ARCMINUTE == pytest.approx(49.0, rel=1e-8)
+    assert 1.0 < found.factor < 1.5  # the preset is 6 % too soft, and bearings are a third of its twist
+
+
+def test_its_slope_is_that_of_the_bearings_share_of_the_twist(found):
+    """By virtual work a spring's share of the twist is how much the rigidity feels it; shares are taken secant-wise."""
+    bearings = found.shares[found.shares["part"].str.contains("bearing")]["share of the twist [%]"].sum() / 100
+    assert found.slope == pytest.approx(bearings, abs=0.05)
+
+
+def test_printed_stiffnesses_are_scaled_alike():
+    printed = replace(load_reducer("rv20e_liu2020"), catalogue=load_reducer("rv20e").catalogue)
+    with pytest.raises(InputError, match="what its bearings can do") as caught:
+        identify_from_catalogue(replace(printed, catalogue=replace(printed.catalogue, torsional_rigidity=1e9)))
+    assert "torsional_rigidity_nm_per_arcmin" in str(caught.value)
+    found = identify_from_catalogue(printed)
+    assert found.factor < 0.05
+    assert "look for another part" in found.warnings[0]
+    for name in BEARINGS:
+        ratio = getattr(found.after.stiffness, name) / getattr(printed.stiffness, name)
+        assert ratio == pytest.approx(found.factor, rel=1e-12)
+
+
+def test_the_file_gives_a_study_the_same_rigidity(tmp_path):
+    path = tmp_path / "bearings.toml"
+    result = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--stiffness", path, "--json")
+    assert result.returncode == 0, result.stderr
+    said = json.loads(result.stdout)
+    identified = load_identified_stiffness(path)
+    assert dict(identified.values) == said["stiffness at rated torque [N/m]"]
+    rigidity = perfect_loop(with_stiffness(load_reducer("rv20e"), identified)).torsional_stiffness[0] * ARCMINUTE
+    # Constant secants at rated torque: stiffer than the bearings at small torques, softer nowhere.
+    assert rigidity == pytest.approx(49.0, rel=0.03)
+
+
+def test_what_does_not_go_together_is_refused():
+    refused(tolalloc("identify"), "a measurement file is missing", "--catalogue")
+    refused(tolalloc("identify", "--catalogue", "units.toml"), "leave out a measurement file")
+    refused(tolalloc("identify", "--catalogue", "--parameter", "bias"), "leave out --parameter")
+    refused(tolalloc("identify", "--catalogue", "--reducer", "rv20e_liu2020"), "no table [catalogue]")
