@@ -36,7 +36,9 @@ DOORS = {
 LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
 """Libraries that are loaded when they are used and not with the package."""
 LATER = ("matplotlib", "numba", "scipy.stats", "scipy.special")
-"""Libraries that no check of a study needs either."""
+"""Libraries that no help needs either."""
+SOLVED_WITH = ("numba", "scipy.stats", "scipy.special")
+"""Libraries with which a check solves some random units."""
 
 
 def imports(tree: ast.Module) -> set[str]:
@@ -77,8 +79,10 @@ def test_the_package_is_imported_without_heavy_libraries():
     assert not loaded_by("import tolalloc")
 
 
-@pytest.mark.parametrize("words", [["--help"], ["check", "studies/rv20e_allocation.py"]])
-def test_help_and_check_need_no_heavy_library(words):
+@pytest.mark.parametrize(
+    ("words", "allowed"), [(["--help"], ()), (["check", "studies/rv20e_allocation.py"], SOLVED_WITH)]
+)
+def test_help_and_check_need_no_heavy_library(words, allowed):
     program = f"""
 from tolalloc.cli.main import main
 sys.argv = ["tolalloc", *{words!r}]
@@ -87,7 +91,7 @@ try:
 except SystemExit as end:
     assert not end.code
 """
-    assert not loaded_by(program)
+    assert loaded_by(program) <= {*allowed}
 
 
 def test_help_lists_the_parameters_that_can_be_identified():

@@ -1,0 +1,67 @@
+"""Units that press themselves: a requirement of every believable reducer, said in a check, lifted by name."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import tolalloc as ta
+from tests.studies.command import tolalloc
+from tests.studies.scripts import study_script
+from tolalloc.exceptions import InputError
+from tolalloc.rv.equivalent.preload import preload
+from tolalloc.rv.rigidity import rated_pin_force
+from tolalloc.study.prepared import Prepared
+
+LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
+
+
+def prepared(reducer: str, **changes: object) -> Prepared:
+    return Prepared(study=ta.Study(ta.reducer(reducer), ta.drawing("rv20e_baseline"), **{"limits": LIMITS, **changes}))
+
+
+def test_no_pin_may_press_harder_without_torque_than_the_rated_torque_makes_it():
+    asked = prepared("rv20e")
+    peak, jammed = asked.requirements
+    assert (peak.output, jammed.output) == (ta.PEAK_TO_PEAK, ta.PRELOAD)
+    assert jammed.limits.upper == rated_pin_force(asked.model.reducer)
+    # Printed stiffnesses are fifty times a catalogue's; what presses with them means nothing.
+    assert [own.output for own in prepared("rv20e_liu2020").requirements] == [ta.PEAK_TO_PEAK]
+
+
+def test_a_study_may_say_otherwise():
+    own = prepared("rv20e", limits={**LIMITS, ta.PRELOAD: ta.Limit(upper=2000.0)}).requirements
+    assert [(limit.output, limit.limits.upper) for limit in own] == [(ta.PEAK_TO_PEAK, 60.0), (ta.PRELOAD, 2000.0)]
+    assert [limit.output for limit in prepared("rv20e", limits={**LIMITS, ta.PRELOAD: None}).requirements] == [
+        ta.PEAK_TO_PEAK
+    ]
+    with pytest.raises(InputError, match="every limit is None"):
+        _ = prepared("rv20e", limits={ta.PRELOAD: None}).requirements
+
+
+def test_a_check_counts_the_jammed_among_random_units(tmp_path):
+    script = study_script(tmp_path, reducer={"name": "rv20e"})
+    result = tolalloc("check", script)
+    assert result.returncode == 0, result.stderr
+    assert "Nominal clearance 1.04 µm on the flank and 8 µm at tip and root" in result.stdout
+    assert "N·m/arcmin where the catalogue states 49" in result.stdout
+    (line,) = (line for line in result.stdout.splitlines() if "random units" in line)
+    said = float(line.split("Of 1000 random units ")[1].split("%")[0]) / 100
+    # The same share of other random units, within four standard errors of the difference.
+    asked = prepared("rv20e")
+    generator, errors = np.random.default_rng(77), asked.errors
+    uniform = generator.uniform(size=(500, len(errors.columns)))
+    x = errors.deviations(errors.standard_values(uniform), errors.zones)
+    found = preload(asked.model.kernel.model, asked.model.kernel.errors(x))
+    share = (found.pin_force > rated_pin_force(asked.model.reducer)).mean()
+    pooled = (said * 1000 + share * 500) / 1500
+    assert abs(said - share) <= 4 * np.sqrt(pooled * (1 - pooled) * (1 / 1000 + 1 / 500))
+
+
+def test_a_check_for_a_program_says_the_same(tmp_path):
+    script = study_script(tmp_path, reducer={"name": "rv20e"})
+    said = json.loads(tolalloc("check", script, "--json").stdout)
+    assert list(said["limits"]) == [ta.PEAK_TO_PEAK, ta.PRELOAD]
+    assert any("are jammed" in sentence for sentence in said["examined"])
