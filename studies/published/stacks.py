@@ -7,6 +7,8 @@ requirement]. Zones and budgets are counted alike: all of them are ± tolerances
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import brentq
@@ -180,3 +182,61 @@ def yield_root_sum_square(
         rtol=1e-14,
     )
     return root_sum_square(name, sensitivities / deviations, float(budget))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StackLimits:
+    """Between which values a requirement lies [unit of the requirement]."""
+
+    nominal: float  # Value at the nominal sizes
+    worst_case: tuple[float, float]  # Smallest and largest value inside all limits
+    root_sum_square: tuple[float, float]  # Nominal less and plus the quadrature of what each side may add
+    centred: tuple[float, float]  # Middle of the worst case less and plus the quadrature of half the zones
+
+
+def stack_limits(
+    sensitivities: Float[np.ndarray, " feature"],
+    nominal: Float[np.ndarray, " feature"],
+    plus: Float[np.ndarray, " feature"],
+    minus: Float[np.ndarray, " feature"],
+) -> StackLimits:
+    """Return the limits of a requirement whose features may deviate by unequal amounts upwards and downwards.
+
+    Parameters
+    ----------
+    nominal
+        Nominal sizes of the features, without the direction in which they count [unit of the feature].
+    plus, minus
+        Upper and lower limit deviation of each, the lower one with its sign [unit of the feature].
+
+    Raises
+    ------
+    InputError
+        A zone beside its nominal size, from which no quadrature can start.
+
+    Notes
+    -----
+    The quadrature side by side from the nominal takes each half of a zone as that of a symmetrical one, so it is not
+    centred on the mean that features have in the middle of their zones. The centred one is: features that are normal
+    there, with half the zone three standard deviations, lie inside it in 99.73 % of all units.
+
+    Examples
+    --------
+    A housing of 10 mm (+50, −50 µm) less a part of 9.8 mm (+30, −20 µm):
+
+    >>> size, plus, minus = np.array([10.0, 9.8]), np.array([0.05, 0.03]), np.array([-0.05, -0.02])
+    >>> found = stack_limits(np.array([1.0, -1.0]), size, plus, minus)
+    >>> [f"{value:.3f}" for value in found.worst_case + found.root_sum_square]
+    ['0.120', '0.270', '0.142', '0.254']
+    """
+    if not np.all((plus >= 0) & (minus <= 0)):
+        limits = [list(pair) for pair in zip(minus.tolist(), plus.tolist(), strict=True)]
+        raise InputError.at("stack", "limit deviations", limits, "zones that hold their nominal size")
+    value, ends = float(sensitivities @ nominal), np.sort([sensitivities * minus, sensitivities * plus], axis=0)
+    middle, half = value + float(ends.mean(axis=0).sum()), float(np.linalg.norm(np.ptp(ends, axis=0) / 2))
+    return StackLimits(
+        nominal=value,
+        worst_case=(value + float(ends[0].sum()), value + float(ends[1].sum())),
+        root_sum_square=(value - float(np.linalg.norm(ends[0])), value + float(np.linalg.norm(ends[1]))),
+        centred=(middle - half, middle + half),
+    )
