@@ -7,15 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.rv.cycloid.mesh import pin_angles
+from tolalloc.rv.equivalent.friction import sliding_ways
 from tolalloc.rv.equivalent.hysteresis import BACKLASH, TURN_ANGLES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 
-SLIDING_FRICTION = 0.05
-"""Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
-
-PRELOAD_ASSUMPTION = f"no-load friction torque: discs sliding on pins alone, coefficient {SLIDING_FRICTION:g}"
+PRELOAD_ASSUMPTION = "no-load friction torque of the pins: discs sliding on pins alone"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,16 +30,13 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     A disc turns against the housing about its pole, so at a pin it slides with the output speed times the distance of
     contact and pole, R_p·√S − r_rp; friction torque µ·ΣF·(R_p·√S − r_rp).
     """
-    reducer, stage = model.reducer, model.reducer.cycloid_stage
+    reducer = model.reducer
     torque = -BACKLASH * reducer.load.rated_torque
     solved = model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES)
     found = forces(solved).pins
-    crank, apart = -stage.disc_teeth * TURN_ANGLES, 2.0 * np.pi / reducer.disc_count
-    angle = np.stack([pin_angles(stage, -(crank + apart * disc)) for disc in range(reducer.disc_count)], axis=1)
-    root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
-    lever = stage.pin_circle_radius * root - stage.pin_radius
+    ways = sliding_ways(reducer, TURN_ANGLES)
     return Preload(
         pin_force=np.asarray(found.max(axis=(1, 2, 3))),
-        friction_torque=SLIDING_FRICTION * np.einsum("sadp,adp->sa", found, lever).max(axis=1),
+        friction_torque=reducer.friction.pins * np.einsum("sadp,adp->sa", found, ways).max(axis=1),
         status=np.asarray(solved.status.max(axis=1)),
     )

@@ -11,6 +11,7 @@ from pydantic import Field
 from tolalloc.exceptions import InputError
 from tolalloc.files import times
 from tolalloc.named_fields import is_number
+from tolalloc.rv.reducer.friction import Friction, FrictionDimensions
 from tolalloc.rv.reducer.parts import Part
 from tolalloc.rv.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
@@ -173,6 +174,8 @@ class Reducer:
     clearances: Clearances = field(default_factory=Clearances)
     # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
     parts: tuple[Part, ...] = ()
+    friction: Friction = field(default_factory=Friction)
+    friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = field(default=())
 

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from tolalloc.exceptions import InputError
 from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.rv.reducer.design import Catalogue, Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.rv.reducer.friction import Friction
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
@@ -69,6 +70,7 @@ class ReducerRecord(Record):
     modification: ModificationRecord
     load: Load
     clearances: Clearances = Clearances()
+    friction: Friction = Friction()
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = ()
 
@@ -96,6 +98,8 @@ class ReducerRecord(Record):
             ),
             load=self.load,
             clearances=self.clearances,
+            friction=self.friction,
+            friction_dimensions=self.stiffness.friction_dimensions,
             catalogue=self.catalogue,
             assumptions=self.assumptions,
         )

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag
 
 from tolalloc.files import Record, times
 from tolalloc.rv.reducer.design import CycloidStage, Reducer
+from tolalloc.rv.reducer.friction import FrictionDimensions
 from tolalloc.rv.reducer.parts import Part
 from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
 from tolalloc.rv.reducer.shafts import Crankshaft, Pillars, bore_flexibility
@@ -146,6 +147,17 @@ class StiffnessRecord(Record):
             else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
         )
 
+    @property
+    def friction_dimensions(self) -> FrictionDimensions:
+        """Bearings and gears that are given by their dimensions, both bearings of a crankshaft as one."""
+        inner, outer, main = self.crank_disc_bearing, self.crank_carrier_bearing, self.carrier_bearing
+        return FrictionDimensions(
+            crank_disc_bearing=inner if isinstance(inner, RollerBearing) else None,
+            crank_carrier_bearing=replace(outer, rows=2 * outer.rows) if isinstance(outer, RollerBearing) else None,
+            carrier_bearing=main if isinstance(main, BallBearing) else None,
+            contact_ratio=self.gear_mesh.contact_ratio if isinstance(self.gear_mesh, GearPair) else None,
+        )
+
     def parts(self, reducer: Reducer) -> tuple[Part, ...]:
         """Return the parts of the interfaces that yield in series, a given stiffness as one of them.
 
@@ -163,8 +175,7 @@ class StiffnessRecord(Record):
                 Part("crank_disc_bearing", "crank–disc bearing", bearing),
                 Part("crank_disc_bearing", "disc", ring),
             ]
-        if isinstance(self.crank_carrier_bearing, RollerBearing):
-            both = replace(self.crank_carrier_bearing, rows=2 * self.crank_carrier_bearing.rows)
+        if (both := self.friction_dimensions.crank_carrier_bearing) is not None:
             found.append(Part("crank_carrier_bearing", "crank–carrier bearings", both))
         if isinstance(self.carrier_bearing, BallBearing):
             found.append(Part("carrier_bearing", "carrier bearing", self.carrier_bearing))
