@@ -13,11 +13,14 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.design import Reducer
 
 LOST_MOTION, BACKLASH = 0.03, 1e-4
 """Torque over rated torque at which the loop's width is read; 3 % by custom, 0.01 % for zero is an assumption."""
 
-LOOP_ASSUMPTION = "backlash: loop width at ±0.01 % of rated torque; no friction, so the loop is one curve"
+LOOP_ASSUMPTION = (
+    "lost motion and backlash without friction, so the loop is one curve; backlash: width at ±0.01 % of rated torque"
+)
 
 LOOP_ANGLES = 2.0 * np.pi * np.arange(180) / 180
 """Angles of one output turn at which a loop is read unless asked otherwise [rad]."""
@@ -70,6 +73,11 @@ DRAWN = (BACKLASH, LOST_MOTION, 0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over rated torque at which a loop is drawn."""
 
 
+def loop_torques(reducer: Reducer, shares: Sequence[float]) -> Float[np.ndarray, " level"]:
+    """Return the torques at shares of the rated one in both directions, ascending [N·m]."""
+    return np.asarray(reducer.load.rated_torque * np.array([*(-share for share in reversed(shares)), *shares]))
+
+
 def hysteresis_loop(
     model: EquivalentModel,
     errors: Float[np.ndarray, "sample column"],
@@ -77,7 +85,7 @@ def hysteresis_loop(
     shares: Sequence[float] = READ,
 ) -> HysteresisLoop:
     """Return torque against twist at shares of the rated torque in both directions and at the carrier angles [rad]."""
-    torque = model.reducer.load.rated_torque * np.array([*(-share for share in reversed(shares)), *shares])
+    torque = loop_torques(model.reducer, shares)
     twist = [
         model.at_torque(level).equilibria(errors, level, carrier_angle).transmission_error for level in torque.tolist()
     ]
