@@ -37,8 +37,11 @@ if TYPE_CHECKING:
     from tolalloc.report.answer import Answer as Answer
     from tolalloc.report.document import Section as Section
     from tolalloc.rv import BACKLASH as BACKLASH
+    from tolalloc.rv import EFFICIENCY as EFFICIENCY
     from tolalloc.rv import FRICTION_TORQUE as FRICTION_TORQUE
+    from tolalloc.rv import HYSTERESIS_LOSS as HYSTERESIS_LOSS
     from tolalloc.rv import LOST_MOTION as LOST_MOTION
+    from tolalloc.rv import LOST_MOTION_WITH_FRICTION as LOST_MOTION_WITH_FRICTION
     from tolalloc.rv import PEAK_TO_PEAK as PEAK_TO_PEAK
     from tolalloc.rv import PRELOAD as PRELOAD
     from tolalloc.rv import RADIAL_CLEARANCE as RADIAL_CLEARANCE
@@ -62,10 +65,13 @@ _WHERE = {
     "BACKLASH": "rv",
     "Calculation": "study.questions",
     "Drawing": "drawings.drawing",
+    "EFFICIENCY": "rv",
     "Effort": "study.effort",
     "Evaluation": "models",
+    "HYSTERESIS_LOSS": "rv",
     "InputError": "exceptions",
     "LOST_MOTION": "rv",
+    "LOST_MOTION_WITH_FRICTION": "rv",
     "Limit": "study.limit",
     "Model": "models",
     "FRICTION_TORQUE": "rv",

@@ -23,7 +23,13 @@ from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading, wave_outputs
+from tolalloc.rv.response.outputs import (
+    OutputsResponse,
+    limited_outputs,
+    orders_reading,
+    readings_of,
+    wave_outputs,
+)
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force
 from tolalloc.units import ARCMINUTE, MICROMETRE
@@ -78,7 +84,7 @@ class ReducerModel(Model):
     @property
     def outputs(self) -> tuple[str, ...]:
         """All that requirements may limit, the peak-to-peak first."""
-        return tuple(name for reading in REQUIREMENTS for name in reading.outputs)
+        return limited_outputs(self.reducer)
 
     def reading(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of these outputs, waves of `spectra` among them if need be.
@@ -95,10 +101,8 @@ class ReducerModel(Model):
             if name not in self.outputs and name not in waves:
                 raise UnknownNameError.among(self.name, "output", name, self.outputs)
         orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
-        readings = tuple(own for own in REQUIREMENTS if not {*own.outputs}.isdisjoint(outputs))
-        response = OutputsResponse(
-            kernel=self.kernel, readings=(*readings, *((orders_reading(orders),) if orders else ()))
-        )
+        readings = (*readings_of(outputs), *((orders_reading(orders),) if orders else ()))
+        response = OutputsResponse(kernel=self.kernel, readings=readings)
         return response if response.outputs == outputs else replace(response, chosen=outputs)
 
     @property

@@ -12,19 +12,24 @@ from tolalloc.chunks import map_chunks
 from tolalloc.models import Evaluation
 from tolalloc.rv import (
     BACKLASH,
+    EFFICIENCY,
     FRICTION_TORQUE,
+    HYSTERESIS_LOSS,
     LOST_MOTION,
+    LOST_MOTION_WITH_FRICTION,
     PEAK_TO_PEAK,
     PRELOAD,
     RADIAL_CLEARANCE,
     TORSIONAL_STIFFNESS,
 )
 from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.rv.equivalent.friction_loop import friction_loop
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.equivalent.line_load import peak_line_load, unit_pressure
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
 from tolalloc.rv.equivalent.preload import preload
+from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 
@@ -46,10 +51,22 @@ def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk colum
 
 
 def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
-    loop = hysteresis_loop(model, errors, TURN_ANGLES)
-    values = np.stack(
-        [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE], axis=1
-    )
+    return _found(_read_off(hysteresis_loop(model, errors, TURN_ANGLES)))
+
+
+def _friction_loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    loop = friction_loop(model, errors, TURN_ANGLES)
+    own = [100.0 * loop.rated.efficiency, loop.lost_motion / ARCMINUTE, loop.hysteresis_loss / ARCMINUTE]
+    return _found([*_read_off(loop.plain), *own])
+
+
+def _read_off(loop: HysteresisLoop) -> list[Float[np.ndarray, " chunk"]]:
+    """Return lost motion, backlash [arcmin] and torsional stiffness [N·m/arcmin]."""
+    return [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE]
+
+
+def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
+    values = np.stack(columns, axis=1)
     # A loop keeps no statuses: an angle without an equilibrium is not a number in it.
     status = np.where(np.isfinite(values).all(axis=1), Status.CONVERGED, Status.NOT_CONVERGED)
     return values, status.astype(np.uint8)
@@ -90,9 +107,13 @@ def _radial_clearance(
 
 _FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
 
+_LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
+_WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
+_FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *_WITH_FRICTION), read=_friction_loop)
+
 REQUIREMENTS = (
     Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
-    Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop),
+    _LOOP,
     Reading(
         outputs=(
             *(f"{name}, rated torque [{OUTPUTS[name][0]}]" for name in _FORCES),
@@ -105,6 +126,19 @@ REQUIREMENTS = (
     Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
 )
 """What a requirement may limit: transmission error, torque against twist, rated load, preload, gap at tip and root."""
+
+
+def limited_outputs(reducer: Reducer) -> tuple[str, ...]:
+    """Return what a requirement may limit; what friction decides only where the reducer's file says enough for it."""
+    own = tuple(name for reading in REQUIREMENTS for name in reading.outputs)
+    return own if reducer.friction_dimensions.unknown else (*own, *_WITH_FRICTION)
+
+
+def readings_of(outputs: tuple[str, ...]) -> tuple[Reading, ...]:
+    """Return the readings that give the outputs; one with friction gives the loop without it too."""
+    loop = _LOOP if {*_WITH_FRICTION}.isdisjoint(outputs) else _FRICTION_LOOP
+    every = (loop if own is _LOOP else own for own in REQUIREMENTS)
+    return tuple(own for own in every if not {*own.outputs}.isdisjoint(outputs))
 
 
 def wave_outputs(order: int) -> tuple[str, str]:
