@@ -15,9 +15,11 @@ from tolalloc.report.document import Section
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import Equilibria, Extremes, Status, count_statuses
 from tolalloc.rv.equivalent.attribution import Attribution, attribute
+from tolalloc.rv.equivalent.friction_loop import FrictionLoop, friction_loop
 from tolalloc.rv.equivalent.hysteresis import (
     LOOP_ANGLES,
     LOOP_ASSUMPTION,
+    TURN_ANGLES,
     HysteresisLoop,
     both_directions,
     hysteresis_loop,
@@ -26,7 +28,9 @@ from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
 from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
+from tolalloc.rv.friction_report import friction_section, friction_sentence, friction_summary
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.friction import friction_assumptions
 from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force, twist_shares
@@ -53,6 +57,7 @@ class TransmissionErrorAnswer(Answer):
     extremes: Extremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
     loop: HysteresisLoop  # Hysteresis loop of this unit and of the perfect reducer
+    friction: FrictionLoop | None  # That with friction; none where the reducer's file does not say enough for it
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
     equally_spaced: int  # Equally spaced angles of the search [-]
@@ -78,6 +83,7 @@ class TransmissionErrorAnswer(Answer):
             f"{found['smallest_arcsec']:.2f}″ at {found['smallest_at_deg']:.2f}° to {found['largest_arcsec']:.2f}″ at "
             f"{found['largest_at_deg']:.2f}°; "
             + (f"its strongest orders are {strongest}." if strongest else "it is flat."),
+            *((friction_sentence(self.friction),) if self.friction else ()),
             *((stated,) if (stated := against_catalogue(self.equilibria.reducer, self.loop)[0]) else ()),
         )
 
@@ -120,6 +126,7 @@ class TransmissionErrorAnswer(Answer):
                 paragraphs=("The twist of the perfect reducer under its rated torque, part by part.",),
                 tables=(("twist", twist_shares(self.equilibria.reducer)),),
             ),
+            *((friction_section(self.equilibria.reducer, self.friction),) if self.friction else ()),
             *shares,
         )
 
@@ -150,6 +157,7 @@ class TransmissionErrorAnswer(Answer):
             "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
             "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),
             "torsional_stiffness_nm_per_arcmin": _pair(self.loop.torsional_stiffness, 1 / ARCMINUTE),
+            "friction": friction_summary(self.friction) if self.friction else None,
             "reversal_arcsec": {
                 "mean": float(reversed_by.mean() / ARCSECOND),
                 "peak_to_peak": float(np.ptp(reversed_by) / ARCSECOND),
@@ -284,19 +292,28 @@ def transmission_error(
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
+    both = np.concatenate([errors, np.zeros_like(errors)])
+    friction = None if reducer.friction_dimensions.unknown else friction_loop(model, both, TURN_ANGLES)
     return TransmissionErrorAnswer(
         header=Header(
             name=unit.name,
             model=reducer.name,
             conditions={"torque on the carrier [N·m]": torque},
-            assumptions=(*reducer.assumptions, *unit.assumptions, LOOP_ASSUMPTION, PRELOAD_ASSUMPTION),
+            assumptions=(
+                *reducer.assumptions,
+                *unit.assumptions,
+                LOOP_ASSUMPTION,
+                PRELOAD_ASSUMPTION,
+                *friction_assumptions(reducer.friction, reducer.friction_dimensions),
+            ),
             statuses=dict(count_statuses(equilibria.status)),
         ),
         torque=torque,
         equilibria=equilibria,
         extremes=extremes,
         preload=preload(model, errors),
-        loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
+        loop=hysteresis_loop(model, both, LOOP_ANGLES),
+        friction=friction,
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
         equally_spaced=model.search.coarse,
