@@ -13,8 +13,9 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, TURN_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces, order_spectrum
-from tolalloc.rv.equivalent.preload import SLIDING_FRICTION, preload
+from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.reducer.files import PRESETS, load_reducer
+from tolalloc.rv.reducer.friction import SLIDING_FRICTION
 from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.rv.rigidity import FACTOR, against_catalogue, rated_pin_force, twist_shares
 from tolalloc.units import ARCMINUTE
@@ -122,6 +123,11 @@ def test_te_says_that_the_unit_of_table_4_is_jammed():
     assert answer["pin_force_without_torque_n"] > 1000
     exact = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "exact", "--json").stdout)
     assert not any("jammed" in warning for warning in exact["warnings"])
+    friction = exact["friction"]
+    assert 80 < friction["efficiency_at_rated_torque_percent"] < 92
+    assert friction["no_load_torque_nm"] < 1 < 10 < answer["friction"]["no_load_torque_nm"]
+    assert friction["by_contact"][0]["contact"] == "pins"
+    assert any(own.startswith("coefficients of friction: pins 0.05, crank–disc") for own in exact["assumptions"])
 
 
 def numbers(found):
