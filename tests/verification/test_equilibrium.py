@@ -252,3 +252,19 @@ def test_a_torque_that_nothing_resists_is_a_status(rv20e, table4):
     curves = loose.equilibria(table4, -1.0)
     assert (curves.status == Status.NOT_RESISTED).all()
     assert np.isnan(curves.transmission_error).all()
+
+
+def test_what_a_model_of_small_displacements_cannot_mean_is_a_status(rv20e):
+    """A journal that stands 2 mm off turns the output by a degree, and the solver finds an equilibrium."""
+    errors = np.zeros((2, len(rv20e.columns)))
+    errors[:, rv20e.columns.index("crank1.journal1.eccentricity.y")] = [1e-6, 2e-3]
+    curve, extremes = rv20e.equilibria(errors, -1.0), rv20e.extremes(errors, -1.0)
+    assert list(extremes.status) == [Status.CONVERGED, Status.OUT_OF_RANGE]
+    assert np.isnan(extremes.largest[1])
+    assert set(curve.status[0]) == {Status.CONVERGED}
+    bad = curve.status[1] == Status.OUT_OF_RANGE
+    assert bad.any()
+    assert np.isnan(curve.transmission_error[1][bad]).all()
+    assert np.abs(curve.transmission_error[1][~bad]).max(initial=0.0) <= rv20e.largest_rotation
+    _, derivatives = rv20e.peak_to_peak_derivatives(errors, -1.0)
+    assert list(derivatives.status) == [Status.CONVERGED, Status.OUT_OF_RANGE]

@@ -11,7 +11,13 @@ from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
 from tolalloc.rv.equivalent.columns import Columns
 from tolalloc.rv.equivalent.condensation import CondensedAngles
-from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_FINITE, NOT_RESISTED
+from tolalloc.rv.equivalent.solvers.records import (
+    CONVERGED,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOT_RESISTED,
+    OUT_OF_RANGE,
+)
 from tolalloc.rv.reducer.design import Reducer
 
 
@@ -22,6 +28,7 @@ class Status(IntEnum):
     NOT_CONVERGED = NOT_CONVERGED
     NOT_RESISTED = NOT_RESISTED
     NOT_FINITE = NOT_FINITE
+    OUT_OF_RANGE = OUT_OF_RANGE
 
     @property
     def sentence(self) -> str:
@@ -31,6 +38,7 @@ class Status(IntEnum):
             Status.NOT_CONVERGED: "no equilibrium within the allowed number of Newton steps",
             Status.NOT_RESISTED: "no pin resists the torque in its direction",
             Status.NOT_FINITE: "an error value is not a finite number",
+            Status.OUT_OF_RANGE: "an output error beyond a tenth of the pin pitch, too far for small displacements",
         }[self]
 
 

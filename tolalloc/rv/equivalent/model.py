@@ -8,7 +8,7 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.answers import Derivatives, Equilibria, Extremes
@@ -17,6 +17,7 @@ from tolalloc.rv.equivalent.condensation import CondensedAngles, condense, error
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.solvers.records import (
     CONVERGED,
+    OUT_OF_RANGE,
     AngleSearch,
     SolvedDerivatives,
     SolvedExtremes,
@@ -122,6 +123,7 @@ class EquivalentModel:
             np.empty(shape, np.uint16),
         )
         solve_curves(tile_size(errors.shape[0]), self._discs, 0, 1, tables, *self._given(errors, torque), turn)
+        self._mark_out_of_range(turn.rotation, turn.status)
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(
             reducer=self.reducer,
@@ -153,6 +155,7 @@ class EquivalentModel:
         )
         given = self._given(errors, torque)
         solve_extremes(tile_size(samples), self._discs, self._tables, *given, search, found)
+        self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
         return Extremes(
             largest=found.extreme[:, 0],
@@ -205,8 +208,21 @@ class EquivalentModel:
         samples = errors.shape[0]
         derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
         solve_rotation_derivatives(tables, *self._given(errors, np.ascontiguousarray(torques)), position, derivative)
+        self._mark_out_of_range(derivative.rotation, derivative.status)
         derivative.rotation[derivative.status != CONVERGED] = np.nan
         return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
+
+    @property
+    def largest_rotation(self) -> float:
+        """Output error up to which displacements count as small, a tenth of the pin pitch; an assumption [rad].
+
+        Normals and levers are those of the nominal place; there, the next flank is a tenth of the way to the next pin.
+        """
+        return 0.1 * 2 * pi / self.reducer.cycloid_stage.pin_count
+
+    def _mark_out_of_range(self, rotation: Float[np.ndarray, "..."], status: UInt8[np.ndarray, "..."]) -> None:
+        """Put a status where an equilibrium was found that the model cannot mean."""
+        status[(status == CONVERGED) & (np.abs(rotation) > self.largest_rotation)] = OUT_OF_RANGE
 
     def _padded(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
         """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""

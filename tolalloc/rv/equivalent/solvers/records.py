@@ -11,7 +11,7 @@ from jaxtyping import Float, Int, UInt8, UInt16
 from tolalloc.rv.cycloid.solvers import LAWS
 from tolalloc.rv.reducer.design import Reducer
 
-CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE = 0, 1, 2, 3
+CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE, OUT_OF_RANGE = range(5)
 """How an equilibrium ended; `tolalloc.rv.equivalent.answers.Status` has the words."""
 
 
