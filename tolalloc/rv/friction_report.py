@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tolalloc.report.figure import Figure
 
 _UNIT = 0
-"""Sample of a loop that is the unit; the perfect reducer is the other one [-]."""
+"""Sample of a loop that is the unit [-]."""
 
 
 def friction_summary(loop: FrictionLoop) -> dict[str, Any]:

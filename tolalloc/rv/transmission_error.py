@@ -57,7 +57,7 @@ class TransmissionErrorAnswer(Answer):
     extremes: Extremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
     loop: HysteresisLoop  # Hysteresis loop of this unit and of the perfect reducer
-    friction: FrictionLoop | None  # That with friction; none where the reducer's file does not say enough for it
+    friction: FrictionLoop | None  # This unit's with friction; none where the reducer's file does not say enough for it
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
     equally_spaced: int  # Equally spaced angles of the search [-]
@@ -292,8 +292,7 @@ def transmission_error(
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
-    both = np.concatenate([errors, np.zeros_like(errors)])
-    friction = None if reducer.friction_dimensions.unknown else friction_loop(model, both, TURN_ANGLES)
+    friction = None if reducer.friction_dimensions.unknown else friction_loop(model, errors, TURN_ANGLES)
     return TransmissionErrorAnswer(
         header=Header(
             name=unit.name,
@@ -312,7 +311,7 @@ def transmission_error(
         equilibria=equilibria,
         extremes=extremes,
         preload=preload(model, errors),
-        loop=hysteresis_loop(model, both, LOOP_ANGLES),
+        loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
         friction=friction,
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
