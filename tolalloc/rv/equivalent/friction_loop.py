@@ -24,7 +24,8 @@ from tolalloc.rv.equivalent.outputs import Solved
 from tolalloc.rv.equivalent.play import Play, interpolated
 
 _STEPS = 81
-"""Equally spaced torques at which a loop is drawn beside those at which it is solved [-]."""
+"""Torques at which a loop is drawn beside those at which it is solved: so many equally spaced, and so many about 0,
+where little torque closes the backlash [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +69,8 @@ def friction_loop(
     levels = loop_torques(model.reducer, DRAWN)
     solved = [Solved.of(model.at_torque(level).equilibria(errors, level, carrier_angle)) for level in levels.tolist()]
     turn = np.stack([each.equilibria.transmission_error for each in solved], axis=1)
-    steps = np.union1d(np.append(levels, 0.0), levels[-1] * np.linspace(-1.0, 1.0, _STEPS))
+    even = np.linspace(-1.0, 1.0, _STEPS)
+    steps = np.unique(np.concatenate([levels, [0.0], levels[-1] * even, levels[-1] * even**5]))
     twist = _followed(levels, turn.mean(axis=2), solved, np.concatenate([steps[::-1], steps]))
     return FrictionLoop(
         torque=steps,
