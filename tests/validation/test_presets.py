@@ -149,3 +149,22 @@ def test_written_amounts_give_what_modify_promises(tmp_path, preset, method):
     assert new.modification.shift * 1e6 == pytest.approx(promised["shift amount [µm]"], rel=1e-12)
     assert (new.stiffness, new.load, new.parts) == (old.stiffness, old.load, old.parts)
     refused(tolalloc("modify", method, *given, "--write", written), "the file exists", "nothing is overwritten")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("arcmin = 49", "arcmin = 2.81", "is 2.81; allowed is 5.57 to 557, a twist of 0.3 to 30 arcmin"),  # per degree
+        ("arcmin = 49", "rad = 168000", "torsional_rigidity_nm_per_rad"),
+        ("arcmin = 49", "arcmin = 168000", "torsional_rigidity_nm_per_arcmin"),  # per radian
+        ("lost_motion_arcmin = 1.0", "lost_motion_arcmin = 60", "lost_motion_arcmin"),  # arcseconds
+        ("arcsec = 70", "arcsec = 1.17", "transmission_error_arcsec"),  # arcminutes
+    ],
+)
+def test_a_catalogue_in_wrong_units_is_refused(tmp_path, old, new, words):
+    path, text = tmp_path / "own.reducer.toml", (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    before, table = text.split("[catalogue]")
+    assert old in table
+    path.write_text(before + "[catalogue]" + table.replace(old, new), encoding="utf-8")
+    result = tolalloc("te", "--reducer", path)
+    refused(result, "own.reducer.toml", words)

@@ -152,8 +152,8 @@ class Catalogue:
         float, Field(alias="torsional_rigidity_nm_per_arcmin", ge=0.1, le=1e5), times(1 / ARCMINUTE)
     ]  # Torque over twist between 3 % and 100 % of the rated torque [N·m/rad]
     # Largest twist between both directions of 3 % of the rated torque, and largest error over a turn [rad]
-    lost_motion: Annotated[float, Field(alias="lost_motion_arcmin", gt=0, le=60), times(ARCMINUTE)]
-    transmission_error: Annotated[float, Field(alias="transmission_error_arcsec", gt=0, le=3600), times(ARCSECOND)]
+    lost_motion: Annotated[float, Field(alias="lost_motion_arcmin", ge=0.05, le=10), times(ARCMINUTE)]
+    transmission_error: Annotated[float, Field(alias="transmission_error_arcsec", ge=5, le=600), times(ARCSECOND)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,10 @@ from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
 from tolalloc.rv.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.units import ARCMINUTE, MICROMETRE, MILLIMETRE
+
+_SMALLEST_TWIST, _LARGEST_TWIST = 0.3, 30.0
+"""Twist under rated torque that a catalogue's rigidity may mean; RV reducers have 2.9 to 4 [arcmin]."""
 
 PRESETS = Path(__file__).parent / "presets"
 
@@ -77,6 +80,14 @@ class ReducerRecord(Record):
     @model_validator(mode="after")
     def _holds_together(self) -> ReducerRecord:
         self.reducer()
+        if self.catalogue:
+            rated, stated = self.load.rated_torque, self.catalogue.torsional_rigidity * ARCMINUTE
+            least, most = rated / _LARGEST_TWIST, rated / _SMALLEST_TWIST
+            if not least <= stated <= most:
+                raise ValueError(
+                    f"catalogue.torsional_rigidity_nm_per_arcmin is {stated:g}; allowed is {least:.3g} to {most:.3g}, "
+                    f"a twist of {_SMALLEST_TWIST:g} to {_LARGEST_TWIST:g} arcmin under the rated {rated:g} N·m"
+                )
         return self
 
     def reducer(self) -> Reducer:
