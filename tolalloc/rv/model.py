@@ -18,6 +18,7 @@ from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.rv.equivalent.perfect import exact_loop
 from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
@@ -201,6 +202,11 @@ class ReducerModel(Model):
         """Torque against twist of the reducer without any error."""
         return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), TURN_ANGLES)
 
+    @cached_property
+    def _exact_loop(self) -> HysteresisLoop:
+        """Torque against twist of the unit whose parts are exact and whose teeth are modified as they stand."""
+        return exact_loop(self.reducer)
+
     @property
     def drawn_amounts(self) -> DrawnAmounts:
         """Equidistant and shift amount of the modification, in steps of half a micrometre."""
@@ -315,7 +321,7 @@ class ReducerModel(Model):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Rigidity and lost motion beside the catalogue's."""
-        sentence, _ = against_catalogue(self.reducer, self._perfect_loop)
+        sentence, _ = against_catalogue(self.reducer, self._exact_loop)
         return (sentence,) if sentence else ()
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:
@@ -336,5 +342,5 @@ class ReducerModel(Model):
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
-        _, far = against_catalogue(self.reducer, self._perfect_loop)
+        _, far = against_catalogue(self.reducer, self._exact_loop)
         return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)

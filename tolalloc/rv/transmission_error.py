@@ -27,6 +27,7 @@ from tolalloc.rv.equivalent.hysteresis import (
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
+from tolalloc.rv.equivalent.perfect import exact_unit
 from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
 from tolalloc.rv.friction_report import friction_section, friction_sentence, friction_summary
 from tolalloc.rv.reducer.design import Reducer
@@ -56,7 +57,7 @@ class TransmissionErrorAnswer(Answer):
     equilibria: Equilibria  # At equally spaced angles of one output turn
     extremes: Extremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
-    loop: HysteresisLoop  # Hysteresis loop of this unit and of the perfect reducer
+    loop: HysteresisLoop  # Hysteresis loop of this unit, of the perfect reducer, and of exact parts as modified
     friction: FrictionLoop | None  # This unit's with friction; none where the reducer's file does not say enough for it
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
@@ -292,6 +293,7 @@ def transmission_error(
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
+    loops = np.concatenate([errors, np.zeros_like(errors), exact_unit(model)])
     friction = None if reducer.friction_dimensions.unknown else friction_loop(model, errors, TURN_ANGLES)
     return TransmissionErrorAnswer(
         header=Header(
@@ -311,7 +313,7 @@ def transmission_error(
         equilibria=equilibria,
         extremes=extremes,
         preload=preload(model, errors),
-        loop=hysteresis_loop(model, np.concatenate([errors, np.zeros_like(errors)]), LOOP_ANGLES),
+        loop=hysteresis_loop(model, loops, LOOP_ANGLES),
         friction=friction,
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
@@ -320,9 +322,9 @@ def transmission_error(
     )
 
 
-def _pair(values: Float[np.ndarray, " 2"], unit_of_measurement: float) -> dict[str, float | None]:
+def _pair(values: Float[np.ndarray, " sample"], unit_of_measurement: float) -> dict[str, float | None]:
     """Return a number of this unit and of the perfect reducer; none where an angle has no answer."""
-    this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values)
+    this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values[:2])
     return {"this_unit": this, "perfect_reducer": perfect}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, log
+from math import exp, isnan, log
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 from tolalloc.exceptions import InputError
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
+from tolalloc.rv.equivalent.perfect import exact_loop
 from tolalloc.rv.reducer.design import Catalogue, Reducer
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.rv.reducer.series import at_torque
@@ -48,15 +48,9 @@ def with_bearings(reducer: Reducer, factor: float) -> Reducer:
     return at_torque(changed, reducer.load.rated_torque)
 
 
-def perfect_loop(reducer: Reducer) -> HysteresisLoop:
-    """Return torque against twist of the reducer without part errors."""
-    model = EquivalentModel(reducer)
-    return hysteresis_loop(model, np.zeros((1, len(model.columns))), TURN_ANGLES)
-
-
 def _rigidity(reducer: Reducer, factor: float) -> float:
     """Return the torsional stiffness with bearings so many times as stiff [N·m/rad]."""
-    return float(perfect_loop(with_bearings(reducer, factor)).torsional_stiffness[0])
+    return float(exact_loop(with_bearings(reducer, factor)).torsional_stiffness[0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +71,7 @@ class CatalogueAnswer(Answer):
 
     @cached_property
     def _loops(self) -> tuple[HysteresisLoop, HysteresisLoop]:
-        return perfect_loop(self.before), perfect_loop(self.after)
+        return exact_loop(self.before), exact_loop(self.after)
 
     @property
     def uncertainty(self) -> float:
@@ -174,17 +168,19 @@ def identify_from_catalogue(reducer: Reducer) -> CatalogueAnswer:
     def off(exponent: float) -> float:
         return log(_rigidity(reducer, exp(exponent)) / stated.torsional_rigidity)
 
-    ends = log(_FARTHEST)
-    low, high = off(-ends), off(ends)
-    if not low < 0 < high:
-        least, most = (exp(end) * stated.torsional_rigidity * ARCMINUTE for end in (low, high))
-        raise InputError.at(
-            reducer.name,
-            "[catalogue] torsional_rigidity_nm_per_arcmin",
-            round(stated.torsional_rigidity * ARCMINUTE, 6),
-            f"{least:.3g} to {most:.3g} N·m/arcmin, what its bearings can do beside its other parts",
-        )
-    exponent = float(brentq(off, -ends, ends, xtol=1e-10))
+    near, far = 0.0, 0.0
+    direction = 1.0 if off(0.0) < 0 else -1.0
+    while (last := direction * off(far)) < 0:
+        near, far = far, far + direction * log(2.0)
+        if abs(far) > log(_FARTHEST) or isnan(off(far)):
+            limit = exp(direction * last) * stated.torsional_rigidity * ARCMINUTE
+            raise InputError.at(
+                reducer.name,
+                "[catalogue] torsional_rigidity_nm_per_arcmin",
+                round(stated.torsional_rigidity * ARCMINUTE, 6),
+                f"at {'most' if direction > 0 else 'least'} {limit:.3g}, with bearings of any stiffness",
+            )
+    exponent = near if near == far else float(brentq(off, near, far, xtol=1e-10))
     after = with_bearings(reducer, exp(exponent))
     return CatalogueAnswer(
         header=Header(

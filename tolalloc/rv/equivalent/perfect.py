@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from math import pi
 
 import numpy as np
+from jaxtyping import Float
 
+from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Solved
 from tolalloc.rv.reducer.design import Reducer
@@ -14,6 +16,18 @@ from tolalloc.rv.reducer.series import at_torque
 
 PHASES = 72
 """Phases of one pin pitch at which a reducer without errors is solved, for forces over the turn [-]."""
+
+
+def exact_unit(model: EquivalentModel) -> Float[np.ndarray, "1 column"]:
+    """Return the errors of a unit whose parts are exact and whose teeth are modified as drawn [m, angles rad]."""
+    deviations: Mapping[str, float] = model.reducer.modification.deviations
+    return np.array([[deviations.get(name, 0.0) for name in model.columns]])
+
+
+def exact_loop(reducer: Reducer) -> HysteresisLoop:
+    """Return torque against twist of the unit whose parts are exact."""
+    model = EquivalentModel(reducer)
+    return hysteresis_loop(model, exact_unit(model), TURN_ANGLES)
 
 
 def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
@@ -30,7 +44,5 @@ def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
         Torque on the carrier, negative where it resists the rotation [N·m].
     """
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
-    deviations: Mapping[str, float] = reducer.modification.deviations
-    errors = np.array([[deviations.get(name, 0.0) for name in model.columns]])
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
-    return Solved.of(model.equilibria(errors, torque, span * np.arange(PHASES) / PHASES))
+    return Solved.of(model.equilibria(exact_unit(model), torque, span * np.arange(PHASES) / PHASES))
