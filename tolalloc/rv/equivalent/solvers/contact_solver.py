@@ -26,6 +26,7 @@ PIVOT = 1e-12  # of the largest diagonal entry
 _ITERATIONS = 100
 _SOFTEST = 6  # decades by which play is softened where a part slides around inside its bearing
 _SEARCH_STEPS = 200
+_ENOUGH = 0.1  # of the first slope along a step, under a curved law
 _FARTHEST = 1e9  # steps; a contact that resists only beyond is none
 _REACH = 1.0  # metres; the same
 
@@ -102,6 +103,7 @@ def _exact_step(problem, work, q):
 
     The derivative along the step increases, straight between the lengths where contacts change. Newton's method on it,
     kept between lengths where it was seen to be negative and positive, ends on the root of the piecewise linear law.
+    A law that is curved anyway has nothing from the exact root: there a slope that has fallen far is enough.
     """
     slope, curvature, least, start = 0.0, 0.0, 0.0, 0.0
     for i in range(q.size):
@@ -113,10 +115,11 @@ def _exact_step(problem, work, q):
             curvature += work.step[i] * problem.stiffness[i, j] * work.step[j]
         slope += against * work.step[i]
     curvature = max(curvature, 0.0)
+    settled = 1e-14 if problem.law == LINEAR else _ENOUGH
     low, high, length = 0.0, np.inf, 1.0
     for _ in range(_SEARCH_STEPS):
         first, second = _slope_at(problem, work, length, slope, curvature)
-        if abs(first) <= 1e-14 * abs(start):
+        if abs(first) <= settled * abs(start):
             return length
         if first < 0.0:
             low = length

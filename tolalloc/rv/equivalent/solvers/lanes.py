@@ -16,6 +16,10 @@ from numba.extending import intrinsic, models, register_model
 
 WIDTH = 8
 
+LOGARITHM_OF_TWO = float.fromhex("0x1.62e42fee00000p-1")
+_LOGARITHM_LEFT = float.fromhex("0x1.a39ef35793c76p-33")
+"""ln 2 in two parts, the first with so few digits that whole multiples of it are exact."""
+
 _DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
 
@@ -105,6 +109,45 @@ def fma(typing, a, b, c):
         return _call(builder, "fma", arguments)
 
     return lanes(lanes, lanes, lanes), emit
+
+
+_ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of √½
+_TERMS = 11  # of the series in s²; the first left out is below 2e-18 of the logarithm
+_SHIFT = 6755399441055744.0  # 1.5·2⁵²: in this range the last bits of a double are an integer
+
+
+@intrinsic
+def logarithm(typing, a):
+    """Return the natural logarithms of positive normal numbers, each within two units in the last place.
+
+    a = 2ᵏ·z with z between √½ and √2, ln z = 2·(s + s³/3 + s⁵/5 + …) with s = (z − 1)/(z + 1).
+    """
+    integers = ir.VectorType(ir.IntType(64), WIDTH)
+
+    def whole(number):
+        return ir.Constant(integers, [number] * WIDTH)
+
+    def real(number):
+        return ir.Constant(_DOUBLES, [number] * WIDTH)
+
+    def emit(context, builder, signature, arguments):
+        bits = builder.bitcast(arguments[0], integers)
+        power = builder.ashr(builder.sub(bits, whole(_ROOT_HALF)), whole(52))
+        z = builder.bitcast(builder.sub(bits, builder.shl(power, whole(52))), _DOUBLES)
+        shifted = builder.bitcast(builder.add(power, whole(0x4338000000000000)), _DOUBLES)
+        k = builder.fsub(shifted, real(_SHIFT))
+        f = builder.fsub(z, real(1.0))
+        s = builder.fdiv(f, builder.fadd(z, real(1.0)))
+        square = builder.fmul(s, s)
+        series = real(2.0 / (2 * _TERMS + 1))
+        for term in range(_TERMS - 1, 0, -1):
+            series = _call(builder, "fma", (series, square, real(2.0 / (2 * term + 1))))
+        # ln z = 2s + s·(s²·series) = f − s·(f − s²·series), of which the last term is small beside f.
+        rest = builder.fmul(s, builder.fsub(f, builder.fmul(square, series)))
+        high, low = real(LOGARITHM_OF_TWO), real(_LOGARITHM_LEFT)
+        return builder.fadd(builder.fmul(k, high), builder.fsub(f, builder.fsub(rest, builder.fmul(k, low))))
+
+    return lanes(lanes), emit
 
 
 @intrinsic

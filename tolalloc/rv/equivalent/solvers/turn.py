@@ -1,6 +1,6 @@
 """All samples over a turn: tiles of samples in parallel, each from its own last angle's equilibrium; their forces.
 
-Pins on linear springs without play go eight samples to a register; whatever needs more care goes one by one. Which way
+Samples without play go eight samples to a register; whatever needs more care goes one by one. Which way
 a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
 """
 
@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from tolalloc.compiled import jit, parallel_jit, prange, thread_count
-from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
@@ -90,7 +89,7 @@ def _side_by_side(discs, first, stride, tables, layout, design, values, finite, 
     guess = np.empty(size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
-        solve_tile_at(discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
+        solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
         for s in range(samples):
             turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
             turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
@@ -111,7 +110,7 @@ def _side_by_side(discs, first, stride, tables, layout, design, values, finite, 
 @jit
 def solve_tile(discs, first, stride, tables, layout, design, values, finite, memory, turn):
     """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
-    if design.law == LINEAR and tables.play_stiffness.shape[1] == 0:
+    if tables.play_stiffness.shape[1] == 0:
         _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn)
     else:
         _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn)

@@ -1,0 +1,71 @@
+"""Eight samples to a register: the logarithm, and line contact with the same bits alone and among others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.random_units import random_units
+from tolalloc.compiled import jit
+from tolalloc.rv.cycloid.solvers.contact_law import pin_force
+from tolalloc.rv.equivalent.answers import Status
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.lane_solver import DEEPEST, _line_contact
+from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, store
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
+
+
+@jit
+def logarithms(numbers, found):
+    for at in range(0, numbers.size, WIDTH):
+        store(found, at, logarithm(load(numbers, at)))
+
+
+@jit
+def line_contacts(stiffness, log_length, depth, force, slope, far):
+    for at in range(0, depth.size, WIDTH):
+        own_force, own_slope, own_far = _line_contact(stiffness, log_length, load(depth, at))
+        store(force, at, own_force)
+        store(slope, at, own_slope)
+        far[at // WIDTH] = own_far
+
+
+def test_logarithms_are_those_of_numpy_within_two_units_in_the_last_place(generator):
+    numbers = np.concatenate(
+        [
+            np.exp(generator.uniform(-690, 690, 4000)),
+            generator.uniform(0.5, 2.0, 4000),
+            1.0 + generator.uniform(-1e-9, 1e-9, 992),
+            [1.0, np.sqrt(0.5), np.nextafter(np.sqrt(0.5), 0), np.sqrt(2.0), 0.5, 2.0, 1e-300, 1e300],
+        ]
+    )
+    found, expected = np.empty_like(numbers), np.log(numbers)
+    logarithms(numbers, found)
+    assert (np.abs(found - expected) <= 2 * np.spacing(np.abs(expected))).all()
+    assert found[-8] == 0.0
+
+
+@pytest.mark.parametrize("log_length", [np.log(0.01), np.log(0.3), np.log(0.1) + 12.0])
+def test_line_contact_is_the_law_of_one_pin(log_length, generator):
+    depth = np.sort(np.exp(generator.uniform(np.log(1e-16), np.log(3e-3), 4000)))
+    force, slope, far = np.empty_like(depth), np.empty_like(depth), np.empty(depth.size // WIDTH, np.int64)
+    line_contacts(2.5e8, log_length, depth, force, slope, far)
+    expected = np.array([pin_force(1, 2.5e8, log_length, 0.0, own) for own in depth])
+    deep = log_length - np.log(depth) < DEEPEST
+    said = ((far[:, np.newaxis] >> np.arange(WIDTH)) & 1).astype(bool).ravel()
+    np.testing.assert_array_equal(said, deep)
+    np.testing.assert_allclose(force[~deep], expected[~deep, 0], rtol=2e-14)
+    np.testing.assert_allclose(slope[~deep], expected[~deep, 1], rtol=1e-13)
+
+
+def test_line_contact_has_the_same_bits_alone_and_among_others(generator):
+    model, unit = EquivalentModel(load_reducer("rv20e")), load_unit("table4")
+    own = unit.errors(model.columns, model.reducer.modification.deviations)
+    errors, angles = random_units(own, model.columns, generator, 21), 2 * np.pi * np.arange(30) / 936
+    together = model.equilibria(errors, -1.0, angles)
+    assert (together.status == Status.CONVERGED).all()
+    for rows in (slice(0, 1), slice(5, 14), slice(20, 21)):
+        apart = model.equilibria(errors[rows], -1.0, angles)
+        np.testing.assert_array_equal(apart.transmission_error, together.transmission_error[rows])
+        np.testing.assert_array_equal(apart.retained, together.retained[rows])
