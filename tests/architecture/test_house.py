@@ -149,6 +149,7 @@ def test_columns_of_the_model_stand_in_the_nomenclature(rv20e):
         assert f"`{generic}`" in page, generic
 
 
+@pytest.mark.slow
 def test_equations_name_functions_that_exist():
     page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
     code = "\n".join(path.read_text(encoding="utf-8") for path in FILES)

@@ -99,6 +99,7 @@ def allocated(tmp_path_factory) -> tuple[Path, str]:
     return path / "report", result.stdout + result.stderr
 
 
+@pytest.mark.slow
 def test_an_allocation_is_compared_with_itself(allocated):
     folder, _ = allocated
     result = tolalloc("compare", folder, folder, "--json")

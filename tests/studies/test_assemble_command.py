@@ -59,6 +59,7 @@ def unit(tmp_path) -> Path:
     return errors_file(tmp_path / "unit1.csv", ("KC1", "KC2", "KC3", "KC4"), errors)
 
 
+@pytest.mark.slow
 def test_measured_parts_are_adjusted_and_reported(unit, tmp_path):
     result = tolalloc("assemble", "bx40e", "--measured", unit, "--out", tmp_path / "report", "--json")
     assert result.returncode == 0, result.stderr

@@ -67,6 +67,7 @@ def set_cell(row: int, column: str, value: str):
     return change
 
 
+@pytest.mark.slow
 def test_te_of_table_4(tmp_path):
     folder = tmp_path / "report"
     result = tolalloc(
@@ -83,6 +84,7 @@ def test_te_of_table_4(tmp_path):
     assert answer["statuses"]["equilibrium found"] == 936
 
 
+@pytest.mark.slow
 def test_te_for_a_person_names_units():
     result = tolalloc("te", "--unit", "table4")
     assert "peak-to-peak over one output turn [arcsec]" in result.stdout
@@ -243,6 +245,7 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
         assert cells["id"] in result.stdout
 
 
+@pytest.mark.slow
 def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     from tolalloc.rv.reducer.files import PRESETS
 
@@ -258,6 +261,7 @@ def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     assert answer["lost_motion_arcmin"]["this_unit"] > 2 * tight["lost_motion_arcmin"]["this_unit"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "reducer", ["rv20e", "rv40e", "rv80e", "rv110e", "rv160e", "rv20e_liu2020", "rv40e_xi2015", "bx40e"]
 )

@@ -19,6 +19,7 @@ def shop(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_shop_data_become_the_form_that_made_them(shop):
     done = tolalloc("costs", str(shop), "--json")
     assert done.returncode == 0, done.stderr
@@ -28,6 +29,7 @@ def test_shop_data_become_the_form_that_made_them(shop):
     assert (taken[0]["valid from [µm]"], taken[0]["valid to [µm]"]) == (5, 40)
 
 
+@pytest.mark.slow
 def test_a_report_is_written_once(shop, tmp_path):
     folder = tmp_path / "report"
     assert tolalloc("costs", str(shop), "--out", str(folder)).returncode == 0

@@ -40,6 +40,7 @@ def test_contact_for_a_person_names_units_and_takes_width_and_support():
     assert "16…17 of its pins" in result.stdout
 
 
+@pytest.mark.slow
 def test_contact_writes_report_and_profile(tmp_path):
     folder, file = tmp_path / "report", tmp_path / "disc.dxf"
     result = tolalloc("contact", "--reducer", "rv40e_xi2015", "--out", folder, "--profile", file, "--points", "100")
@@ -58,6 +59,7 @@ def test_contact_writes_report_and_profile(tmp_path):
     assert radius.min() == pytest.approx(59.694, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_profile_as_csv_carries_what_was_removed(tmp_path):
     file = tmp_path / "disc.csv"
     assert tolalloc("contact", "--reducer", "rv40e_xi2015", "--profile", file).returncode == 0
@@ -121,6 +123,7 @@ def test_no_file_is_written_about_a_reducer_that_nobody_named(written):
     refused(tolalloc(*written), "--reducer is missing", "rv40e, rv40e_xi2015, rv80e")
 
 
+@pytest.mark.slow
 def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
     path = reducer_with(tmp_path, ("equidistant_um = -2", "equidistant_um = 80"), ("shift_um = 8", "shift_um = -50"))
     result = tolalloc("te", "--reducer", path, "--json")
@@ -156,6 +159,7 @@ def test_studies_that_make_one_report(study, tmp_path):
     refused(again, "not empty")
 
 
+@pytest.mark.slow
 def test_modify_li2018_gives_the_closed_form():
     result = tolalloc("modify", "li2018", "--reducer", "rv40e_xi2015", "--radial", "15", "--json")
     assert result.returncode == 0, result.stderr

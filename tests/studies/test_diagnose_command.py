@@ -50,6 +50,7 @@ def bench(tmp_path_factory) -> Bench:
     return Bench(path / "few.csv", path / "unit7.csv")
 
 
+@pytest.mark.slow
 def test_a_bad_housing_is_named(bench, tmp_path):
     result = tolalloc("diagnose", bench.curve, "--tolerances", bench.tolerances, *REPORT, tmp_path / "report", "--json")
     assert result.returncode == 0, result.stderr

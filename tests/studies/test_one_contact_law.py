@@ -39,6 +39,7 @@ def contact(overloaded) -> dict:
     return answer_of("contact", "--reducer", overloaded, "--torque", -TORQUE)
 
 
+@pytest.mark.slow
 def test_contact_says_what_te_says(overloaded, contact):
     found = answer_of("te", "--reducer", overloaded, "--unit", "exact", "--torque", -TORQUE)
     outputs = {own["name"]: own["value"] for own in found["outputs"]}
@@ -48,6 +49,7 @@ def test_contact_says_what_te_says(overloaded, contact):
     assert [2 * pins for pins in yielding["pins in contact on a disc [-]"]] == both_discs
 
 
+@pytest.mark.slow
 def test_modify_says_what_contact_says_of_the_reducer_that_it_writes(overloaded, tmp_path):
     written = tmp_path / "modified.toml"
     chosen = answer_of("modify", "song2019", "--reducer", overloaded, "--torque", -TORQUE, "--rotation", 0.0005,

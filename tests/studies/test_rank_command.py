@@ -57,6 +57,7 @@ def ranked(tmp_path_factory) -> Path:
     return path / "report"
 
 
+@pytest.mark.slow
 def test_the_report_is_complete(ranked):
     names = {path.name for path in ranked.iterdir()}
     assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}

@@ -19,6 +19,7 @@ SHORT = ("--speed", "5250", "--ramp", "0.02", "--duration", "0.06", "--step", "1
 INSTALLED = pytest.mark.skipif(find_spec("exudyn") is None, reason="the optional extra is not installed")
 
 
+@pytest.mark.slow
 def test_a_run_is_reported_with_its_series(tmp_path):
     folder = tmp_path / "report"
     said = tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--torque", "-572", "--out", folder)
@@ -60,6 +61,7 @@ def test_the_compliance_decides_how_many_pins_carry():
     assert answer["lowest natural frequency [Hz]"] > 0
 
 
+@pytest.mark.slow
 @INSTALLED
 def test_the_prototype_turns_with_the_same_ratio():
     answer = json.loads(
@@ -85,6 +87,7 @@ neglected = ["*"]
 """
 
 
+@pytest.mark.slow
 @INSTALLED
 def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     path = tmp_path / "bored.toml"

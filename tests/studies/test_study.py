@@ -111,6 +111,7 @@ def test_a_question_that_is_none_is_refused_with_the_nearest_name(tmp_path, kind
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path):
     script, elsewhere = tmp_path / "mine" / "own_study.py", tmp_path / "elsewhere"
     (tmp_path / "mine" / "tables").mkdir(parents=True)

@@ -113,6 +113,7 @@ def test_preload_is_what_presses_at_the_torque_of_backlash():
     assert found.pin_force[0] > rated_pin_force(reducer) > 100 * found.pin_force[1]
 
 
+@pytest.mark.slow
 def test_te_says_that_the_unit_of_table_4_is_jammed():
     answer = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--json").stdout)
     assert answer["warnings"][0].startswith("This unit is jammed: without torque its pins press with up to")

@@ -98,6 +98,7 @@ def inside(name: str, confidence: float) -> dict[str, np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_reference_lies_in_the_99_percent_interval(name):
     for kind, held in inside(name, 0.99).items():

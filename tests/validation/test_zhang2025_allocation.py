@@ -114,6 +114,7 @@ def test_without_adjusting_it_does_not_matter_what_might_be_turned():
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_filters_tuned_again_save_another_quarter():
     found = retuned_allocation(PLAN)
     costs = [each.cost for each in found.allocations]
@@ -123,6 +124,7 @@ def test_filters_tuned_again_save_another_quarter():
     assert found.best.gap <= 1e-9
 
 
+@pytest.mark.slow
 def test_priced_effort_has_a_best_precision():
     found = best_precision(PRICED)
     assert found.interior
@@ -132,6 +134,7 @@ def test_priced_effort_has_a_best_precision():
     assert allocate_angles(PRICED, 10.0).total == pytest.approx(53.56, abs=5.1e-3)
 
 
+@pytest.mark.slow
 def test_genetic_algorithm_ends_up_to_one_per_cent_above_the_certified_cost():
     """Ten seeds; the smallest, median and largest gap at Q = 10."""
     allocation = allocate_angles(PLAN)

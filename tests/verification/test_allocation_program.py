@@ -134,6 +134,7 @@ def one_process(problem: AllocationProblem) -> AllocationProblem:
     return replace(problem, features=features)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", seeds(3, quick=1))
 def test_the_best_and_second_best_are_those_of_a_brute_force(kind, seed):
@@ -225,6 +226,7 @@ def test_prices_are_the_derivatives_of_the_least_cost(kind):
     assert middle.prices.max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_answer_is_the_same_in_millimetres_micrometres_and_metres(kind):
     first, *others = (random_problem(2, unit=unit, **KINDS[kind]) for unit in (1.0, 1e3, 1e-3))
@@ -306,6 +308,7 @@ def test_the_feasible_shared_variables_of_the_linear_program_are_found():
     assert least_infeasible(tight).blocking == ("up", "down")
 
 
+@pytest.mark.slow
 def test_many_features_are_allocated_with_a_proof_and_no_neighbour_is_cheaper():
     problem = random_problem(1, features=12, stacks=2, worst_case=0.2)
     best = solved(problem)
@@ -322,6 +325,7 @@ def test_many_features_are_allocated_with_a_proof_and_no_neighbour_is_cheaper():
         assert found is None or found.cost >= second.cost * (1 - 1e-9)
 
 
+@pytest.mark.slow
 def test_alike_features_are_not_told_apart():
     """Without that, a thousand permutations of the best would have to be ruled out one by one."""
     model = random_problem(0, features=2).features[0]
@@ -348,6 +352,7 @@ def test_alike_features_are_not_told_apart():
         assert found.gap <= 1e-8
 
 
+@pytest.mark.slow
 def test_a_search_that_ends_early_says_so_in_its_gap():
     problem = random_problem(2, features=12, stacks=2, worst_case=0.2)
     early, whole = allocate(problem, most_nodes=1), solved(problem)

@@ -100,6 +100,7 @@ def test_no_allowed_tolerances_are_cheaper_than_the_bound():
     assert ((factor / t).sum(axis=1) + t**2 @ losses + constant).min() >= found.bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [PLAN, PRICED], ids=["free effort", "priced effort"])
 def test_prices_are_what_a_wider_limit_saves(plan):
     found, step = allocate_angles(plan), 1e-3 * ARCSECOND
@@ -149,6 +150,7 @@ def test_an_unknown_form_of_cost_is_refused():
         allocate_angles(asking(form="linear"))
 
 
+@pytest.mark.slow
 def test_filters_are_tuned_again_until_they_expect_what_is_allocated():
     found = retuned_allocation(PLAN)
     assert found.settled
@@ -167,6 +169,7 @@ def test_an_iteration_cut_short_says_so():
     assert not found.settled
 
 
+@pytest.mark.slow
 def test_a_filter_for_the_allocated_tolerances_need_not_be_the_cheapest():
     """The effort is priced, and the filter knows nothing of prices."""
     found = retuned_allocation(PRICED)
@@ -175,6 +178,7 @@ def test_a_filter_for_the_allocated_tolerances_need_not_be_the_cheapest():
     assert found.allocations[-1].total > 1.001 * found.best.total
 
 
+@pytest.mark.slow
 def test_best_precision_beats_the_curve_and_its_own_neighbours():
     found = best_precision(PRICED, lowest=0.5, highest=20.0, points=12)
     assert found.interior
@@ -184,6 +188,7 @@ def test_best_precision_beats_the_curve_and_its_own_neighbours():
         assert allocate_angles(PRICED, factor * found.best.gains.precision).total > found.best.total
 
 
+@pytest.mark.slow
 def test_precisions_at_which_no_tolerances_keep_the_limits_have_no_cost():
     noisy = replace(PRICED, measurement_noise=4.5 * ARCSECOND)
     found = best_precision(noisy, lowest=0.1, highest=100.0, points=9)
@@ -201,12 +206,14 @@ def test_a_range_that_is_none_is_refused(arguments):
         best_precision(PLAN, *arguments)
 
 
+@pytest.mark.slow
 def test_effort_without_a_price_asks_for_the_end_of_a_range_of_low_precisions():
     found = best_precision(PLAN, lowest=0.1, highest=2.0, points=6)
     assert not found.interior
     assert found.best.gains.precision == pytest.approx(2, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_genetic_algorithm_keeps_the_limits_and_stays_above_the_bound(seed):
     allocation = allocate_angles(PRICED)

@@ -150,6 +150,7 @@ def said(results: AssemblyAnswer) -> str:
     return " ".join(results.sentences)
 
 
+@pytest.mark.slow
 def test_the_norm_of_measured_parts_is_said_before_and_after(measured):
     before, after = measured.measured.norms[[0, tables.at_precision(measured)]] / ARCSECOND
     assert np.linalg.norm(measured.measured.unadjusted) / ARCSECOND == pytest.approx(before)
@@ -157,10 +158,12 @@ def test_the_norm_of_measured_parts_is_said_before_and_after(measured):
     assert f"takes the norm of all final angles from {before:.2f}″ to {after:.2f}″" in said(measured)
 
 
+@pytest.mark.slow
 def test_a_weighted_norm_is_called_so(plan):
     assert "weighted norm" in said(run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), ERRORS))
 
 
+@pytest.mark.slow
 def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     sweep, at = expected.sweep, tables.at_precision(expected)
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
@@ -230,6 +233,7 @@ def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
     assert f"Of 2000 random assemblies with {which}, {share.estimate:.2%} are" in said(expected)
 
 
+@pytest.mark.slow
 def test_the_tolerances_of_the_tuned_filter_are_verified_where_effort_has_no_price(plan):
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
     assert "random assemblies with the tolerances of the tuned filter at a precision of 5, " in said(free)
@@ -256,6 +260,7 @@ def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
     assert warned not in warnings(expected)
 
 
+@pytest.mark.slow
 def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan):
     best = expected.tolerances.by_precision.best
     assert f"a precision of {best.gains.precision:.4g}" in said(expected)
@@ -269,6 +274,7 @@ def test_parts_beyond_their_tolerance_are_named_and_no_others(measured):
     assert "Beyond their stated tolerance: bracket about x (+70.00″, ±60″)." in warnings(measured)
 
 
+@pytest.mark.slow
 def test_a_part_at_its_tolerance_is_not_beyond_it(plan):
     assert not any("Beyond" in warning for warning in warnings(run(plan, plan.tolerances)))
 
@@ -434,6 +440,7 @@ def test_a_unit_of_precision_that_adds_is_not_said_to_take_off(expected):
     assert "adds" not in said(replace(expected, sweep=replace(sweep, next_unit=-sweep.next_unit * 0.01)))
 
 
+@pytest.mark.slow
 def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
     errors = ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]])
     weighted = run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), errors)
@@ -570,6 +577,7 @@ def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, e
     assert exactly not in assumptions(expected)
 
 
+@pytest.mark.slow
 def test_a_single_angle_that_rises_is_counted(plan):
     # The rotor's own error, about axes turned by 90°, cancels what the bracket hands on about x.
     results = run(plan, ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]]))

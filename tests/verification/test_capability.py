@@ -104,6 +104,7 @@ def test_wilson_covers_on_average(confidence):
     assert min(coverage) > confidence - 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
 def test_quantile_interval_covers(generator, share):
     """The true quantile of a skewed distribution lies inside as often as the attained confidence says."""

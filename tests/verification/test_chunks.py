@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.random_units import random_units
 from tolalloc import chunks
@@ -15,6 +16,7 @@ from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.response.kernel import KernelResponse
 
 
+@pytest.mark.slow
 def test_same_bits_for_any_chunk_and_any_process(rv20e, table4, generator, monkeypatch):
     units = random_units(table4, rv20e.columns, generator, 150)
     model = EquivalentModel(rv20e.reducer, AngleSearch(coarse=312))

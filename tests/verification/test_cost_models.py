@@ -189,6 +189,7 @@ def test_a_fit_to_exact_points_returns_the_parameters_and_is_chosen(model, unit)
     assert (best.smallest, best.largest) == (curve.zones[0], curve.zones[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [CLOSED[0], CLOSED[1], CLOSED[3]], ids=named)
 def test_fitted_parameters_lie_within_four_standard_errors(model, generator):
     zones, noise = np.repeat(np.geomspace(2.0, 30.0, 30), 2), 0.02
@@ -219,6 +220,7 @@ def test_the_error_left_out_is_that_of_a_fit_without_the_point(generator):
         assert fit.unseen[left_out] == pytest.approx(unseen, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_noise_seldom_makes_the_choice_more_complicated(generator):
     """The rule keeps the form in about 95 of 100 samples; fewer than 12 of 15 has a probability of 0.005."""
     chosen = []

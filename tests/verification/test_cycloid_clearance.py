@@ -49,6 +49,7 @@ def test_exact_distances_are_those_of_a_search(seed):
         assert np.abs(found - expected).max() < NANOMETRE_MILLIONTH, (stage, amounts, pins, turned)
 
 
+@pytest.mark.slow
 def test_many_profiles_at_once_are_each_alone(generator):
     stages = [random_cycloid_stage(generator) for _ in range(30)]
     profiles = [ToothProfile(stage=stage, modification=random_amounts(generator)) for stage in stages]

@@ -16,6 +16,7 @@ from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.units import ARCSECOND
 
 
+@pytest.mark.slow
 def test_derivative_agrees_with_differences(rv20e, table4, generator):
     """Central differences of the peak-to-peak over ±0.5 nm along random directions, extremes found to 1e-6 of a turn.
 

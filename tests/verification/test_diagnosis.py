@@ -216,6 +216,7 @@ def test_thinning_keeps_the_nearest_reading_of_each_place() -> None:
         thinned(curve, NOISE, 12)
 
 
+@pytest.mark.slow
 def test_the_true_errors_misfit_by_no_more_than_noise(problem: CurveProblem, prepared: Prepared) -> None:
     numbers = SeedTree(5).child("misfit").generator().standard_normal((24, problem.size))
     generator, square = SeedTree(5).child("noise").generator(), []
@@ -226,6 +227,7 @@ def test_the_true_errors_misfit_by_no_more_than_noise(problem: CurveProblem, pre
     assert abs(np.mean(square) - 159) < 4 * np.sqrt(2 * 159 / 24)
 
 
+@pytest.mark.slow
 def test_derivatives_by_the_numbers_are_those_of_the_residuals(problem: CurveProblem) -> None:
     numbers = SeedTree(5).child("slope").generator().standard_normal((1, problem.size))
     residual, slope = problem.linearised(numbers)
@@ -243,6 +245,7 @@ def test_steps_never_lead_uphill(problem: CurveProblem) -> None:
     assert np.all(problem.misfit(end) + 0.5 * (end**2).sum(axis=1) < 0.5 * before)
 
 
+@pytest.mark.slow
 def test_a_source_that_alone_deviates_is_dominant(problem: CurveProblem) -> None:
     owner = np.array(problem.errors.source_of_column)
     wide = problem.deviations(np.full((1, problem.size), 2.0))

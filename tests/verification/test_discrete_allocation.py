@@ -227,6 +227,7 @@ def large_program(seed, features=30, steps=8):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_large_problems_are_proven_and_no_exchange_of_two_is_better(seed):
     program = large_program(seed)

@@ -64,6 +64,7 @@ def test_frequencies_are_those_of_differences_of_the_dense_gradient(preset, law,
     np.testing.assert_allclose(found.carrier_share.sum(axis=1), 1.0)
 
 
+@pytest.mark.slow
 def test_a_kicked_unit_rings_at_the_frequency_of_the_carriers_mode(rv20e, table4):
     """The strongest frequency of the record lies within its resolution of the mode that moves the carrier most."""
     angle, duration, steps = 0.3, 0.5, 25000
@@ -113,6 +114,7 @@ def test_critical_speeds_are_where_an_order_meets_a_band():
     np.testing.assert_allclose([one.carrier_share for one in found], [0.8, 0.8, 0.2])
 
 
+@pytest.mark.slow
 def test_as_the_speed_falls_the_orders_become_those_of_the_static_curve(rv20e, table4):
     orders, steps = (1, 2, 39, 78, 80), 2340
     damping = Damping(mass_proportional=20.0, stiffness_proportional=1e-5)
@@ -127,6 +129,7 @@ def test_as_the_speed_falls_the_orders_become_those_of_the_static_curve(rv20e, t
     assert (found.status == Status.CONVERGED).all()
 
 
+@pytest.mark.slow
 def test_at_resonance_an_order_grows_as_an_oscillator_does(rv20e, table4):
     """Of small errors under full torque no pin lets go: the first mode is one oscillator, 1/(2ζ) at its frequency."""
     errors, inertia, order, steps = 0.01 * table4, heavy(rv20e), 78, 3120
@@ -146,6 +149,7 @@ def test_at_resonance_an_order_grows_as_an_oscillator_does(rv20e, table4):
     assert (found.unsettled < 0.01 * found.peak_to_peak).all()
 
 
+@pytest.mark.slow
 def test_a_measured_unit_grows_at_its_critical_speed(rv20e, table4):
     """Its stiffness changes with the pins that carry, so its resonance is broad; still every order 78 … 80 grows."""
     inertia, orders, steps = heavy(rv20e), (78, 79, 80), 2340

@@ -52,6 +52,7 @@ def free_vibration(rv20e, table4):
     return found, dense_model(rv20e.reducer, unit, -505.0, angle), motion
 
 
+@pytest.mark.slow
 def test_agrees_with_radau(rv20e, table4):
     reducer, end, steps = rv20e.reducer, 1e-4, 8000
     torque, speed = SpeedProfile((0.0, end), (-167.0, -120.0), "step"), SpeedProfile((0.0, end), (2.0, 12.0), "step")
@@ -138,6 +139,7 @@ def energy_drift(model, errors, steps: int, integrator: Integrator) -> float:
     return float(np.ptp(kinetic + elastic - supplied) / kinetic.max())
 
 
+@pytest.mark.slow
 def test_energy_is_what_was_supplied(rv20e, table4):
     coarse, fine = (energy_drift(rv20e, table4, steps, newmark()) for steps in (100, 200))
     assert fine < 0.35 * coarse

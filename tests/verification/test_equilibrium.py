@@ -234,7 +234,7 @@ def test_a_bad_sample_is_a_status_and_leaves_its_neighbours_alone(rv20e, table4)
 
 
 def test_far_pins_are_reached_from_a_cold_start(rv20e):
-    """With all pins a third of a millimetre away the torque turns the carrier until pins resist, and the solve finds that."""
+    """With all pins a third of a millimetre away the torque turns the carrier until pins resist."""
     model = EquivalentModel(rv20e.reducer, AngleSearch(coarse=8))
     errors = np.zeros((1, len(model.columns)))
     errors[0, model.columns.index("modification.equidistant")] = 3e-4

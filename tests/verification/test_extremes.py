@@ -11,6 +11,7 @@ from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.units import ARCSECOND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 0.3])
 def test_peak_to_peak_is_within_a_twentieth_arcsecond_on_99_percent(rv20e, table4, generator, scale):
     """Against a search from four times as many angles that follows candidates four times as far.

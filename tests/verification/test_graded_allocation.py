@@ -73,6 +73,7 @@ def zones_of(found, design):
     return dict(zip((own.name for own in found.space.errors.active), found.space.zones(design), strict=True))
 
 
+@pytest.mark.slow
 def test_all_members_of_a_group_carry_one_zone_and_its_name(prepared, found):
     zones, labels = zones_of(found, found.chosen.design), dict(zip(found.space.groups, found.labels, strict=True))
     for group in found.space.groups:
@@ -119,6 +120,7 @@ def test_no_more_choices_are_verified_than_asked_for_and_none_twice(found):
     assert len(set(designs)) == len(designs)
 
 
+@pytest.mark.slow
 def test_the_start_on_shared_zones_is_as_near_as_shared_zones_can_be(prepared, found):
     start = start_of(verifier_of(prepared))
     apart = prepared.space.zones(start.design)
@@ -131,6 +133,7 @@ def test_the_start_on_shared_zones_is_as_near_as_shared_zones_can_be(prepared, f
     np.testing.assert_array_equal(found.tried[0].design, start.design)
 
 
+@pytest.mark.slow
 def test_the_choice_is_the_best_of_all_there_are(prepared):
     verifier = verifier_of(prepared, keeping(prepared.space, "disc pitch", "disc run-out", "disc bores"), limit=70.0)
     start = start_of(verifier)
@@ -157,6 +160,7 @@ def test_the_choice_is_the_best_of_all_there_are(prepared):
     assert found.bound == pytest.approx(best, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_locked_modification_stays_however_odd_it_is(prepared):
     now = prepared.model.reducer.modification
     verifier = verifier_of(prepared, prepared.space.fixed, limit=70.0)
@@ -167,6 +171,7 @@ def test_a_locked_modification_stays_however_odd_it_is(prepared):
     )
 
 
+@pytest.mark.slow
 def test_a_clearance_that_leaves_no_round_amounts_is_kept_all_the_same(prepared):
     narrow = between(prepared.space, (1.23, 1.23), (5.0, 20.0))
     verifier = verifier_of(prepared, narrow, limit=70.0)
@@ -185,6 +190,7 @@ def test_a_locked_member_does_not_change_the_zones_of_its_group(prepared):
     np.testing.assert_allclose(zones / UM, [0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.2, 4, 5, 6.3])
 
 
+@pytest.mark.slow
 def test_an_unreachable_limit_ends_with_the_least_violating_choice(prepared):
     verifier = verifier_of(prepared, limit=2.0)
     found = allocate_grades(verifier, start_of(verifier, scale=0.2), 8)

@@ -52,6 +52,7 @@ def bench(**changes) -> Bench:
     return replace(whole, **changes)
 
 
+@pytest.mark.slow
 def test_derivatives_of_every_kind_of_reading_agree_with_differences():
     """Peak-to-peaks are as accurate as the angles of their kinks, so they need a longer step than curves and loops."""
     names = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing", "gear_mesh", "pin_contact")
@@ -351,6 +352,7 @@ def test_every_search_ends_where_gauss_newton_does(algorithm):
     assert ((found.coordinates >= problem.lower) & (found.coordinates <= problem.upper)).all()
 
 
+@pytest.mark.slow
 def test_peak_to_peaks_at_one_newton_metre_leave_two_stiffnesses_open():
     """As Table 6 of liu2020 hints: one and the same S with K_b and K_ca anywhere between their bounds."""
     limits = {"crank_disc_bearing": (0.8e10, 1.3e10), "crank_carrier_bearing": (1.4e10, 1.8e10)}
@@ -370,6 +372,7 @@ def test_peak_to_peaks_at_one_newton_metre_leave_two_stiffnesses_open():
         assert not profile(problem, found.coordinates, place, own).is_identified
 
 
+@pytest.mark.slow
 def test_curves_and_loops_find_the_truth_again():
     """Twelve repetitions; all of them within three standard errors, and intervals that cover as 95 % intervals do."""
     true = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.0e10}

@@ -105,6 +105,7 @@ def test_the_factor_puts_the_quantile_on_the_limit():
         assert abs(np.quantile(values, TARGET) - 14.0) <= 1e-3 * 14.0
 
 
+@pytest.mark.slow
 def test_intervals_cover():
     """90 % intervals of 150 samples cover 0.9 less 3 standard errors and 0.03 for the slope taken as constant."""
     truth, inside = true_factor(14.0)[:2], []

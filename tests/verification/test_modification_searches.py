@@ -79,6 +79,7 @@ def test_polishing_never_makes_worse():
     assert polish(FIT, from_point(FIT, best.amounts)).objective <= best.objective
 
 
+@pytest.mark.slow
 def test_differential_evolution_reaches_the_optimum_in_nine_seeds_of_ten():
     """29 of these 30 seeds; 266 of 300, so 88.7 % with a standard error of 1.8 %, however many generations follow.
 
@@ -106,11 +107,13 @@ def test_differential_evolution_is_the_plain_one_of_the_source():
     assert (variant.CR.value, variant.F.value, variant.jitter.value, variant.mutation.prob) == (0.3, 0.4, False, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fit", "fit of a negative shift", "gap"])
 def test_cma_es_reaches_the_optimum(name):
     assert spread(PROBLEMS[name], "CMA-ES", range(8)).share == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fit", "gap"])
 def test_genetic_algorithm_comes_near_but_not_nearer_than_the_optimum(name):
     problem = PROBLEMS[name]

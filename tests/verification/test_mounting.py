@@ -297,6 +297,7 @@ def test_the_sun_is_tried_in_all_teeth_only_if_it_has_errors(errors: ErrorModel,
         assert len(units) == len(np.unique(units, axis=0)) == expected
 
 
+@pytest.mark.slow
 def test_two_units_come_close_to_the_best_of_all_mountings(errors: ErrorModel, kernel: KernelResponse) -> None:
     gaps = []
     for seed in range(3):
@@ -315,6 +316,7 @@ def test_two_units_come_close_to_the_best_of_all_mountings(errors: ErrorModel, k
     assert max(gaps) < 0.05
 
 
+@pytest.mark.slow
 def test_several_units_gain_more_than_by_chance_and_every_part_is_used_once(
     errors: ErrorModel, kernel: KernelResponse
 ) -> None:

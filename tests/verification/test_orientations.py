@@ -145,6 +145,7 @@ def line_loads(response, plan, draws):
     return named(loaded, final.reshape(-1, plan.space.states))[LOAD].reshape(draws, len(plans))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotations", [True, False], ids=["with rotations", "tilts alone"])
 def test_adjusting_lowers_the_largest_line_load_of_every_assembly(response, plan, rotations):
     parts = tuple(part if rotations else replace(part, rotates=()) for part in plan.chain.parts)

@@ -140,6 +140,7 @@ def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(
     assert remembered.outputs == quantile.outputs
 
 
+@pytest.mark.slow
 def test_on_the_kernel_ladders_and_a_third_objective_hold(prepared, quantile):
     space = prepared.space
     ladders = {group: ladder_of(space, group) for group in space.groups[:2]}

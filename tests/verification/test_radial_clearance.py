@@ -56,6 +56,7 @@ def test_changed_radii_change_it_as_they_change_the_exact_distance(rv20e, diamet
     np.testing.assert_allclose(exact[0], found, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_it_is_the_smallest_gap_of_all_rows_at_tips_and_roots(rv20e, generator):
     stage, count = rv20e.reducer.cycloid_stage, rv20e.reducer.cycloid_stage.pin_count
     errors = generator.normal(0.0, 1e-6, (5, len(rv20e.columns)))

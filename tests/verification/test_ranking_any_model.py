@@ -132,6 +132,7 @@ def test_the_ranking_is_that_of_the_closed_form(answer):
     assert [frame["requirement"] for frame in answer.summary["requirements"]] == ["gap", "play"]
 
 
+@pytest.mark.slow
 def test_a_lower_limit_is_an_upper_one_of_the_output_with_its_sign_turned(answer):
     turned = ranked({PLAY: Limits(lower=1.95)})
     yields = turned.sample.evaluation.values[:, 0] >= 1.95
@@ -152,6 +153,7 @@ def test_two_limits_count_the_units_beyond_either():
     assert any("inside the limits" in sentence or "beyond the limits" in sentence for sentence in both.sentences)
 
 
+@pytest.mark.slow
 def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
     found = ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)}, Chain(deviation=0.01))
     assert found.indices.sources == ("a", "b", "scale")

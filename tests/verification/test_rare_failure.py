@@ -90,6 +90,7 @@ def test_curved_limits(bend):
     assert np.mean(np.square(errors)) > 0.1
 
 
+@pytest.mark.slow
 def test_stated_errors_are_neither_small_nor_large():
     """Over many seeds the spread of the estimates is that which each of them states."""
     limit = Flat(beta=3.5)

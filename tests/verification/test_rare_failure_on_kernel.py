@@ -112,6 +112,7 @@ def test_share_that_is_not_rare_is_left_to_random_units():
     assert found.capability.ppk == pytest.approx(2.0 / 3, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(
     ("kind", "limit", "exact"),
@@ -132,6 +133,7 @@ def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
     assert found.calls == sum(item.calls for item in found.estimates)
 
 
+@pytest.mark.slow
 def test_widened_sampling_states_its_own_spread():
     """Over 60 seeds on a known share, with directions from one pair of small runs."""
     limit, exact = limited(Radius, normals(6), 4.5), chi2.sf(4.5**2, 2)
@@ -152,6 +154,7 @@ def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
     assert 0 < found.parts_per_million.high < 1000
 
 
+@pytest.mark.slow
 def test_methods_that_contradict_each_other_are_not_relied_on(monkeypatch):
     def too_small(*arguments: object) -> RareFailure:
         found = widened_sampling(*arguments)
@@ -190,6 +193,7 @@ def test_log_normal_interval_covers_as_stated(generator, runs):
     assert covered / 4000 == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 4000))
 
 
+@pytest.mark.slow
 def test_intervals_of_subset_simulation_cover():
     """30 intervals of 95 % at Φ(−4.265) ≈ 1e-5 from small runs cover 0.95 less 3 standard errors."""
     runs, seeds = 3, 30

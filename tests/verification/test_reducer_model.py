@@ -87,6 +87,7 @@ def test_derivatives_by_the_settings_are_those_by_the_amounts_that_they_mean(mod
         model.derivatives(LOST_MOTION, x)
 
 
+@pytest.mark.slow
 def test_one_standard_uncertainty_of_a_stiffness_does_to_other_outputs_what_the_kernel_says(model, x):
     (source,) = model.uncertain
     assert source.columns == tuple(f"stiffness.{name}" for name in model.identified.values)
@@ -106,6 +107,7 @@ def test_one_standard_uncertainty_of_a_stiffness_does_to_other_outputs_what_the_
     assert isinstance(model.with_uncertain((PEAK_TO_PEAK,)), StiffnessResponse)
 
 
+@pytest.mark.slow
 def test_a_change_of_half_and_two_of_them_at_once_is_to_first_order(model, x):
     steps = np.sqrt(np.diag(model.uncertain[0].covariance))
     response = model.with_uncertain((LOST_MOTION, RADIAL))

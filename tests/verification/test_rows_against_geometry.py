@@ -178,6 +178,7 @@ def exact_rows(name: str, at: DisplacedReducer) -> np.ndarray:
     return np.concatenate([part for parts in rows for part in parts], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cranks", [2, 3])
 def test_rows_are_the_derivatives_of_exact_geometry(cranks, generator):
     reducer = replace(load_reducer("rv20e_liu2020"), crank_count=cranks)

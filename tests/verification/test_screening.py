@@ -106,6 +106,7 @@ def test_a_failed_sample_drops_its_trajectory_alone():
         elementary_effects(Experiment.of(Products(fail=(9,)), SIZES, SeedTree(3)), 40)
 
 
+@pytest.mark.slow
 def test_the_interval_of_mu_star_covers():
     """A 90 % interval of 200 covers 0.9 less 3 standard errors, and the small sample's own shortfall of 0.03."""
     truth = elementary_effects(Experiment.of(Products(), SIZES, SeedTree(4)), 4000).mu_star[0, 0]
@@ -138,6 +139,7 @@ def true_pawn(share: float) -> float:
     return float(np.median(np.abs(given - norm.cdf(y)).max(axis=1)))
 
 
+@pytest.mark.slow
 def test_pawn_and_delta_of_a_normal_sum():
     """Within 4 standard errors, and 0.02 that the kernel density (delta) and the maximum over noise (PAWN) add.
 
@@ -155,6 +157,7 @@ def test_pawn_and_delta_of_a_normal_sum():
     assert (found.units, found.failed) == (2048, 0)
 
 
+@pytest.mark.slow
 def test_an_index_without_effect_passes_the_dummies_as_rarely_as_stated():
     """One of eleven vectors without effect is the largest with probability 1/11; 4 standard errors of 60."""
     passed = []
@@ -165,6 +168,7 @@ def test_an_index_without_effect_passes_the_dummies_as_rarely_as_stated():
     assert abs(np.mean(passed) - 1 / 11) < 4 * np.sqrt(1 / 11 * 10 / 11 / 60)
 
 
+@pytest.mark.slow
 def test_a_vector_without_effect_passes_the_dummies_as_rarely_as_stated():
     """A source of three measures, the most there are, passes 10 dummies with probability 1/11; 3 standard errors."""
     errors = ErrorModel(

@@ -104,6 +104,7 @@ def test_seed_zero_is_refused_by_the_design_and_fine_for_the_analysis():
     assert (one.indices.total != other.indices.total).any()
 
 
+@pytest.mark.slow
 def test_a_block_larger_than_a_chunk_is_a_chunk():
     design = SaltelliDesign(factor_groups=tuple(f"x{at}" for at in range(SAMPLES_AT_ONCE)), seed=1)
     chunk = next(design.chunks(0, 4))

@@ -79,6 +79,7 @@ def first_order_error(response: StiffnessResponse, x: np.ndarray, changes: np.nd
     )
 
 
+@pytest.mark.slow
 def test_first_order_against_the_kernel(response):
     """At a small torque the error falls faster than the change; at a large one contacts change, and it is seen."""
     x, direction = units(16, 1), np.array([[-1.0, 0.0], [0.7, -0.7]])
@@ -105,6 +106,7 @@ def test_a_change_is_that_of_the_reducer(response):
     np.testing.assert_array_equal(response(extended).values, response.kernel(x).values)
 
 
+@pytest.mark.slow
 def test_share_of_the_variance_against_direct_monte_carlo(response):
     """Pairs of the same unit with two draws of the stiffness give the total index without Sobol's scheme."""
     stiffness = source(0.6, -0.5)

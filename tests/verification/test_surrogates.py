@@ -273,6 +273,7 @@ def test_a_correction_is_the_line_of_least_squares():
     assert (line.columns, line.outputs) == (COLUMNS, OUTPUTS)
 
 
+@pytest.mark.slow
 def test_contact_at_fewer_angles_passes_and_more_angles_miss_less(kernel, units):
     answers = answers_of(kernel, units, SeedTree(1))
     scores = [cross_validate(ContactCandidate(kernel=kernel, angles=angles), answers) for angles in (234, 936)]
@@ -301,6 +302,7 @@ def test_a_failed_contact_stays_a_failed_sample(kernel, units):
     assert fitted(x).good.tolist() == [row != 3 for row in range(8)]
 
 
+@pytest.mark.slow
 def test_the_regression_of_curves_follows_them_where_few_columns_vary(kernel, units):
     columns = ("disc1.bore1.position.x", "disc1.bore1.position.y", "pin.diameter")
     still = {name: 0.0 for name in kernel.columns if name not in columns}

@@ -131,6 +131,7 @@ def test_failed_units_do_not_make_a_sample_too_small():
     assert (found.units, found.outside) == (990, 50)
 
 
+@pytest.mark.slow
 def test_intervals_cover():
     """90 % intervals of 100 samples cover 0.9 less 3 standard errors and 0.03 that so few units outside cost."""
     inside = []
@@ -150,6 +151,7 @@ def test_intervals_cover():
     assert np.mean(inside, axis=0).min() > 0.9 - 0.03 - 3 * np.sqrt(0.09 / 100)
 
 
+@pytest.mark.slow
 def test_the_test_of_no_effect_is_as_rarely_wrong_as_stated():
     """A source without effect has p ≤ 0.2 in a fifth of 150 samples; 4 standard errors."""
     wrong = [

@@ -70,6 +70,7 @@ def carrying(answer) -> np.ndarray:
     return (answer.pin_forces > 0).sum(axis=2)
 
 
+@pytest.mark.slow
 def test_ratio_and_speeds(calibrated):
     answer, steady = calibrated
     assert answer.time[-1] == pytest.approx(2.0)
@@ -139,6 +140,7 @@ def static(reducer: Reducer, carrier_angle: np.ndarray, torque: float, errors=No
     return equilibria.transmission_error[0], forces(equilibria).pins[0]
 
 
+@pytest.mark.slow
 def test_equivalent_model_agrees_where_its_gaps_are_exact(rigid):
     """They are under an equidistant modification and a torque that moves pins by little beside the roots' radius."""
     reducer = replace(rigid, modification=Modification(equidistant=1 * MICROMETRE, shift=0.0))
@@ -150,6 +152,7 @@ def test_equivalent_model_agrees_where_its_gaps_are_exact(rigid):
     np.testing.assert_array_equal(carrying(answer)[late[at]], (pins[at] > 0).sum(axis=1))
 
 
+@pytest.mark.slow
 def test_bearings_yield_as_in_the_equivalent_model(rigid):
     """Under the whole load and with the modification of the source, whose linear gaps are off by up to 0.05 µm here.
 
@@ -167,6 +170,7 @@ def test_bearings_yield_as_in_the_equivalent_model(rigid):
     np.testing.assert_allclose(mean_forces, pins.mean(axis=0), rtol=0, atol=0.01 * pins.max())
 
 
+@pytest.mark.slow
 def test_an_ideal_first_stage_does_not_feel_that_planets_yield(rigid):
     """A planet that yields by u turns its crank in the equivalent model, and the mesh loads its bearing: twice u/r.
 
@@ -182,6 +186,7 @@ def test_an_ideal_first_stage_does_not_feel_that_planets_yield(rigid):
     assert (answer.transmission_error[late] - error).mean() == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.slow
 def test_hertzian_line_contact_of_the_preset(rigid):
     answer, late = brief_run(with_stiffness(rigid, pin_contact_law="logarithmic"), -572.0)
     assert set(np.unique(carrying(answer)[late])) == {8, 9}
@@ -193,6 +198,7 @@ ALONG = 1e-6 * np.cos(20 * DEGREE)
 """What 1 µm along the pitch circle adds along the line of action [m]."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("errors", "gears"),
     [

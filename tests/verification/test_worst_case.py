@@ -158,6 +158,7 @@ def at_limit(errors: ErrorModel, units: int) -> np.ndarray:
     return errors.deviations(np.concatenate([item.at_limit(uniform[:, at]) for item, at in own], axis=1), errors.zones)
 
 
+@pytest.mark.slow
 def test_it_lies_inside_all_zones_and_beyond_every_random_unit_at_their_limits(kernel, errors, worst):
     assert kernel(worst.x[np.newaxis]).values[0, 0] == worst.value
     for item, own in zip(errors.active, errors.columns_of_source, strict=True):
@@ -168,6 +169,7 @@ def test_it_lies_inside_all_zones_and_beyond_every_random_unit_at_their_limits(k
     assert np.nanquantile(worst.ends, 0.75) > 0.97 * worst.value
 
 
+@pytest.mark.slow
 def test_its_change_with_the_zones_is_that_of_other_searches(kernel, errors, worst):
     # Searches from other starts differ by 0.3 %, so a difference over 40 % of the zones is good to 1.5 % of the value
     # over 40 %: 2 arcsec of all zones together, 240.
@@ -181,6 +183,7 @@ def test_it_is_the_same_again_and_for_seed_zero(kernel, errors):
     np.testing.assert_array_equal(found[0].ends, found[1].ends)
 
 
+@pytest.mark.slow
 def test_differences_are_the_exact_derivatives(kernel, errors):
     x = at_limit(errors, 16)
     steps = np.full(len(errors.columns), 1e-8)
@@ -192,6 +195,7 @@ def test_differences_are_the_exact_derivatives(kernel, errors):
     assert np.median(off) < 0.03
 
 
+@pytest.mark.slow
 def test_other_outputs_have_a_worst_unit_by_differences(kernel, errors):
     outputs = OutputsResponse(kernel=kernel, readings=(REQUIREMENTS[-1],))
     output, steps = outputs.outputs[0], np.full(len(errors.columns), 1e-9)

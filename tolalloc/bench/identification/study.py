@@ -142,12 +142,17 @@ def _require_visible(study: IdentificationStudy, data: AllReadings) -> None:
 def _require_close(study: IdentificationStudy, data: AllReadings, stand_in: StandIn) -> None:
     """Refuse bounds within which polynomials are no stand-in for the model."""
     off = stand_in.polynomial.rms_error
-    if off > data.noise.min():
+    if not off <= data.noise.min():
         bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in study.parameters)
+        error = (
+            "in a part of them the model has no answer"
+            if np.isnan(off)
+            else f"polynomials of the model are off by {off / ARCSECOND:.2g}″ where the noise is "
+            f"{data.noise.min() / ARCSECOND:.2g}″"
+        )
         raise InputError(
-            f"tolalloc identify: bounds {bounds} are too wide, polynomials of the model are off by "
-            f"{off / ARCSECOND:.2g}″ where the noise is {data.noise.min() / ARCSECOND:.2g}″; allowed are narrower "
-            "ones, such as half to double."
+            f"tolalloc identify: bounds {bounds} are too wide, {error}; allowed are narrower ones, such as half "
+            "to double."
         )
 
 
