@@ -107,6 +107,7 @@ def test_an_allocation_is_compared_with_itself(allocated):
     assert "housing.pitch" in result.stdout
 
 
+@pytest.mark.slow
 def test_the_report_is_complete(allocated):
     folder, said = allocated
     assert {path.name for path in folder.iterdir()} == {
@@ -136,6 +137,7 @@ def test_the_report_is_complete(allocated):
     assert "units/s" in said
 
 
+@pytest.mark.slow
 def test_the_answer_reads_well(allocated):
     _, said = allocated
     assert "Met: " in said
@@ -147,6 +149,7 @@ def test_the_answer_reads_well(allocated):
     assert "housing.runout" in said
 
 
+@pytest.mark.slow
 def test_the_answer_for_programs_is_finite(allocated):
     folder, _ = allocated
     answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["allocation"]
@@ -160,6 +163,7 @@ def test_the_answer_for_programs_is_finite(allocated):
     assert all(name.endswith("]") for name in with_unit)
 
 
+@pytest.mark.slow
 def test_the_drawing_is_read_back_and_carries_grades(allocated):
     folder, _ = allocated
     sources = {source.name: source for source in load_tolerance_table(folder / "allocation.csv")}
@@ -190,6 +194,7 @@ def test_the_cost_is_one_number_in_summary_drawing_and_table(tmp_path, change):
     assert sum(own.cost * own.zone / table[own.name].zone for own in before) != pytest.approx(cost, rel=0.05)
 
 
+@pytest.mark.slow
 def test_every_header_of_the_tables_has_a_unit(allocated):
     folder, _ = allocated
     for path in (folder / "tables").iterdir():

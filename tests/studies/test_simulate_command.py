@@ -53,6 +53,7 @@ def test_a_run_is_reported_with_its_series(tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_the_compliance_decides_how_many_pins_carry():
     options = ("--pin-stiffness", "3.67e7", "--json")
     answer = json.loads(tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, *options).stdout)

@@ -106,6 +106,7 @@ def test_the_reference_lies_in_the_99_percent_interval(name):
         assert held.mean(axis=0).min() >= 0.97, f"{kind}: {held.mean(axis=0)}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_90_percent_intervals_cover_as_they_say(name):
     """The standard error of a share of 90 % over 1000 repetitions is 0.95 %, so the limits are five of them away."""

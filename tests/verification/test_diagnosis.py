@@ -238,6 +238,7 @@ def test_derivatives_by_the_numbers_are_those_of_the_residuals(problem: CurvePro
     assert np.abs(found - slope[0] @ direction).max() < 1e-2 * np.abs(found).max()
 
 
+@pytest.mark.slow
 def test_steps_never_lead_uphill(problem: CurveProblem) -> None:
     start = SeedTree(5).child("climb").generator().standard_normal((3, problem.size))
     before = problem.misfit(start) + 0.5 * (start**2).sum(axis=1)

@@ -89,6 +89,7 @@ def test_all_members_of_a_group_carry_one_zone_and_its_name(prepared, found):
     assert {SERIES, "IT3"} <= set(labels.values())
 
 
+@pytest.mark.slow
 def test_every_choice_has_round_amounts_and_clearances_inside_their_range(prepared, found):
     shared = found.space.shared
     for design in found.tried[1:]:

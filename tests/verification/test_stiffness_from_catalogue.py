@@ -32,6 +32,7 @@ def test_its_slope_is_that_of_the_bearings_share_of_the_twist(found):
     assert found.slope == pytest.approx(bearings, abs=0.05)
 
 
+@pytest.mark.slow
 def test_printed_stiffnesses_are_scaled_alike():
     printed = replace(load_reducer("rv20e_liu2020"), catalogue=load_reducer("rv20e").catalogue)
     with pytest.raises(InputError, match="with bearings of any stiffness") as caught:
@@ -45,6 +46,7 @@ def test_printed_stiffnesses_are_scaled_alike():
         assert ratio == pytest.approx(found.factor, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_file_gives_a_study_the_same_rigidity(tmp_path):
     path = tmp_path / "bearings.toml"
     result = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--stiffness", path, "--json")
