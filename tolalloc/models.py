@@ -321,6 +321,11 @@ class Model(ABC):
         return ()
 
     @property
+    def ranked(self) -> tuple[str, ...]:
+        """Outputs that every ranking looks at; others, that cost more than they tell, once they are limited."""
+        return self.outputs
+
+    @property
     def own_limits(self) -> Mapping[str, float]:
         """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
         return {}

@@ -25,6 +25,7 @@ from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import (
+    WITH_FRICTION,
     OutputsResponse,
     limited_outputs,
     orders_reading,
@@ -86,6 +87,11 @@ class ReducerModel(Model):
     def outputs(self) -> tuple[str, ...]:
         """All that requirements may limit, the peak-to-peak first."""
         return limited_outputs(self.reducer)
+
+    @property
+    def ranked(self) -> tuple[str, ...]:
+        """All but those with friction, which ask for more than twice the equilibria of the other outputs of a loop."""
+        return tuple(name for name in self.outputs if name not in WITH_FRICTION)
 
     def reading(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of these outputs, waves of `spectra` among them if need be.

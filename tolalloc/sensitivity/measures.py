@@ -73,8 +73,9 @@ class Measures:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """All outputs of the model, the leading one first."""
-        return (self.leading, *(name for name in self.model.outputs if name != self.leading))
+        """Outputs of the model that are ranked or limited, the leading one first."""
+        asked = {*self.model.ranked, *self.limits} - {self.leading}
+        return (self.leading, *(name for name in self.model.outputs if name in asked))
 
     @cached_property
     def response(self) -> Response:

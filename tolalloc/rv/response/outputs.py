@@ -108,8 +108,9 @@ def _radial_clearance(
 _FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
 
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
-_WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
-_FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *_WITH_FRICTION), read=_friction_loop)
+WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
+"""Outputs of the loop with friction."""
+_FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
 REQUIREMENTS = (
     Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
@@ -131,12 +132,12 @@ REQUIREMENTS = (
 def limited_outputs(reducer: Reducer) -> tuple[str, ...]:
     """Return what a requirement may limit; what friction decides only where the reducer's file says enough for it."""
     own = tuple(name for reading in REQUIREMENTS for name in reading.outputs)
-    return own if reducer.friction_dimensions.unknown else (*own, *_WITH_FRICTION)
+    return own if reducer.friction_dimensions.unknown else (*own, *WITH_FRICTION)
 
 
 def readings_of(outputs: tuple[str, ...]) -> tuple[Reading, ...]:
     """Return the readings that give the outputs; one with friction gives the loop without it too."""
-    loop = _LOOP if {*_WITH_FRICTION}.isdisjoint(outputs) else _FRICTION_LOOP
+    loop = _LOOP if {*WITH_FRICTION}.isdisjoint(outputs) else _FRICTION_LOOP
     every = (loop if own is _LOOP else own for own in REQUIREMENTS)
     return tuple(own for own in every if not {*own.outputs}.isdisjoint(outputs))
 
