@@ -37,6 +37,8 @@ def test_a_study_may_say_otherwise():
     assert [limit.output for limit in prepared("rv20e", limits={**LIMITS, ta.PRELOAD: None}).requirements] == [
         ta.PEAK_TO_PEAK
     ]
+    with pytest.raises(InputError, match="the model has no limit of its own to lift there"):
+        _ = prepared("rv20e", limits={**LIMITS, ta.LOST_MOTION: None}).requirements
     with pytest.raises(InputError, match="every limit is None"):
         _ = prepared("rv20e", limits={ta.PRELOAD: None}).requirements
 

@@ -71,6 +71,10 @@ class Prepared:
             if name not in self.model.outputs:
                 raise UnknownNameError.among(self.place, "limit of", name, self.model.outputs)
         asked = {name: limit for name, limit in self.study.limits.items() if limit is not None}
+        for name in self.study.limits.keys() - asked.keys() - self.model.own_limits.keys():
+            raise InputError.at(
+                self.place, f"limits[{name!r}]", None, "ta.Limit(...): the model has no limit of its own to lift there"
+            )
         if not asked:
             raise InputError(f"{self.place}: every limit is None; limit one output at least, the leading one first.")
         own = {
