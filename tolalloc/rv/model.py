@@ -335,6 +335,8 @@ class ReducerModel(Model):
         stage, (flank, radial) = self.reducer.cycloid_stage, self._clearances
         found = preload(self.kernel.model, self.kernel.errors(x))
         solved, rated = found.status == 0, self._rated_pin_force
+        if not solved.any():
+            return (f"None of {len(x)} random units has an equilibrium without torque.", *self.remarks)
         jammed, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
         unsolved = "" if solved.all() else f" ({(~solved).sum()} have no equilibrium)"
         return (
