@@ -1,22 +1,22 @@
-"""How the kernel's functions are compiled: without the interpreter's lock, without reordered sums, kept on disc.
+"""How the kernel's functions are compiled and shared among threads: no interpreter's lock, no reordered sums.
 
 numba keeps a compiled function until its own file changes, although functions from other files are built into it. So
 what is kept stands in a folder named after a digest of all rooms named ``solvers``, where every compiled function
 lives: a change in any of their files compiles all anew.
+
+Threads are the interpreter's own, each calling compiled functions that hold no lock. A parallel loop of numba's was no
+faster here, and took as long to compile as all that it calls.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numba as nb
-from numba import get_num_threads as thread_count
-from numba import prange
-
-__all__ = ["is_kept", "jit", "parallel_jit", "prange", "thread_count", "use_threads"]
 
 _HERE = Path(__file__)
 _FILES = [_HERE, *sorted(_HERE.parent.glob("**/solvers/*.py"))]
@@ -29,29 +29,37 @@ def is_kept(module: str) -> bool:
     return any(_KEPT.glob(f"*/{module}.*.nbi"))
 
 
-def _compile(function: Callable[..., Any], parallel: bool) -> Any:
+def jit(function: Callable[..., Any]) -> Any:
+    """Compile a function when it is first called."""
     others = nb.config.CACHE_DIR
     nb.config.CACHE_DIR = str(_KEPT)  # read while decorating only
     try:
-        return nb.njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(function)
+        return nb.njit(cache=True, nogil=True, error_model="numpy")(function)
     finally:
         nb.config.CACHE_DIR = others
 
 
+_threads = int(nb.config.NUMBA_NUM_THREADS)
+
+
+def thread_count() -> int:
+    """Return how many threads of the process share the work; at first one for each core."""
+    return _threads
+
+
 def use_threads(count: int) -> None:
-    """Let the loops of `parallel_jit` functions use this many threads of the process."""
-    nb.set_num_threads(count)
+    """Let this many threads of the process share the work."""
+    global _threads
+    _threads = count
 
 
-def jit(function: Callable[..., Any]) -> Any:
-    """Compile a function for one thread."""
-    return _compile(function, parallel=False)
-
-
-def parallel_jit(function: Callable[..., Any]) -> Any:
-    """Compile a function whose `numba.prange` loops share their turns among the threads.
-
-    The loop's number is unsigned to the threads and signed to the rest; pass ``np.int64(number)`` on, or all that
-    is called is compiled twice.
-    """
-    return _compile(function, parallel=True)
+def in_threads(work: Callable[[slice], None], samples: int, size: int) -> None:
+    """Do some work on all samples, at most ``size`` of them at a time, the threads sharing the parts."""
+    parts = [slice(start, min(start + size, samples)) for start in range(0, samples, size)]
+    if min(_threads, len(parts)) <= 1:
+        for part in parts:
+            work(part)
+        return
+    with ThreadPoolExecutor(min(_threads, len(parts))) as pool:
+        for _ in pool.map(work, parts):
+            pass  # raises what the work raised

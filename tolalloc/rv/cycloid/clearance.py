@@ -72,7 +72,7 @@ def exact_clearance(
     profiles: Sequence[ToothProfile], pin_angle: Float[np.ndarray, " pin"], rotation: Rotation = 0.0
 ) -> Float[np.ndarray, "profile pin"]:
     """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m]."""
-    from tolalloc.rv.cycloid.solvers.distance import FIELDS, design_clearances, pin_clearances
+    from tolalloc.rv.cycloid.solvers.distance import FIELDS, pin_clearances
 
     designs, clearance = np.empty((len(profiles), FIELDS)), np.empty((len(profiles), pin_angle.size))
     for row, profile in zip(designs, profiles, strict=True):
@@ -84,10 +84,7 @@ def exact_clearance(
         )  # fmt: skip
     turned = np.ascontiguousarray(np.broadcast_to(rotation, clearance.shape), float)
     angle = np.ascontiguousarray(np.remainder(pin_angle + pi, 2 * pi) - pi)
-    if len(profiles) == 1:  # waking the threads would take longer
-        design_clearances(designs[0], angle, turned[0], clearance[0])
-    else:
-        pin_clearances(designs, angle, turned, clearance)
+    pin_clearances(designs, angle, turned, clearance)
     return clearance
 
 

@@ -21,7 +21,6 @@ from tolalloc.rv.equivalent.solvers.records import (
     AngleSearch,
     SolvedDerivatives,
     SolvedExtremes,
-    SolvedTurn,
     SolverDesign,
     design_of,
 )
@@ -111,18 +110,11 @@ class EquivalentModel:
         carrier_angle: Float[np.ndarray, " angle"] | None = None,
     ) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles."""
-        from tolalloc.rv.equivalent.solvers.turn import solve_curves, tile_size
+        from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_curves
 
         angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
-        shape = (errors.shape[0], angle.size)
-        turn = SolvedTurn(
-            np.empty(shape),
-            np.empty((*shape, tables.load.shape[2])),
-            np.empty(shape, np.uint8),
-            np.empty(shape),
-            np.empty(shape, np.uint16),
-        )
-        solve_curves(tile_size(errors.shape[0]), self._discs, 0, 1, tables, *self._given(errors, torque), turn)
+        turn = make_turn(errors.shape[0], angle.size, tables.load.shape[2])
+        solve_curves(self._discs, tables, *self._given(errors, torque), turn)
         self._mark_out_of_range(turn.rotation, turn.status)
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(
@@ -142,7 +134,6 @@ class EquivalentModel:
     def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
         """Return the refined extremes of every sample over one output turn."""
         from tolalloc.rv.equivalent.solvers.extremes import solve_extremes
-        from tolalloc.rv.equivalent.solvers.turn import tile_size
 
         samples, search = errors.shape[0], self.search
         found = SolvedExtremes(
@@ -154,7 +145,7 @@ class EquivalentModel:
             np.empty(samples),
         )
         given = self._given(errors, torque)
-        solve_extremes(tile_size(samples), self._discs, self._tables, *given, search, found)
+        solve_extremes(self._discs, self._tables, *given, search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
         return Extremes(

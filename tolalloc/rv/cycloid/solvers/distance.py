@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.compiled import in_threads, jit
 
 # Fields of a design, `tolalloc.rv.cycloid.clearance` fills them.
 CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
 
 _GRID = 384  # points of the scan over a tooth and a part of its neighbours
 _NEAR = 0.3  # distance from the path over its radius, and slip along it [rad], up to which the nearest point is plain
+_AT_ONCE = 16  # designs that a thread takes together
 _BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 
@@ -182,9 +183,16 @@ def design_clearances(design, pin_angle, turned, clearance):
         clearance[k] = own - design[PIN]
 
 
-@parallel_jit
+@jit
+def _clearances(designs, pin_angle, turned, clearance):
+    for d in range(designs.shape[0]):
+        design_clearances(designs[d], pin_angle, turned[d], clearance[d])
+
+
 def pin_clearances(designs, pin_angle, turned, clearance):
     """Fill the clearances [m] of pins on the discs of many designs, [design, pin]; ``designs`` are [design, FIELDS]."""
-    for d in prange(designs.shape[0]):
-        own = np.int64(d)
-        design_clearances(designs[own], pin_angle, turned[own], clearance[own])
+
+    def fill(part):
+        _clearances(designs[part], pin_angle, turned[part], clearance[part])
+
+    in_threads(fill, designs.shape[0], _AT_ONCE)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 
-from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.compiled import in_threads, jit
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import along, compress, make_work, play_force
@@ -206,10 +206,11 @@ def _advance_sample(s, first, angles, tables, parts, integrator, step, layout, m
             _observe(s, record.slot[time], problem, work.compression, x, v, acceleration, record)
 
 
-@parallel_jit
 def advance(first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record):
     """Take all samples through the steps of the tables, the first of which is number ``first``."""
-    for s in prange(errors.shape[0]):
-        _advance_sample(
-            np.int64(s), first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record
-        )
+
+    def take(part):
+        given = (first, angles, tables, parts, integrator, step, layout, mapped, design, errors)
+        _advance_sample(part.start, *given, state, record)
+
+    in_threads(take, errors.shape[0], 1)

@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.compiled import in_threads, jit
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.contact_solver import solve_tangent
 from tolalloc.rv.equivalent.solvers.energy import assemble, compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import interpolation, make_memory, solve_between
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE
+
+_AT_ONCE = 32  # samples that a thread takes together
 
 
 @jit
@@ -169,14 +171,14 @@ def _clear(derivative, s, value):
 
 
 @jit
-def _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position, step, derivative):
+def _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position, step, memory, derivative):
     _clear(derivative, s, 0.0)
     if not np.isfinite(position[s]).all():
         _clear(derivative, s, np.nan)
         return
     values, q = np.empty((1, layout.end)), np.empty(tables.load.shape[2])
     values_of(errors[s : s + 1], torque, layout, mapped, values)
-    memory = make_memory(design.law, tables)
+    memory[2].first[:] = -1
     for extreme in range(2):
         sign = 1.0 - 2.0 * extreme
         before, behind = position[s, extreme] - 2.0 * step, position[s, extreme] + 2.0 * step
@@ -189,33 +191,53 @@ def _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position
 
 
 @jit
-def _of_rotation(s, tables, layout, mapped, design, errors, torque, position, derivative):
+def _of_rotation(s, tables, layout, mapped, design, errors, torque, position, memory, derivative):
     values = np.empty((1, layout.end))
     _clear(derivative, s, 0.0)
     derivative.status[s] = NOT_FINITE
     sample, angle = s // position.size, s % position.size
     if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
-        memory = make_memory(design.law, tables)
+        memory[2].first[:] = -1
         derivative.status[s] = _add_derivative(
             position[angle], 1.0, tables, layout, design, values[0], memory, derivative, s
         )
 
 
-@parallel_jit
+@jit
+def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, position, step, derivative):
+    memory = make_memory(design.law, tables)
+    for s in range(first, last):
+        _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position, step, memory, derivative)
+
+
+@jit
+def _rotations(first, last, tables, layout, mapped, design, errors, torque, position, derivative):
+    memory = make_memory(design.law, tables)
+    for s in range(first, last):
+        _of_rotation(s, tables, layout, mapped, design, errors, torque, position, memory, derivative)
+
+
 def solve_peak_to_peak_derivatives(tables, layout, mapped, design, errors, torque, position, step, derivative):
     """Fill the derivatives of the peak-to-peak from the positions of its two extremes, [sample, 2].
 
     ``step`` is the distance in nodes within which the extremes were found.
     """
-    for s in prange(errors.shape[0]):
-        _of_peak_to_peak(np.int64(s), tables, layout, mapped, design, errors, torque, position, step, derivative)
+
+    def solve(part):
+        given = (tables, layout, mapped, design, errors, torque)
+        _peak_to_peaks(part.start, part.stop, *given, position, step, derivative)
+
+    in_threads(solve, errors.shape[0], _AT_ONCE)
 
 
-@parallel_jit
 def solve_rotation_derivatives(tables, layout, mapped, design, errors, torque, position, derivative):
     """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
 
     The derivatives stand in one row, sample by sample, and position by position within a sample.
     """
-    for s in prange(errors.shape[0] * position.size):
-        _of_rotation(np.int64(s), tables, layout, mapped, design, errors, torque, position, derivative)
+
+    def solve(part):
+        given = (tables, layout, mapped, design, errors, torque)
+        _rotations(part.start, part.stop, *given, position, derivative)
+
+    in_threads(solve, errors.shape[0] * position.size, _AT_ONCE)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit, parallel_jit, prange
+from tolalloc.compiled import in_threads, jit
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory, solve_anywhere
 from tolalloc.rv.equivalent.solvers.problem import values_of
-from tolalloc.rv.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE
-from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes
+from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile, tile_size
 
 
 @jit
@@ -65,17 +65,14 @@ def _refine(sign, rotation, retained, search, tables, layout, design, values, me
 
 
 @jit
-def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, errors, torque, search, found):
-    a, b = number * samples, min((number + 1) * samples, errors.shape[0])
-    size, angles = tables.load.shape[2], search.coarse + 2
-    values = np.empty((b - a, layout.end))
-    finite = values_of(errors[a:b], torque, layout, mapped, values)
-    memory, turn = make_memory(design.law, tables), make_turn(b - a, angles, size)
-    solve_tile(discs, MARGIN, search.nodes_per_coarse, tables, layout, design, values, finite, memory, turn)
-    for s in range(a, b):
-        own = s - a
-        found.solves[s], found.left_over[s] = angles, 0.0
-        found.status[s], found.residual[s] = turn.status[own].max(), turn.residual[own].max()
+def _refine_all(tables, layout, mapped, design, errors, torque, search, turn, found):
+    """Fill the extremes of some samples whose coarse turn is solved."""
+    values = np.empty((errors.shape[0], layout.end))
+    values_of(errors, torque, layout, mapped, values)
+    memory = make_memory(design.law, tables)
+    for s in range(errors.shape[0]):
+        found.solves[s], found.left_over[s] = turn.rotation.shape[1], 0.0
+        found.status[s], found.residual[s] = turn.status[s].max(), turn.residual[s].max()
         if found.status[s] == NOT_FINITE:
             found.extreme[s], found.position[s] = np.nan, np.nan
             continue
@@ -83,7 +80,7 @@ def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, er
         for side in range(2):
             sign = 1.0 - 2.0 * side
             best, at, left, count, worst_status, worst_residual = _refine(
-                sign, turn.rotation[own], turn.retained[own], search, tables, layout, design, values[own], memory
+                sign, turn.rotation[s], turn.retained[s], search, tables, layout, design, values[s], memory
             )
             found.extreme[s, side], found.position[s, side] = sign * best, at
             found.left_over[s] += left
@@ -92,8 +89,13 @@ def _extremes_of_tile(number, samples, discs, tables, layout, mapped, design, er
             found.residual[s] = max(found.residual[s], worst_residual)
 
 
-@parallel_jit
-def solve_extremes(size, discs, tables, layout, mapped, design, errors, torque, search, found):
+def solve_extremes(discs, tables, layout, mapped, design, errors, torque, search, found):
     """Fill the extremes of every sample."""
-    for number in prange((errors.shape[0] + size - 1) // size):
-        _extremes_of_tile(np.int64(number), size, discs, tables, layout, mapped, design, errors, torque, search, found)
+
+    def solve(part):
+        given = (tables, layout, mapped, design, errors[part], torque)
+        turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
+        solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)
+        _refine_all(*given, search, turn, SolvedExtremes(*(values[part] for values in found)))
+
+    in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit, parallel_jit, prange, thread_count
+from tolalloc.compiled import in_threads, jit, thread_count
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
@@ -18,7 +18,6 @@ from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE, Solved
 from tolalloc.rv.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
 
 
-@jit
 def make_turn(samples, angles, retained):
     """Return an empty turn."""
     return SolvedTurn(
@@ -37,8 +36,10 @@ def _give_up(turn, s):
 
 
 @jit
-def _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn):
+def _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn):
     """Solve some samples at every ``stride``-th node, one after another."""
+    values = np.empty((errors.shape[0], layout.end))
+    finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     for s in range(values.shape[0]):
         if not finite[s]:
             _give_up(turn, s)
@@ -78,8 +79,10 @@ def _fill_tile(layout, values, finite, used, tile, tilted):
 
 
 @jit
-def _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn):
+def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
     """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
+    values = np.empty((errors.shape[0], layout.end))
+    finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
     used = (samples + FOUR - 1) // FOUR * FOUR
     tile, careful, tilted = make_tile(layout, size, contacts), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
@@ -107,35 +110,25 @@ def _side_by_side(discs, first, stride, tables, layout, design, values, finite, 
             _give_up(turn, s)
 
 
-@jit
-def solve_tile(discs, first, stride, tables, layout, design, values, finite, memory, turn):
+def solve_tile(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
     """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
     if tables.play_stiffness.shape[1] == 0:
-        _side_by_side(discs, first, stride, tables, layout, design, values, finite, memory, turn)
+        _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn)
     else:
-        _one_by_one(first, stride, tables, layout, design, values, finite, memory, turn)
+        _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn)
 
 
-@jit
-def _curves_of_tile(number, size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
-    a, b = number * size, min((number + 1) * size, errors.shape[0])
-    values = np.empty((b - a, layout.end))
-    finite = values_of(errors[a:b], torque, layout, mapped, values)
-    part = SolvedTurn(turn.rotation[a:b], turn.retained[a:b], turn.status[a:b], turn.residual[a:b], turn.touching[a:b])
-    solve_tile(discs, first, stride, tables, layout, design, values, finite, make_memory(design.law, tables), part)
+def solve_curves(discs, tables, layout, mapped, design, errors, torque, turn):
+    """Fill the equilibria of every sample at every node of the tables.
 
-
-@parallel_jit
-def solve_curves(size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
-    """Fill the equilibria of every sample at every ``stride``-th node of the tables, from node ``first`` on.
-
-    ``size`` is that of a tile, `tile_size`; the answer does not depend on it.
     ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
     """
-    for number in prange((errors.shape[0] + size - 1) // size):
-        _curves_of_tile(
-            np.int64(number), size, discs, first, stride, tables, layout, mapped, design, errors, torque, turn
-        )
+
+    def solve(part):
+        own = SolvedTurn(*(values[part] for values in turn))
+        solve_tile(discs, 0, 1, tables, layout, mapped, design, errors[part], torque, own)
+
+    in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))
 
 
 @jit
@@ -171,21 +164,12 @@ def _forces_of_sample(tables, layout, mapped, design, errors, torque, status, re
             rows[at, row] = tables.row_stiffness[at, row] * compression
 
 
-@parallel_jit
 def solve_forces(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
     """Fill the forces of all samples at all nodes of the tables, those of `tolalloc.rv.equivalent.outputs.Forces`."""
-    for number in prange(errors.shape[0]):
-        s = np.int64(number)
-        _forces_of_sample(
-            tables,
-            layout,
-            mapped,
-            design,
-            errors[s : s + 1],
-            torque,
-            status[s],
-            retained[s],
-            pins[s],
-            rows[s],
-            elements[s],
-        )
+
+    def fill(part):
+        s = part.start
+        own = (status[s], retained[s], pins[s], rows[s], elements[s])
+        _forces_of_sample(tables, layout, mapped, design, errors[part], torque, *own)
+
+    in_threads(fill, errors.shape[0], 1)
