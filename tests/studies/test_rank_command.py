@@ -16,8 +16,8 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 
 PEAK_TO_PEAK = "peak-to-peak transmission error"
 EFFORT = """effort=ta.Effort(ranking=RankingEffort(
-    units=2048, sobol=SobolEffort(start=256, limit=256, second_order=True), trajectories=8, moment_units=512,
-    derivative_units=128, inverse_units=1852, surrogate_units=256, level_units=200, level_runs=2, widened_units=500,
+    units=1024, sobol=SobolEffort(start=128, limit=128, second_order=True), trajectories=8, moment_units=256,
+    derivative_units=64, inverse_units=926, surrogate_units=96, level_units=100, level_runs=2, widened_units=200,
     permutations=200))"""
 
 
