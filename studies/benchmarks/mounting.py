@@ -24,12 +24,12 @@ import time
 from collections import defaultdict
 from typing import Any
 
-import numba
 import numpy as np
 from kernel_speed import SEED, progress
 
 from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting, units_from
 from tolalloc.assembly.mounting.stock import PartStock, drawn_parts
+from tolalloc.compiled import thread_count
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -135,7 +135,7 @@ def answer(sets: int, swapped: int) -> dict[str, Any]:
     failures = int(sum(sum(own["failures"]) for own in found.values()))
     met = summary[4]["seconds"]["median"] < TARGET_SECONDS
     return {
-        "threads": numba.get_num_threads(),
+        "threads": thread_count(),
         "load_average_before": load,
         "sets": sets,
         "units": summary,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -188,7 +187,7 @@ def test_bits_depend_neither_on_threads_nor_on_the_batch(rv20e, table4):
     damping, some = Damping(stiffness_proportional=1e-6), np.array([0, 600])
     threads = thread_count()
     try:
-        use_threads(numba.config.NUMBA_NUM_THREADS)
+        use_threads(4)
         before = run(rv20e, errors, motion, damping, observe=some)
         use_threads(1)
         one = run(rv20e, errors, motion, damping, observe=some)

@@ -13,6 +13,7 @@ from tests.random_reducers import Case, random_case, variations
 from tests.random_units import random_units
 from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
+from tolalloc.compiled import thread_count, use_threads
 from tolalloc.rv.cycloid.solvers import LOGARITHMIC
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.answers import Status
@@ -203,17 +204,14 @@ def test_nominal_geometry_leaves_no_gap(rv20e):
 
 
 def test_random_units_all_converge_with_the_same_bits_on_any_number_of_threads(rv20e, table4, generator):
-    import numba
-
-    units = random_units(table4, rv20e.columns, generator, 300)
-    threads = numba.get_num_threads()
+    units, threads = random_units(table4, rv20e.columns, generator, 300), thread_count()
     try:
         results = []
-        for count in range(1, numba.config.NUMBA_NUM_THREADS + 1):
-            numba.set_num_threads(count)
+        for count in (1, 2, 3, 4):
+            use_threads(count)
             results.append(rv20e.extremes(units, -1.0))
     finally:
-        numba.set_num_threads(threads)
+        use_threads(threads)
     for result in results:
         assert (result.status == Status.CONVERGED).all()
         assert result.residual.max() <= 1e-9
