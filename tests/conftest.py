@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 
+from tests.compiled_first import compile_in_two_processes
 from tolalloc.compiled import use_threads
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
@@ -12,6 +13,13 @@ from tolalloc.rv.reducer.unit_file import load_unit
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     use_threads(1)  # every core has a worker already
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernel before workers start."""
+    if "PYTEST_XDIST_WORKER" not in os.environ and getattr(session.config.option, "numprocesses", None):
+        compile_in_two_processes()
 
 
 @pytest.fixture(scope="session")

@@ -82,6 +82,7 @@ def test_ratio_and_speeds(calibrated):
     assert answer.input_angle[-1] == pytest.approx(1.5 * SPEED, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_power_closes(calibrated):
     answer, steady = calibrated
     given = (answer.input_torque * answer.input_speed)[steady].mean()
@@ -91,6 +92,7 @@ def test_power_closes(calibrated):
     assert np.ptp(answer.kinetic_energy[steady]) < 1e-3 * answer.kinetic_energy[steady].mean()
 
 
+@pytest.mark.slow
 def test_sixteen_teeth_carry_with_the_compliance_of_the_source(calibrated):
     answer, steady = calibrated
     assert set(np.unique(carrying(answer)[steady])) == {16, 17}
@@ -116,6 +118,7 @@ def exact_equilibrium(reducer: Reducer, sun_angle: float, torque: float):
     return error, stiffness * compression(error)
 
 
+@pytest.mark.slow
 def test_steady_run_passes_through_exact_equilibria(calibrated, rigid):
     """Bearings of 1e13 N/m add 0.01″ to rigid ones; the rest is vibration."""
     answer, steady = calibrated
