@@ -1,10 +1,7 @@
 """Compile the kernel before many workers start, each of which would compile all of it: a part in each of two processes.
 
-    python -m tests.compiled_first lanes
-    python -m tests.compiled_first care
-
-``lanes`` is what solves eight samples at a time, for two discs and for three; ``care`` is what solves one, what stands
-on it (forces, extremes, derivatives, motion), and the lanes of a single disc.
+python -m tests.compiled_first lanes
+python -m tests.compiled_first care
 """
 
 from __future__ import annotations
@@ -28,24 +25,30 @@ from tolalloc.rv.reducer.files import load_reducer
 FEW = AngleSearch(coarse=8)
 
 
-def lanes(*counts: int) -> None:
-    """Compile the solver of eight samples at a time, for numbers of discs."""
-    reducer = load_reducer("rv20e_liu2020")
-    for discs in counts:
-        model = EquivalentModel(replace(reducer, disc_count=discs), FEW)
+def model_of(discs: int = 2, play: float = 0.0) -> EquivalentModel:
+    """Return a model of few angles; with play no sample goes in lanes."""
+    reducer = replace(load_reducer("rv20e_liu2020"), disc_count=discs, clearances=Clearances(gear_mesh=play))
+    return EquivalentModel(reducer, FEW)
+
+
+def lanes() -> None:
+    """Compile what solves eight samples at a time, for every number of discs, and motion."""
+    for discs in (2, 3, 1):
+        model = model_of(discs)
         model.equilibria(np.zeros((1, len(model.columns))), -1.0, np.zeros(1))
+    model = model_of()
+    rest = motion_of(model.reducer, SpeedProfile.constant(0.0), SpeedProfile.constant(-1.0), 1e-3, 2)
+    nothing = np.zeros((1, len(model.columns)))
+    simulate(model, nothing, rest, inertia_of(model.reducer), Damping(), newmark(), None)
 
 
 def care() -> None:
-    """Compile what solves one sample at a time, and what stands on it."""
-    # With play no sample goes in lanes.
-    model = EquivalentModel(replace(load_reducer("rv20e_liu2020"), clearances=Clearances(gear_mesh=1e-9)), FEW)
+    """Compile what solves one sample at a time, and what stands on it: extremes, derivatives and forces."""
+    model = model_of(play=1e-9)
     nothing = np.zeros((1, len(model.columns)))
     model.peak_to_peak_derivatives(nothing, -1.0)
     model.rotation_derivatives(nothing, -1.0, np.zeros(1))
     forces(model.equilibria(nothing, -1.0, np.zeros(1)))
-    rest = motion_of(model.reducer, SpeedProfile.constant(0.0), SpeedProfile.constant(-1.0), 1e-3, 2)
-    simulate(model, nothing, rest, inertia_of(model.reducer), Damping(), newmark(), None)
 
 
 def compile_in_two_processes() -> None:
@@ -57,8 +60,4 @@ def compile_in_two_processes() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "lanes":
-        lanes(2, 3)
-    else:
-        care()
-        lanes(1)
+    {"lanes": lanes, "care": care}[sys.argv[1]]()

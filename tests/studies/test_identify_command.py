@@ -90,6 +90,7 @@ def test_the_answer_for_a_program(run):
     assert "units and readings are simulated" in answer["assumptions"]
 
 
+@pytest.mark.slow
 def test_the_truth_is_found(run):
     (found,) = run.answer["parameters"]
     uncertainty = found["relative standard uncertainty [-]"]
@@ -187,6 +188,7 @@ def test_wide_bounds_keep_the_value_inside_its_interval(curves, run):
         assert low < high
 
 
+@pytest.mark.slow
 def test_bounds_beyond_what_polynomials_follow_are_refused(curves):
     refused(
         identify(curves, name=f"{NAME}=1e4:1e13"), "are too wide, in a part of them the model has no answer", "narrower"

@@ -245,6 +245,7 @@ def test_no_file_is_about_a_reducer_that_nobody_named(curves, tmp_path, option, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):
     options = ("--parameter", NAME, "--seed", "-1", "--out", tmp_path / "report", "--reducer", "rv20e_liu2020")
     refused(process("identify", curves / "measurement.toml", *options), "seed is -1")

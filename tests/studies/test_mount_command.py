@@ -38,6 +38,7 @@ def test_one_unit_is_mounted_in_the_best_of_all_ways(tmp_path):
     assert places == {"housing", "carrier", "crank1", "crank2", "disc1", "disc2"}  # the sun has no errors
 
 
+@pytest.mark.slow
 def test_two_units_share_their_parts_and_are_reported(tmp_path):
     folder = tmp_path / "report"
     said = tolalloc(

@@ -78,6 +78,7 @@ def test_the_report_is_complete(ranked):
     assert "<script src" not in page
 
 
+@pytest.mark.slow
 def test_pairs_say_what_errors_add_together(ranked):
     pairs = pd.read_csv(ranked / "tables" / "pairs.csv")
     assert len(pairs) == 15
@@ -86,6 +87,7 @@ def test_pairs_say_what_errors_add_together(ranked):
     assert "pin.diameter" not in set(pairs.iloc[0][["source", "with"]])
 
 
+@pytest.mark.slow
 def test_every_measure_lies_in_its_interval(ranked):
     measures = pd.read_csv(ranked / "tables" / "measures.csv")
     for name, value in (
@@ -99,6 +101,7 @@ def test_every_measure_lies_in_its_interval(ranked):
         assert (measures[high] > measures[low]).all(), name
 
 
+@pytest.mark.slow
 def test_the_answer_for_programs_is_whole(ranked):
     answer = json.loads((ranked / "summary.json").read_text(encoding="utf-8"))["ranking"]
     assert len(answer["ranking"]) == 6
@@ -111,6 +114,7 @@ def test_the_answer_for_programs_is_whole(ranked):
     assert requirement["Yield low 2.5 % [%]"] < requirement["Yield [%]"] < requirement["Yield high 97.5 % [%]"]
 
 
+@pytest.mark.slow
 def test_errors_of_the_housing_make_multiples_of_the_teeth_and_turning_ones_of_the_pins(ranked):
     orders = pd.read_csv(ranked / "tables" / "orders.csv")
     order, alone = orders["order of the output turn [-]"], orders["alone low 5 % [-]"] > 0.05

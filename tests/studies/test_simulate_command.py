@@ -137,6 +137,7 @@ def test_a_number_or_name_out_of_range_is_refused(option, words):
         prepare_simulation(SimulationStudy(**option))
 
 
+@pytest.mark.slow
 def test_a_missing_engine_is_said_in_one_sentence(tmp_path):
     (tmp_path / "exudyn.py").write_text("raise ImportError\n", encoding="utf-8")
     refused(process("simulate", "--engine", "exudyn", PYTHONPATH=str(tmp_path)), "pip install -e '.[multibody]'")

@@ -144,6 +144,7 @@ def test_without_the_extra_a_mock_up_unit_is_refused_in_one_sentence(monkeypatch
         ta.from_fmu(str(tmp_path / "gap.fmu"), inputs={"a": "a"}, outputs={"b [mm]": "b"})
 
 
+@pytest.mark.slow
 def test_grades_of_a_model_without_settings(study):
     own = ta.Study(
         study.model,

@@ -78,6 +78,7 @@ def test_zone(rv40e):
     assert given(rv40e).zone[0] / DEGREE == pytest.approx([3.173, 150.020], abs=0.0005)
 
 
+@pytest.mark.slow
 def test_deflection_from_the_printed_upper_angle(rv40e):
     """The upper angle tells the deflection to 0.004 µm: half of its last digit, at 0.7 µm per degree."""
 

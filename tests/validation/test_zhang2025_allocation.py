@@ -105,10 +105,12 @@ def test_one_limit_has_a_closed_form():
     assert found.prices * ARCSECOND == pytest.approx([cost / 24], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_adjusting_makes_the_tolerances_eight_times_cheaper():
     assert allocate_angles(PLAN, 0.0).cost / allocate_angles(PLAN, 10.0).cost == pytest.approx(7.75, abs=0.01)
 
 
+@pytest.mark.slow
 def test_without_adjusting_it_does_not_matter_what_might_be_turned():
     costs = [allocate_angles(plan, 0.0).cost for plan in (PLAN, PLAN.turning_fewer)]
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)

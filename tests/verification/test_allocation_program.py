@@ -151,6 +151,7 @@ def test_the_best_and_second_best_are_those_of_a_brute_force(kind, seed):
         assert (problem.violation(found.zones, found.shared) / problem.scales).max() <= 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_any_prices_and_directions_bound_the_best_cost(kind, generator):
     problem = random_problem(7, **KINDS[kind])

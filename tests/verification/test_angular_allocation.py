@@ -163,6 +163,7 @@ def test_filters_are_tuned_again_until_they_expect_what_is_allocated():
         assert (each.spread <= each.limits.values * (1 + 1e-9)).all()
 
 
+@pytest.mark.slow
 def test_an_iteration_cut_short_says_so():
     found = retuned_allocation(PLAN, most_filters=3)
     assert len(found.allocations) == 3
@@ -230,6 +231,7 @@ def test_genetic_algorithm_that_finds_nothing_says_so():
         genetic_allocation(PLAN, allocate_angles(PLAN, 0.0), SeedTree(0), population=4, generations=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [0.0, 10.0])
 def test_assemblies_built_at_random_have_the_exact_spread(precision):
     """Eight spreads within 4 standard errors."""
@@ -252,6 +254,7 @@ def test_share_within_each_limit_is_that_of_a_normal_angle_or_a_round_tilt(preci
     assert found.share.estimate <= min(share.estimate for share in found.shares)
 
 
+@pytest.mark.slow
 def test_eight_limits_at_three_standard_deviations_keep_fewer_assemblies_than_one():
     found = verify_angles(PLAN, allocate_angles(PLAN), SeedTree(0))
     assert found.share.high < 0.9973

@@ -188,6 +188,7 @@ def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
     assert "another unit still takes off 25.0%" in said(replace(expected, sweep=sweep))
 
 
+@pytest.mark.slow
 def test_the_line_load_is_said_with_perfect_parts(measured):
     sentences = said(replace(measured, transmission=effect(1)))
     assert "Largest line load at rated torque: 400 → 200 N/mm (perfect parts: 0.8 N/mm)." in sentences
@@ -270,6 +271,7 @@ def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan
     assert "best precision" not in set(tolerance_tables.certificate_table(free.plan, free.tolerances)["allocation"])
 
 
+@pytest.mark.slow
 def test_parts_beyond_their_tolerance_are_named_and_no_others(measured):
     assert "Beyond their stated tolerance: bracket about x (+70.00″, ±60″)." in warnings(measured)
 
@@ -286,6 +288,7 @@ def test_missed_limits_are_named(expected):
     assert not any("miss limits" in warning for warning in warnings(expected))
 
 
+@pytest.mark.slow
 def test_a_characteristic_that_rises_is_named(measured):
     assert not larger(measured)
     swapped = replace(measured.measured, unadjusted=measured.measured.adjusted / 2)
@@ -304,6 +307,7 @@ def test_assemblies_without_equilibrium_are_counted(expected):
     assert transmission.answers(lost, transmission.LINE_LOAD).shape == (2, 9)
 
 
+@pytest.mark.slow
 def test_turning_as_listed_gives_what_is_said_to_be_left(measured):
     frame, plan = tables.step_table(measured), measured.plan
     state = np.zeros(9)
@@ -367,6 +371,7 @@ def limited(results: AssemblyAnswer, limit: float) -> AssemblyAnswer:
     return replace(results, plan=replace(results.plan, requirements=asked))
 
 
+@pytest.mark.slow
 def test_a_limit_is_in_doubt_where_what_the_turns_miss_reaches_beyond_it(measured):
     missed = replace(measured.measured, missed=ARCSECOND * np.array([[1.0, 2.0, 0.5], [0, 0, 0], [0, 0, 0]]))
     known = replace(measured, measured=missed)
@@ -379,6 +384,7 @@ def test_a_limit_is_in_doubt_where_what_the_turns_miss_reaches_beyond_it(measure
         assert any("reach beyond the limit" in each for each in warnings(asked)) == (word == "in doubt")
 
 
+@pytest.mark.slow
 def test_measured_parts_that_miss_limits_are_told_what_keeps_them(measured):
     asked = limited(measured, 0.01)
     keeping = replace(asked, measured=replace(asked.measured, keeping=446.68))
@@ -388,6 +394,7 @@ def test_measured_parts_that_miss_limits_are_told_what_keeps_them(measured):
     assert summary(keeping)["measured"]["smallest precision tried that keeps all limits [-]"] == 446.68
 
 
+@pytest.mark.slow
 def test_an_output_that_rises_is_warned_of_with_a_reason(measured):
     (warning,) = [each for each in warnings(replace(measured, transmission=effect(1))) if "N·m" in each]
     assert warning.startswith(
@@ -398,6 +405,7 @@ def test_an_output_that_rises_is_warned_of_with_a_reason(measured):
     assert "one carries alone" in text(replace(measured, transmission=effect(1)), "Transmission")
 
 
+@pytest.mark.slow
 def test_an_output_that_falls_is_not_warned_of(measured):
     fallen = replace(effect(1), values=effect(1).values[[1, 0]])
     found = warnings(replace(measured, transmission=fallen))
@@ -449,6 +457,7 @@ def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
     )
 
 
+@pytest.mark.slow
 def test_turns_of_measured_parts_come_from_the_file(measured, expected):
     assert "measure" not in tables.step_table(measured) and "measure" in tables.step_table(expected)
     heading = "How errors build up and are adjusted"
@@ -496,6 +505,7 @@ def test_costs_that_are_no_reciprocals_keep_their_scale(plan):
     assert part["cost factor [cost units]"] == [7, 7, 7] and part["cost scale [arcsec]"] == [20, 20, 20]
 
 
+@pytest.mark.slow
 def test_digits_that_mean_nothing_are_cut(measured, expected):
     frame = tables.rounded(pd.DataFrame({"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}))
     assert list(map(repr, frame["x"].tolist())) == ["0.0", "0.0", "14.0", "0.0"]
@@ -541,6 +551,7 @@ def test_differences_from_perfect_parts_are_in_percent():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 10])
 def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured, samples):
     document = replace(measured if samples == 1 else expected, transmission=effect(samples)).document
@@ -554,6 +565,7 @@ def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured,
     json.dumps(document.summary, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_only_pins_that_carry_are_shown(measured):
     figure = transmission.pressure_map(effect(1), 5.0)
     assert list(figure.rows) == ["Q = 0, pin 2", "Q = 0, pin 3", "Q = 5, pin 2", "Q = 5, pin 3"]
@@ -569,6 +581,7 @@ def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
     assert "the base is rigid" in document.assumptions
 
 
+@pytest.mark.slow
 def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, expected):
     exactly = (
         "all parts are measured before the first is mounted, exactly, and turned as listed, without measuring again"
@@ -588,6 +601,7 @@ def test_a_single_angle_that_rises_is_counted(plan):
     assert f"Larger adjusted than unadjusted: {rose} of 9, " in paragraphs
 
 
+@pytest.mark.slow
 def test_finite_rotations_are_compared(measured):
     apart = summary(measured)["measured"]["largest difference by finite rotations [arcsec]"]
     assert 0 < apart < 0.1  # products of angles of some 70″

@@ -68,6 +68,7 @@ def test_agrees_with_radau(rv20e, table4):
             assert (np.abs(state[0] - expected[:, derivative]) <= (1e-6, 2e-5)[derivative] * largest).all()
 
 
+@pytest.mark.slow
 def test_approaches_the_static_model_as_the_speed_falls(rv20e, table4):
     apart = []
     for minutes in (1.0, 4.0, 20.0):  # of one output turn
@@ -214,6 +215,7 @@ def test_a_failed_sample_is_a_status_and_never_a_number(rv20e, table4):
     assert ((floating.status == Status.CONVERGED) == np.isfinite(floating.transmission_error)).all()
 
 
+@pytest.mark.slow
 def test_damping_of_one_interface_acts_there_alone(rv20e, table4):
     """An oscillation decays under damped meshes; the same factor on all interfaces is that on each of them."""
     torque = SpeedProfile((0.0, 1e-9), (-500.0, -505.0))

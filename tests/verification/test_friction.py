@@ -185,6 +185,7 @@ def test_lost_motion_of_units_of_the_baseline_drawing():
     assert 0.88 < efficiency.max() < 0.92
 
 
+@pytest.mark.slow
 def test_outputs_with_friction_can_be_limited_where_dimensions_are_known():
     limits = {name: ta.Limit(upper=90.0) for name in (ta.EFFICIENCY, ta.LOST_MOTION_WITH_FRICTION, ta.HYSTERESIS_LOSS)}
     names = tuple(limits)

@@ -99,6 +99,7 @@ def test_every_choice_has_round_amounts_and_clearances_inside_their_range(prepar
         assert np.all(design.design[-2:] <= shared.upper + 1e-6)
 
 
+@pytest.mark.slow
 def test_cost_is_that_of_the_zones_and_not_below_the_bound(prepared, found):
     zones = zones_of(found, found.chosen.design)
     own = sum(source.cost * source.zone / zones[source.name] for source in prepared.space.errors.active)
@@ -108,6 +109,7 @@ def test_cost_is_that_of_the_zones_and_not_below_the_bound(prepared, found):
     assert found.solution.bound <= found.solution.cost * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_met_is_what_the_fresh_units_show(found):
     assert found.chosen.met
     for design in found.tried:
@@ -115,6 +117,7 @@ def test_met_is_what_the_fresh_units_show(found):
     assert found.chosen.cost == min(design.cost for design in found.tried[1:] if design.met)
 
 
+@pytest.mark.slow
 def test_no_more_choices_are_verified_than_asked_for_and_none_twice(found):
     designs = [tuple(np.round(design.design, 6)) for design in found.tried[1:]]
     assert 1 <= len(designs) <= 4

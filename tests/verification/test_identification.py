@@ -75,6 +75,7 @@ def test_derivatives_of_every_kind_of_reading_agree_with_differences():
             assert np.median(np.abs(own - expected)) < allowed, (item.name, block)
 
 
+@pytest.mark.slow
 def test_curves_and_loops_lose_their_mean_and_peak_to_peaks_do_not():
     measured = simulated_bench(RV20E, random_units(ERRORS, 2, SeedTree(3)), bench()).measurements
     data = data_of(measured, "test")
@@ -247,6 +248,7 @@ def test_a_stand_in_is_moved_onto_the_model():
     np.testing.assert_allclose(moved.values(at[np.newaxis])[0], model.values)
 
 
+@pytest.mark.slow
 def test_bootstrap_spreads_as_least_squares_says():
     """With 40 units the bootstrap's standard deviation is within 40 % of the first-order one."""
     problem = straight_problem(40)

@@ -126,6 +126,7 @@ def test_capability_refuses_it(at, generator):
             call()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [0, 150, 500, 1200])
 def test_subset_simulation_counts_it_as_safe_and_cautions(at):
     found = [subset_simulation(limit_state((at,), kind), SEEDS, samples=500, runs=2) for kind in KINDS]

@@ -143,6 +143,7 @@ def independent_blocks(weights: np.ndarray, blocks: int, seed: int) -> SobolAnal
     )
 
 
+@pytest.mark.slow
 def test_90_percent_intervals_hold_the_closed_form_as_often_as_they_say():
     """Four standard errors of a share of 90 % over 200 repetitions are 8.5 %."""
     held, amplitudes = [], AMPLITUDES[:, :3]

@@ -96,6 +96,7 @@ def test_curves_over_the_turn_have_the_largest_values_of_the_response(response, 
     assert (width <= refined + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_a_sample_keeps_its_bits_in_other_company(response):
     uniform = next(SeedTree(4).uniform_chunks(70, len(response.columns)))
     x, quick = (2 * uniform - 1) * 60 * ARCSECOND, replace(response, readings=response.readings[1:])

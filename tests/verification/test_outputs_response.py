@@ -35,6 +35,7 @@ def response(prepared):
     return OutputsResponse(kernel=prepared.model.kernel, readings=(*REQUIREMENTS, orders_reading(ORDERS)))
 
 
+@pytest.mark.slow
 def test_every_output_is_that_of_its_own_function(prepared, response, x):
     kernel, found = prepared.model.kernel, response(x)
     assert found.good.all()

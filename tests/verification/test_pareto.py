@@ -56,6 +56,7 @@ def test_the_closed_form_is_what_the_convex_program_proves(stack, budget):
     assert proven.cost == pytest.approx(stack.cost_bound(budget), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_seeded_front_has_the_volume_of_the_exact_one_and_never_beats_its_certificate(stack, exact, seed):
     known = exact[spread_over(50, 8)]
@@ -67,6 +68,7 @@ def test_a_seeded_front_has_the_volume_of_the_exact_one_and_never_beats_its_cert
     assert cheaper_than_certified(stack, front.losses) < 1e-9
 
 
+@pytest.mark.slow
 def test_an_unseeded_front_comes_near_the_exact_one_from_above(stack, exact):
     found = search(stack, exact[:0], SeedTree(0), POPULATION, 100)
     assert 0.97 < hypervolume_ratio(found.front(POPULATION).losses, stack(exact).values) < 1.0
@@ -80,6 +82,7 @@ def test_an_unseeded_front_comes_near_the_exact_one_from_above(stack, exact):
     assert hypervolume_ratio(found.front(every).losses, early.front(every).losses) >= 1.0
 
 
+@pytest.mark.slow
 def test_on_ladders_the_front_is_that_of_all_combinations():
     stack = stack_problem(features=8, on_ladder=8)
     everything = stack(np.array(list(itertools.product(range(4), repeat=8)), dtype=float)).values
@@ -127,6 +130,7 @@ class Sphere:
         return Objectives(values=values, violation=np.column_stack([short, short - 1]), status=status)
 
 
+@pytest.mark.slow
 def test_three_objectives_reach_the_sphere_and_cover_it():
     found = search(Sphere(), np.empty((0, 6)), SeedTree(0), 92, 80)
     front = found.front(92)

@@ -76,6 +76,7 @@ def test_a_search_interrupted_at_generation_7_ends_with_the_bits_of_an_uninterru
     assert [path.name for path in tmp_path.iterdir()] == ["front.npz"]
 
 
+@pytest.mark.slow
 def test_a_search_resumed_in_another_process_has_the_same_bits(tmp_path, stack):
     whole = search(stack, np.empty((0, 12)), SeedTree(0), *SMALL)
     interrupt(stack, tmp_path / "front.npz")

@@ -152,6 +152,7 @@ def test_on_the_kernel_ladders_and_a_third_objective_hold(prepared, quantile):
     assert 0 <= front.knee < front.cost.size
 
 
+@pytest.mark.slow
 def test_too_many_failed_designs_on_the_kernel_stop_the_search(prepared, quantile, monkeypatch):
     answer = QuantileResponse.__call__
 

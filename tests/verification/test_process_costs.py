@@ -162,6 +162,7 @@ def test_the_cost_of_the_tolerance_table_is_that_of_its_process_alone(tmp_path):
     assert float(named[1].total(np.asarray(PITCH.zone))) == pytest.approx(PITCH.cost, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_fitted_row_takes_the_form_that_predicts_the_points(tmp_path):
     tolerances = np.geomspace(4, 40, 8)
     lines = [f"hobbed,{zone!r},µm,{1 + 20 / zone!r}" for zone in tolerances.tolist()]

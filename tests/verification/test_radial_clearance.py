@@ -96,6 +96,7 @@ def test_an_error_that_is_no_number_is_a_status(prepared):
     assert values[0, 0] == pytest.approx(prepared.model.reducer.modification.radial_clearance / MICROMETRE)
 
 
+@pytest.mark.slow
 def test_line_load_and_pressure_are_those_of_the_most_loaded_pin(prepared, generator):
     kernel, stage = prepared.model.kernel, prepared.model.reducer.cycloid_stage
     x = generator.normal(0.0, 0.5e-6, (3, len(kernel.columns)))

@@ -110,6 +110,7 @@ def answer() -> RankingAnswer:
     return ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)})
 
 
+@pytest.mark.slow
 def test_the_answer_speaks_of_the_outputs_by_name_and_unit(answer):
     text = " ".join((answer.title, answer.subtitle, *answer.sentences))
     assert "What drives a chain: links" in text
@@ -145,6 +146,7 @@ def test_a_lower_limit_is_an_upper_one_of_the_output_with_its_sign_turned(answer
     assert turned.inverse.low[1] <= 0.05 / 0.0548 <= turned.inverse.high[1]
 
 
+@pytest.mark.slow
 def test_two_limits_count_the_units_beyond_either():
     both = ranked({GAP: Limits(lower=0.98, upper=1.02)})
     values = both.sample.evaluation.values[:, 0]

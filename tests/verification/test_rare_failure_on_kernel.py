@@ -144,6 +144,7 @@ def test_widened_sampling_states_its_own_spread():
     assert 0.7 < error.std() < 1.4
 
 
+@pytest.mark.slow
 def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
     limit = limited(Sum, ErrorModel((source("s", distribution=Distribution.UNIFORM),)), 3.5)
     found = yield_at_limit(limit, units_of(limit, 0, 5000), samples=200, runs=2)

@@ -82,6 +82,7 @@ def test_means_converge_within_their_standard_error(design):
         assert spread < 0.35
 
 
+@pytest.mark.slow
 def test_the_spread_of_latin_hypercube_chunks_gives_an_honest_standard_error():
     """Each chunk's mean is independent of the others: 16 of them cover the mean as Student's t says."""
     means = answer(chunks(LATIN, 3, 16 * 200 * CHUNK)).reshape(200, 16, CHUNK).mean(axis=2)

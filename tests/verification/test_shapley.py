@@ -189,6 +189,7 @@ def test_a_failed_sample_drops_its_permutation_and_too_many_stop_the_analysis():
         shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 1)
 
 
+@pytest.mark.slow
 def test_intervals_cover_and_ranks_agree():
     """The 90 % intervals of 100 repetitions: 82 to 97 % is four standard errors and the bootstrap's own shortfall."""
     errors = model(PAIRS)

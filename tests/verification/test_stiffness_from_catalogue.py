@@ -20,6 +20,7 @@ def found():
     return identify_from_catalogue(load_reducer("rv20e"))
 
 
+@pytest.mark.slow
 def test_the_factor_gives_the_rigidity_of_the_catalogue(found):
     rigidity = exact_loop(with_bearings(load_reducer("rv20e"), found.factor)).torsional_stiffness[0]
     assert rigidity * ARCMINUTE == pytest.approx(49.0, rel=1e-8)

@@ -285,6 +285,7 @@ def test_contact_at_fewer_angles_passes_and_more_angles_miss_less(kernel, units)
     assert (fitted.response(answers.x).values[:, 0] <= answers.y + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_contact_at_fewer_angles_holds_at_other_zones_than_it_was_fitted_at(kernel, errors, units):
     fitted = ContactCandidate(kernel=kernel, angles=936).fit(units, kernel(units).values[:, 0])
     smaller = errors.deviations(errors.standard_values(next(SeedTree(6).uniform_chunks(100, 60))), errors.zones / 2)

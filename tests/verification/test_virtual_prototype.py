@@ -230,6 +230,7 @@ def test_errors_of_parts_act_as_in_the_equivalent_model(rigid, errors, gears):
     assert np.abs(answer.transmission_error[late] - error).max() < 0.05 * ARCSECOND
 
 
+@pytest.mark.slow
 def test_contacts_take_exact_distances(rigid):
     mesh, stage = mesh_of(rigid, part_errors(rigid, {})), rigid.cycloid_stage
     profile, contact = ToothProfile(stage=stage, modification=rigid.modification), np.empty((40, 6))

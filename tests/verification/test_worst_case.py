@@ -177,6 +177,7 @@ def test_its_change_with_the_zones_is_that_of_other_searches(kernel, errors, wor
     assert worst.by_zone @ errors.zones == pytest.approx((wide - narrow) / 0.4, rel=0.03)
 
 
+@pytest.mark.slow
 def test_it_is_the_same_again_and_for_seed_zero(kernel, errors):
     found = [worst_unit(Experiment.of(kernel, errors, SEEDS), starts=4, steps=4) for _ in range(2)]
     np.testing.assert_array_equal(found[0].x, found[1].x)

@@ -171,50 +171,38 @@ def _clear(derivative, s, value):
 
 
 @jit
-def _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position, step, memory, derivative):
-    _clear(derivative, s, 0.0)
-    if not np.isfinite(position[s]).all():
-        _clear(derivative, s, np.nan)
-        return
-    values, q = np.empty((1, layout.end)), np.empty(tables.load.shape[2])
-    values_of(errors[s : s + 1], torque, layout, mapped, values)
-    memory[2].first[:] = -1
-    for extreme in range(2):
-        sign = 1.0 - 2.0 * extreme
-        before, behind = position[s, extreme] - 2.0 * step, position[s, extreme] + 2.0 * step
-        rise = max(sign * _slope(before, step, tables, layout, design, values[0], memory, q), 0.0)
-        fall = max(-sign * _slope(behind, step, tables, layout, design, values[0], memory, q), 0.0)
-        share = rise / (rise + fall) if rise + fall > 0.0 else 0.5
-        for at, factor in ((before, sign * (1.0 - share)), (behind, sign * share)):
-            outcome = _add_derivative(at, factor, tables, layout, design, values[0], memory, derivative, s)
-            derivative.status[s] = max(derivative.status[s], outcome)
-
-
-@jit
-def _of_rotation(s, tables, layout, mapped, design, errors, torque, position, memory, derivative):
-    values = np.empty((1, layout.end))
-    _clear(derivative, s, 0.0)
-    derivative.status[s] = NOT_FINITE
-    sample, angle = s // position.size, s % position.size
-    if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
-        memory[2].first[:] = -1
-        derivative.status[s] = _add_derivative(
-            position[angle], 1.0, tables, layout, design, values[0], memory, derivative, s
-        )
-
-
-@jit
 def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, position, step, derivative):
     memory = make_memory(design.law, tables)
+    values, q = np.empty((1, layout.end)), np.empty(tables.load.shape[2])
     for s in range(first, last):
-        _of_peak_to_peak(s, tables, layout, mapped, design, errors, torque, position, step, memory, derivative)
+        if not np.isfinite(position[s]).all():
+            _clear(derivative, s, np.nan)
+            continue
+        _clear(derivative, s, 0.0)
+        values_of(errors[s : s + 1], torque, layout, mapped, values)
+        memory[2].first[:] = -1
+        for extreme in range(2):
+            sign = 1.0 - 2.0 * extreme
+            before, behind = position[s, extreme] - 2.0 * step, position[s, extreme] + 2.0 * step
+            rise = max(sign * _slope(before, step, tables, layout, design, values[0], memory, q), 0.0)
+            fall = max(-sign * _slope(behind, step, tables, layout, design, values[0], memory, q), 0.0)
+            share = rise / (rise + fall) if rise + fall > 0.0 else 0.5
+            for at, factor in ((before, sign * (1.0 - share)), (behind, sign * share)):
+                outcome = _add_derivative(at, factor, tables, layout, design, values[0], memory, derivative, s)
+                derivative.status[s] = max(derivative.status[s], outcome)
 
 
 @jit
 def _rotations(first, last, tables, layout, mapped, design, errors, torque, position, derivative):
-    memory = make_memory(design.law, tables)
+    memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
     for s in range(first, last):
-        _of_rotation(s, tables, layout, mapped, design, errors, torque, position, memory, derivative)
+        sample, angle = s // position.size, s % position.size
+        _clear(derivative, s, 0.0)
+        derivative.status[s] = NOT_FINITE
+        if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
+            memory[2].first[:] = -1
+            at = position[angle]
+            derivative.status[s] = _add_derivative(at, 1.0, tables, layout, design, values[0], memory, derivative, s)
 
 
 def solve_peak_to_peak_derivatives(tables, layout, mapped, design, errors, torque, position, step, derivative):
