@@ -157,7 +157,7 @@ def test_grades_of_a_model_without_settings(study):
     assert found.met
     assert all(source.grade for source in found.drawing.sources)
     assert found.cost >= published()["total"]
-    assert str(found).startswith("The cheapest drawing of contact angle")
+    assert str(found).startswith("The cheapest verified drawing of contact angle")
 
 
 def test_what_a_function_takes_and_returns_is_checked(study):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import kurtosis, norm
+from scipy.stats import kurtosis, norm, skew
 
 from tests.prepared import prepared as baseline
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
@@ -52,10 +52,10 @@ def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int =
 class KnownTrial(OutputTrial):
     """A trial whose values are known."""
 
-    design, groups, failed = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0
+    design, groups, failed, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95
 
-    def __init__(self, values, failed=0):
-        vars(self).update(values=values, failed=failed, output="x [mm]")
+    def __init__(self, values, failed=0, confidence=0.95):
+        vars(self).update(values=values, failed=failed, output="x [mm]", confidence=confidence)
 
     def derived(self):
         return self.values, np.outer(self.values, [1.0, 0.0, 0.0, 0.0]) / self.design[0]
@@ -159,6 +159,27 @@ def test_a_cpk_of_a_normal_sample_has_bissells_bound():
     for side in sides:
         needed = (side.sign * (side.value - values.mean())) / (3 * values.std(ddof=1))
         assert needed - 1 == pytest.approx(norm.ppf(0.95) * np.sqrt((1 / 9 + needed**2 / 2) / values.size), rel=0.05)
+
+
+def test_the_bound_of_a_cpk_knows_which_way_a_sample_leans():
+    """(c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4) with the skewness towards each limit."""
+    values, target = np.random.default_rng(6).gumbel(size=3000), 1.1
+    for side in AtCpk(target=target).judge(KnownTrial(values), Limits(lower=-40.0, upper=40.0)):
+        turned = side.sign * values
+        needed = (side.sign * side.value - turned.mean()) / (3 * values.std(ddof=1))
+        variance = 1 / 9 + needed * skew(turned) / 3 + needed**2 * (kurtosis(values, fisher=False) - 1) / 4
+        assert (needed - target) * np.sqrt(values.size / variance) == pytest.approx(norm.ppf(0.95), rel=1e-9)
+
+
+def test_at_even_odds_a_guarantee_is_that_of_the_sample_itself():
+    values, target = np.random.default_rng(7).standard_normal(1152), 0.9973
+    (shown,) = AtYield(target=target).judge(KnownTrial(values, confidence=0.95), Limits(upper=3.0))
+    (even,) = AtYield(target=target).judge(KnownTrial(values, confidence=0.5), Limits(upper=3.0))
+    assert shown.value == values.max()  # none of 1,152 may lie beyond
+    assert even.value == np.sort(values)[-3]  # 3.1 of 1,152 do so on average
+    (cpk,) = AtCpk(target=1.2).judge(KnownTrial(values, confidence=0.5), Limits(upper=3.0))
+    assert cpk.value == pytest.approx(values.mean() + 3.6 * values.std(ddof=1), rel=1e-12)
+    assert cpk.standard_error > 0
 
 
 def test_a_worst_case_adds_and_a_lower_limit_turns_it():

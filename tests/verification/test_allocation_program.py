@@ -168,6 +168,15 @@ def test_any_prices_and_directions_bound_the_best_cost(kind, generator):
     assert cost_bound(problem, np.zeros(len(problem.stacks)), generator.random(4)) <= least * (1 + 1e-10)
 
 
+def test_a_shared_variable_is_priced_at_its_cheaper_end():
+    dual = LagrangeDual(random_problem(4, features=2, shared=3, stacks=2))
+    prices, box = np.array([0.7, 1.9]), dual.problem.shared
+    found = dual.price(prices, dual.planes(np.ones(2)))
+    slope = prices @ np.array([stack.slopes for stack in dual.problem.stacks])
+    corners = np.array(list(product(*zip(box.lower, box.upper, strict=True))))
+    assert slope @ found.shared == (corners @ slope).min() < (corners @ slope).max()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_random_design_is_cheaper_than_the_bound(kind, generator):
     problem = random_problem(3, **KINDS[kind], tightness=0.6)

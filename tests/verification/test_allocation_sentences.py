@@ -35,6 +35,7 @@ SMALL = replace(
     changed_costs=3,
     share_blocks=8,
     yields=(0.8, 0.95, 0.9999),
+    confidence=0.95,
 )
 
 
@@ -87,35 +88,38 @@ def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
 
 def test_the_certificate_says_what_the_dual_bound_says(results):
     joint = results.free
-    sentence = said(results, "Certified: by the local models")
-    assert f"that keep the limits cost less than {joint.bound:.2f}; it costs {joint.gap:.1%} more" in sentence
+    sentence = said(results, "By the local models around the verified design")
+    assert f"that keep the limits cost less than {joint.bound:.2f}, as far as these models hold;" in sentence
+    assert f"it costs {joint.gap:.1%} more" in sentence
     points = 100 * (joint.inside.cost - joint.optimum.cost) / joint.bound
     assert points > 0.1
     assert f"{points:.1f} points of that for the margin of one standard error" in sentence
     at_once = replace(results, free=replace(joint, inside=joint.optimum))
-    assert "margin" not in said(at_once, "Certified")
+    assert "margin" not in said(at_once, "By the local models")
     graded = said(results, "On grades")
     assert f"that keeps the limits costs less than {results.graded.bound:.2f}." in graded
 
 
 def test_nothing_is_certified_of_a_miss(results):
     graded = missing(results.graded)
-    lost = replace(results, free=missing(results.free), graded=graded)
+    lost = replace(results, fixed=missing(results.fixed), free=missing(results.free), graded=graded)
     sentences = lost.sentences
-    assert lost.summary["certified bound [cost units]"] is None
-    assert not [own for own in sentences if "Certified" in own or "costs less than" in own or "at the rate of" in own]
+    assert lost.summary["bound by the local models [cost units]"] is None
+    assert not [
+        own for own in sentences if "By the local models" in own or "costs less than" in own or "at the rate of" in own
+    ]
     assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
 
 
 def test_the_certificate_table_has_both_rooms(results):
     table = optimality_tables.certificate_table(results).set_index("search")
     row, joint = table.loc["tolerances and modification"], results.free
-    assert row["certified bound, at the limits [cost units]"] == joint.bound
-    assert row["certified bound, inside [cost units]"] == joint.inside.bound + joint.locked_cost
-    assert row["certified bound, inside [cost units]"] > row["certified bound, at the limits [cost units]"]
+    assert row["bound by the models, at the limits [cost units]"] == joint.bound
+    assert row["bound by the models, inside [cost units]"] == joint.inside.bound + joint.locked_cost
+    assert row["bound by the models, inside [cost units]"] > row["bound by the models, at the limits [cost units]"]
     assert row["cheapest of the models, inside [cost units]"] <= row["verified cost [cost units]"]
     assert 0 < row["of that for the margin [%]"] <= row["verified cost above the bound at the limits [%]"]
-    assert np.isnan(table.loc["grades", "certified bound, inside [cost units]"])
+    assert np.isnan(table.loc["grades", "bound by the models, inside [cost units]"])
 
 
 def test_the_modification_saves_only_what_the_searches_can_tell(results):
@@ -123,10 +127,10 @@ def test_the_modification_saves_only_what_the_searches_can_tell(results):
     cost = joint.chosen.cost
     plain = replace(results, free=costing(results.free, results.free.bound), fixed=costing(results.fixed, 1e3 * cost))
     tight = replace(plain, fixed=replace(plain.fixed, optimum=replace(plain.fixed.optimum, bound=1e3 * cost)))
-    assert "certified" not in said(tight, "The modification saves")
+    assert "bound of its models" not in said(tight, "The modification saves")
     small = replace(results, free=joint, fixed=costing(results.fixed, 1.1 * cost))
     sentence = said(small, f"The modification saves {0.1 * cost:.2f} cost units (9.1%)")
-    assert f"ended {small.fixed.gap:.1%} above its own certified bound, so up to that much of it may" in sentence
+    assert f"ended {small.fixed.gap:.1%} above the bound of its models, so up to that much of it may" in sentence
     for factor in (1.0, 0.9):
         same = replace(results, free=joint, fixed=costing(results.fixed, factor * cost))
         assert "Nothing cheaper was found with the modification free" in " ".join(same.sentences)

@@ -139,6 +139,13 @@ def true_pawn(share: float) -> float:
     return float(np.median(np.abs(given - norm.cdf(y)).max(axis=1)))
 
 
+def test_pawn_is_the_median_distance_of_the_classes():
+    sample, errors = normal_sum(0.6, 0, 2048)
+    found = moment_independent(sample, errors, SeedTree(0).child("m"), resamples=2, dummies=2)
+    within = 4 * 0.4 * 0.5 / np.sqrt(205) + 0.02
+    np.testing.assert_allclose(found.pawn[:2], [true_pawn(0.6), true_pawn(0.4)], atol=within)
+
+
 @pytest.mark.slow
 def test_pawn_and_delta_of_a_normal_sum():
     """Within 4 standard errors, and 0.02 that the kernel density (delta) and the maximum over noise (PAWN) add.

@@ -122,6 +122,9 @@ class AllocationEffort:
         Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
     yields
         Yield targets among which the cheapest good unit is looked for [-].
+    confidence
+        One-sided confidence with which fresh units must show a guarantee; at one half, even odds, small samples aim at
+        the limit itself instead of buying a margin [-].
 
     Raises
     ------
@@ -140,6 +143,7 @@ class AllocationEffort:
     stiffness_units: int = 2048
     share_blocks: int = 256
     yields: tuple[float, ...] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
+    confidence: float = 0.95
 
     def __post_init__(self) -> None:
         _require_enough(self, "")
@@ -154,6 +158,8 @@ class AllocationEffort:
         blocks = self.share_blocks
         if blocks < 2 or blocks & (blocks - 1):
             raise InputError.at("study", "effort.allocation.share_blocks", blocks, "a power of two, 2 or more")
+        if not 0.5 <= self.confidence < 1:
+            raise InputError.at("study", "effort.allocation.confidence", self.confidence, "a share from 0.5 to below 1")
         if not self.yields or not all(0 < target < 1 for target in self.yields):
             raise InputError.at("study", "effort.allocation.yields", self.yields, "one share or more between 0 and 1")
 
@@ -173,5 +179,6 @@ QUICK_ALLOCATION = AllocationEffort(
     stiffness_units=1152,
     share_blocks=32,
     yields=(0.7, 0.8, 0.9, 0.95, 0.99, 0.9973),
+    confidence=0.5,
 )
 """Effort of a quick run: every stage is real, every interval wide."""

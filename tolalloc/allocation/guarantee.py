@@ -33,14 +33,14 @@ class Guarantee(Protocol):
         """Return every limited side; the requirement is met if no value lies beyond its limit."""
         ...
 
-    def require_enough(self, units: int) -> None:
-        """Raise unless so many units can show it."""
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
+        """Raise unless so many units can show it with a one-sided confidence."""
         ...
 
 
 @dataclass(frozen=True)
 class AtYield(NamedFields):
-    """So many units lie within all limits of the output, shown with one-sided 95 % confidence.
+    """So many units lie within all limits of the output, shown with one-sided confidence, 95 % in a full run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class AtYield(NamedFields):
         """What must be shown, in words."""
         return f"{self.target:.2%} of units"
 
-    def require_enough(self, units: int) -> None:
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Raise unless so many units can show it.
 
         Raises
@@ -77,14 +77,14 @@ class AtYield(NamedFields):
         InputError
             Too few units for the target, even if none is rejected.
         """
-        if allowed_rejections(units, self.target) < 0:
-            needed = int(np.ceil(np.log(1 - CONFIDENCE) / np.log(self.target)))
+        if allowed_rejections(units, self.target, confidence) < 0:
+            needed = int(np.ceil(np.log(1 - confidence) / np.log(self.target)))
             raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
         units = trial.values.size + trial.failed
-        allowed = allowed_rejections(units, self.target) - trial.failed
+        allowed = allowed_rejections(units, self.target, trial.confidence) - trial.failed
         left_out = _shared_out(np.sort(trial.values), limits, max(allowed, 0))
         return tuple(self._side(trial, sign, limit, left_out[sign], allowed >= 0) for sign, limit in _turned(limits))
 
@@ -103,7 +103,7 @@ class AtYield(NamedFields):
 
 @dataclass(frozen=True)
 class AtCpk(NamedFields):
-    """The capability index of the output reaches a target, shown with one-sided 95 % confidence.
+    """The capability index of the output reaches a target, shown with one-sided confidence, 95 % in a full run.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class AtCpk(NamedFields):
         """What must be shown, in words."""
         return f"Cpk {self.target:g}"
 
-    def require_enough(self, units: int) -> None:
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:  # noqa: ARG002
         """Raise unless so many units can show it.
 
         Raises
@@ -153,7 +153,7 @@ class AtCpk(NamedFields):
 
     def _side(self, trial: OutputTrial, sign: int, limit: float) -> Side:
         turned = sign * trial.values
-        needed, error = self._needed(turned)
+        needed, error = self._needed(turned, trial.confidence)
         deviation = float(turned.std(ddof=1))
         value = float(turned.mean()) + 3 * needed * deviation
         return Side(
@@ -165,16 +165,19 @@ class AtCpk(NamedFields):
             stack=_root_sum_square(trial, sign, limit, value),
         )
 
-    def _needed(self, turned: Float[np.ndarray, " unit"]) -> tuple[float, float]:
+    def _needed(self, turned: Float[np.ndarray, " unit"], confidence: float) -> tuple[float, float]:
         """Return the estimate whose lower bound is the target, and its standard error [-]."""
         from scipy.stats import kurtosis, norm, skew
 
-        z, units = float(norm.ppf(CONFIDENCE)), turned.size
+        z, units = float(norm.ppf(confidence)), turned.size
         lean, tails = float(skew(turned)), float(kurtosis(turned, fisher=False)) - 1
         # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root.
         square, half = units - z**2 * tails / 4, units * self.target + z**2 * lean / 6
-        needed = (half + np.sqrt(half**2 - square * (units * self.target**2 - z**2 / 9))) / square
-        return float(needed), float(needed - self.target) / z
+        # At even odds both roots are the target, up to rounding.
+        root = np.sqrt(max(half**2 - square * (units * self.target**2 - z**2 / 9), 0.0))
+        needed = (half + root) / square
+        variance = (1 / 9 + needed * lean / 3 + needed**2 * tails / 4) / units
+        return float(needed), float(np.sqrt(variance))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +189,7 @@ class WorstCase:
         """What must be shown, in words."""
         return "worst case found"
 
-    def require_enough(self, units: int) -> None:
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Accept every number of units; none is asked."""
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
@@ -224,7 +227,7 @@ class RootSumSquare:
         """What must be shown, in words."""
         return "root-sum-square"
 
-    def require_enough(self, units: int) -> None:
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Accept every number of units; none is asked."""
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:

@@ -15,7 +15,7 @@ from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
 
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 """Distance from a bound, over the bound, up to which it is rounding [-]."""
 
 
@@ -155,9 +155,7 @@ def allocate(
     """
     first, space = start or answer(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
-    is_allowed = np.all(
-        (first.design >= space.lower * (1 - _ROUNDING)) & (first.design <= space.upper * (1 + _ROUNDING))
-    )
+    is_allowed = np.all((first.design >= space.lower * (1 - ROUNDING)) & (first.design <= space.upper * (1 + ROUNDING)))
     tried = ((first,) if is_allowed else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
     chosen = answer(tried)
     return ZoneAllocation(

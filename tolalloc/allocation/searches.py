@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.candidates import Candidates
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
@@ -22,7 +23,7 @@ from tolalloc.allocation.robustness import Robustness, robustness
 from tolalloc.allocation.search import ZoneAllocation, allocate, require_groups
 from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.trust_region import kept_stacks
-from tolalloc.allocation.verification import Verifier
+from tolalloc.allocation.verification import Verifier, answer
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import Experiment
@@ -88,7 +89,7 @@ class DrawingQuestion:
         for requirement in self.requirements:
             for name, units in asked.items():
                 try:
-                    requirement.guarantee.require_enough(units)
+                    requirement.guarantee.require_enough(units, self.effort.confidence)
                 except InputError as error:
                     raise InputError(f"{self.place}, effort.{name} for {requirement.output}, {error}") from None
 
@@ -103,6 +104,7 @@ class DrawingQuestion:
             seeds=direct if search == "direct" else self.seeds("verification").child(search),
             units=self.effort.verification_units,
             largest_failed_share=self.largest_failed_share,
+            confidence=self.effort.confidence,
         )
 
     def quantile(self, spread: float) -> QuantileResponse:
@@ -131,9 +133,21 @@ class DrawingQuestion:
         """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
         return allocate(self.verifier("joint", self.space), fixed.proportional_tried, self.effort.search, fixed.chosen)
 
-    def graded(self, free: ZoneAllocation) -> GradedAllocation:
-        """Return the allocation on ladders of zones."""
-        return allocate_grades(self.verifier("graded", self.space), free.chosen, self.effort.graded_steps)
+    def graded(self, free: ZoneAllocation, fixed: ZoneAllocation | None) -> GradedAllocation:
+        """Return the cheaper allocation on ladders of zones, with the settings free or as they are."""
+        steps = self.effort.graded_steps
+        found = [allocate_grades(self.verifier("graded", self.space), free.chosen, steps)]
+        if fixed:
+            found.append(allocate_grades(self.verifier("graded alone", self.space.fixed), fixed.chosen, steps))
+        best = answer(tuple(own.chosen for own in found))
+        return next(own for own in found if own.chosen is best)
+
+    def beside_grades(self, free: ZoneAllocation, graded: GradedAllocation) -> ZoneAllocation:
+        """Return the allocation of free zones, looked for again from grades that are cheaper: they are such zones."""
+        if not graded.chosen.met or (free.chosen.met and free.chosen.cost <= graded.chosen.cost):
+            return free
+        verifier = self.verifier("beside grades", self.space)
+        return allocate(verifier, free.proportional_tried, self.effort.search, graded.chosen)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -237,7 +251,8 @@ def allocate_drawing(
                 free = question.direct()
         if question.grades:
             with record.stage("grades"):
-                graded = question.graded(free)
+                graded = question.graded(free, fixed)
+                free = question.beside_grades(free, graded)
         if question.what_if:
             with record.stage("modification trade"):
                 trade = question.trade(free)
@@ -251,7 +266,7 @@ def allocate_drawing(
             with record.stage("robustness"):
                 robust = question.robustness(free)
         with record.stage("shares of variance"):
-            chosen = (graded or free).chosen
+            chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
             shares = question.shares(chosen.space, chosen.design)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationAnswer(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.monte_carlo import MonteCarlo
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import DifferencedResponse
 from tolalloc.drawings.seeds import SeedTree
@@ -179,6 +179,7 @@ class OutputTrial:
 
     units: FreshUnits  # The units
     output: str  # Name of the output with its unit
+    confidence: float = CONFIDENCE  # With which a guarantee must be shown, one-sided; one half is even odds [-]
 
     @property
     def design(self) -> Float[np.ndarray, " variable"]:

@@ -12,7 +12,7 @@ from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits, OutputTrial
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.capability.monte_carlo import MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, proportion, require_few_failures
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model
 
@@ -90,10 +90,11 @@ class Verifier:
     units: int  # Units per verification [-]
     slope_units: int = 1024  # How many of them derivatives that the model does not know exactly are averaged over [-]
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
+    confidence: float = CONFIDENCE  # With which guarantees must be shown, one-sided [-]
 
     def __post_init__(self) -> None:
         for requirement in self.requirements:
-            requirement.guarantee.require_enough(self.units)
+            requirement.guarantee.require_enough(self.units, self.confidence)
 
     @property
     def limit(self) -> float:
@@ -123,7 +124,8 @@ class Verifier:
         for sample in fresh.samples:
             require_few_failures(sample, name, self.largest_failed_share)
         checks = tuple(
-            requirement.check(OutputTrial(units=fresh, output=requirement.output)) for requirement in self.requirements
+            requirement.check(OutputTrial(units=fresh, output=requirement.output, confidence=self.confidence))
+            for requirement in self.requirements
         )
         values = {output: fresh.values(output) for output in outputs}
         kept = np.array([_kept(requirement, values[requirement.output]) for requirement in self.requirements])

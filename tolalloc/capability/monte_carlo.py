@@ -92,10 +92,12 @@ def proportion(units: int, rejected: int) -> Yield:
     )
 
 
-def allowed_rejections(units: int, target: float) -> int:
-    """Return how many rejected units still show the target yield with one-sided 95 % confidence; −1 if none do."""
+def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE) -> int:
+    """Return how many rejected units still show the target yield with one-sided confidence; −1 if none do."""
+    from scipy.stats import beta
+
     rejected = -1
-    while rejected + 1 < units and proportion(units, rejected + 1).bound >= target:
+    while rejected + 1 < units and beta.ppf(1 - confidence, units - rejected - 1, rejected + 2) >= target:
         rejected += 1
     return rejected
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from tolalloc.allocation.candidates import Candidates
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.fronts import Fronts
@@ -92,9 +93,19 @@ class AllocationAnswer(Answer):
         return self.requirements[0].output
 
     @property
+    def candidates(self) -> Candidates:
+        """What the searches found, among which the drawing is the cheapest."""
+        return Candidates(fixed=self.fixed, free=self.free, graded=self.graded)
+
+    @cached_property
     def chosen(self) -> VerifiedDesign:
-        """What the drawing shall show: the graded design where grades were asked for."""
-        return self.graded.chosen if self.graded else self.free.chosen
+        """What the drawing shall show: the cheapest of all that was shown to keep the limits."""
+        return self.candidates.drawn
+
+    @property
+    def keeps_table(self) -> bool:
+        """Whether nothing that was verified is cheaper than the tolerance table as it is."""
+        return self.chosen is self.free.baseline
 
     @property
     def drawn(self) -> DesignSpace:
@@ -112,9 +123,9 @@ class AllocationAnswer(Answer):
         return self.chosen.cost
 
     @property
-    def bound(self) -> float:
-        """Lower bound on the cost of every drawing, by the convex models around the verified one [cost units]."""
-        return self.graded.bound if self.graded else self.free.bound
+    def bound(self) -> float | None:
+        """Least cost of a drawing by the convex models around the verified ones; none if one undercuts it."""
+        return self.candidates.bound
 
     @cached_property
     def drawn_sources(self) -> tuple[Source, ...]:
@@ -148,7 +159,11 @@ class AllocationAnswer(Answer):
     @property
     def title(self) -> str:
         """What the answer is about."""
-        return f"The cheapest drawing of {self.header.model}: {self.header.name}"
+        if not self.met:
+            return f"No drawing shown to keep its limits, {self.header.model}: {self.header.name}"
+        if self.keeps_table:
+            return f"Keep the drawing of {self.header.model}: {self.header.name}"
+        return f"The cheapest verified drawing of {self.header.model}: {self.header.name}"
 
     @property
     def subtitle(self) -> str:
@@ -216,7 +231,7 @@ class AllocationAnswer(Answer):
             "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
             f"cost of {self.free_label} [cost units]": free.chosen.cost,
             "cost on grades [cost units]": self.graded.chosen.cost if self.graded else None,
-            "certified bound [cost units]": self.bound if chosen.met else None,
+            "bound by the local models [cost units]": self.bound if chosen.met else None,
             "gap of the convex program [-]": free.optimum.gap,
             "blocking requirement": None if chosen.met else chosen.blocking.requirement.output,
             "beyond its limit by [unit of the output]": None if chosen.met else -chosen.blocking.slack,

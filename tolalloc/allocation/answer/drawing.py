@@ -23,7 +23,8 @@ def drawn_sources(answer: AllocationAnswer) -> tuple[Source, ...]:
     space, chosen = answer.drawn, answer.chosen
     zones = dict(zip((source.name for source in space.errors.active), space.zones(chosen.design), strict=True))
     made, costs = space.made_by(chosen.design), space.cost_of_sources(chosen.design)
-    labels = dict(zip(space.groups, answer.graded.labels, strict=True)) if answer.graded else {}
+    on_grades = answer.graded and chosen is answer.graded.chosen
+    labels = dict(zip(space.groups, answer.graded.labels, strict=True)) if answer.graded and on_grades else {}
     found = []
     for source in answer.space.errors.sources:
         if source.name not in made:

@@ -7,6 +7,7 @@ import pandas as pd
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.tables import searches, solver_noise
+from tolalloc.allocation.candidates import GRADES
 from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.pareto import Front
 from tolalloc.report.wording import short, unit_of
@@ -14,16 +15,16 @@ from tolalloc.units import MICROMETRE
 
 
 def certificate_table(answer: AllocationAnswer) -> pd.DataFrame:
-    """Return cost, certified bound and gap of every search, at the limits and one standard error inside them."""
+    """Return cost, bound by the models and gap of every search, at the limits and one standard error inside them."""
     rows: list[dict[str, object]] = [
         {
             "search": label,
             "verified cost [cost units]": found.chosen.cost,
             "cheapest of the models, at the limits [cost units]": found.optimum.cost + found.locked_cost,
-            "certified bound, at the limits [cost units]": found.bound,
+            "bound by the models, at the limits [cost units]": found.bound,
             "gap of the program, at the limits [-]": found.optimum.gap,
             "cheapest of the models, inside [cost units]": found.inside.cost + found.locked_cost,
-            "certified bound, inside [cost units]": found.inside.bound + found.locked_cost,
+            "bound by the models, inside [cost units]": found.inside.bound + found.locked_cost,
             "gap of the program, inside [-]": found.inside.gap,
             "verified cost above the bound at the limits [%]": found.gap * 100,
             "of that for the margin [%]": (found.inside.cost - found.optimum.cost) / found.bound * 100,
@@ -36,10 +37,10 @@ def certificate_table(answer: AllocationAnswer) -> pd.DataFrame:
         locked = graded.space.locked_cost
         rows.append(
             {
-                "search": "grades",
+                "search": GRADES,
                 "verified cost [cost units]": graded.chosen.cost,
                 "cheapest of the models, at the limits [cost units]": graded.solution.cost + locked,
-                "certified bound, at the limits [cost units]": graded.bound,
+                "bound by the models, at the limits [cost units]": graded.bound,
                 "gap of the program, at the limits [-]": graded.solution.gap,
                 "verified cost above the bound at the limits [%]": (graded.chosen.cost / graded.bound - 1) * 100,
                 "designs verified [-]": len(graded.tried),
@@ -70,7 +71,7 @@ def bounds_table(answer: AllocationAnswer) -> pd.DataFrame:
 
 
 def front_tables(answer: AllocationAnswer, fronts: Fronts) -> tuple[tuple[str, pd.DataFrame], ...]:
-    """Return the exact front with its certified bound, and the searched ones with what the real model says of them."""
+    """Return the exact front with its bound, and the searched ones with what the real model says of them."""
     unit = unit_of(answer.leading)
     kept = f"{short(answer.leading)} kept, told [{unit}]"
     groups, searched = len(answer.drawn.groups), fronts.searched
@@ -78,7 +79,7 @@ def front_tables(answer: AllocationAnswer, fronts: Fronts) -> tuple[tuple[str, p
         {
             f"{short(answer.leading)} limit [{unit}]": fronts.exact.limits,
             "cost [cost units]": fronts.exact.cost,
-            "certified bound [cost units]": fronts.exact.bound,
+            "bound by the models [cost units]": fronts.exact.bound,
         }
     )
     found = pd.DataFrame({kept: searched.quantile, f"on the kernel [{unit}]": searched.on_kernel})

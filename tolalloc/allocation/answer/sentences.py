@@ -30,6 +30,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     found.append(_cost(answer))
     return (
         *found,
+        _compared(answer),
         *_certificate(answer),
         *_modification(answer),
         *_prices(answer),
@@ -83,17 +84,34 @@ def _cost(answer: AllocationAnswer) -> str:
     )
 
 
+def _compared(answer: AllocationAnswer) -> str:
+    """Return what every verified drawing costs, and which one is drawn."""
+    costs = [
+        f"{name} {own.cost:.2f}{'' if own.met else ' (misses a limit)'}"
+        for name, own in answer.candidates.designs(answer.free_label).items()
+    ]
+    listed = f"Verified: {'; '.join(costs)}."
+    if answer.met and answer.keeps_table:
+        return f"Keep the drawing: nothing that may be drawn and keeps every limit was found cheaper. {listed}"
+    return listed
+
+
 def _certificate(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
+    if answer.met and answer.bound is None:
+        return (
+            "A verified drawing costs less than the local models around the others hold for possible, so they bound "
+            "nothing here.",
+        )
     return (*_free(answer), *_graded(answer))
 
 
 def _free(answer: AllocationAnswer) -> tuple[str, ...]:
-    """Return what is certified of free zones; nothing where they miss a limit."""
-    joint = answer.free
-    if not joint.chosen.met:
+    """Return how far the models let free zones be from optimal; nothing where they miss a limit."""
+    found = answer.candidates.unrestricted
+    if not found.chosen.met:
         return ()
-    of_margin = (joint.inside.cost - joint.optimum.cost) / joint.bound
+    of_margin = (found.inside.cost - found.optimum.cost) / found.bound
     margin = (
         f", {100 * of_margin:.1f} points of that for the margin of one standard error that the search keeps"
         if of_margin >= _SAME_COST
@@ -102,14 +120,14 @@ def _free(answer: AllocationAnswer) -> tuple[str, ...]:
     design = "the verified design with free zones" if answer.graded else "the verified design"
     chosen = f"zones, processes and {answer.model.settings_word}" if answer.space.settings else "zones and processes"
     return (
-        f"Certified: by the local models around {design}, no {chosen} that keep the limits cost "
-        f"less than {joint.bound:.2f}; it costs {max(joint.gap, 0.0):.1%} more ({joint.chosen.cost:.2f}){margin}.",
+        f"By the local models around {design}, no {chosen} that keep the limits cost less than {found.bound:.2f}, as "
+        f"far as these models hold; it costs {max(found.gap, 0.0):.1%} more ({found.chosen.cost:.2f}){margin}.",
     )
 
 
 def _graded(answer: AllocationAnswer) -> tuple[str, ...]:
-    """Return what is certified of grades, if they were asked for."""
-    graded, free = answer.graded, answer.free.chosen
+    """Return how far grades can be from optimal, if they were asked for."""
+    graded, free = answer.graded, answer.candidates.unrestricted.chosen
     if not graded:
         return ()
     cost = f"On grades and preferred numbers the cost is {graded.chosen.cost:.2f}"
@@ -139,7 +157,7 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
     doubt = ""
     if max(answer.fixed.gap, answer.free.gap) > saving:
         doubt = (
-            f" (the search for tolerances alone ended {max(answer.fixed.gap, 0.0):.1%} above its own certified bound, "
+            f" (the search for tolerances alone ended {max(answer.fixed.gap, 0.0):.1%} above the bound of its models, "
             "so up to that much of it may be the search)"
         )
     return (
@@ -203,7 +221,10 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
     chosen, found = answer.chosen, []
     if answer.header.quick:
-        found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
+        found.append(
+            "Quick run: small samples, wide intervals, limits shown at even odds. Run without --quick before setting a "
+            "drawing."
+        )
     if not chosen.met:
         found.append(
             "No design was verified to meet all limits. This is the least violating one; what blocks is "
@@ -259,7 +280,7 @@ def assumptions(answer: AllocationAnswer) -> tuple[str, ...]:
         if priced
         else "a cost falls as 1/zone, from the tolerance table's cost at its zone",
         *(("what is chosen beside the zones costs nothing and is exact",) if answer.space.settings else ()),
-        "sources correlated as their file states; the certified bounds do not know of correlations"
+        "sources correlated as their file states; the bounds of the models do not know of correlations"
         if answer.space.errors.is_correlated
         else "all sources are independent of each other",
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.candidates import ALONE, GRADES
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.program.problem import Solution
@@ -25,18 +26,13 @@ def solver_noise(solution: Solution) -> float:
 
 def designs(answer: AllocationAnswer) -> dict[str, VerifiedDesign]:
     """Return the designs that the report compares."""
-    found = {
-        "tolerance table as it is": answer.free.baseline,
-        "all zones scaled alike": answer.free.proportional,
-    }
-    found |= {label: search.chosen for label, search in searches(answer).items()}
-    return {**found, "grades": answer.graded.chosen} if answer.graded else found
+    return answer.candidates.designs(answer.free_label)
 
 
 def searches(answer: AllocationAnswer) -> dict[str, ZoneAllocation]:
     """Return the searches by what they were free to choose."""
     free = {answer.free_label: answer.free}
-    return {"tolerances alone": answer.fixed, **free} if answer.fixed else free
+    return {ALONE: answer.fixed, **free} if answer.fixed else free
 
 
 def limit_price(side: Side, price: float) -> tuple[float, str]:
@@ -133,7 +129,7 @@ def verified_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return all designs that fresh units have judged, in order."""
     tried = {label: search.tried for label, search in searches(answer).items()}
     if answer.graded:
-        tried["grades"] = answer.graded.tried
+        tried[GRADES] = answer.graded.tried
     return pd.DataFrame(
         [
             {

@@ -94,7 +94,7 @@ class EquivalentModel:
 
     def _given(
         self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]
-    ) -> tuple[Any, ...]:
+    ) -> tuple[Any, Any, Any, Any, Any]:
         """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
         columns = self.error_columns
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque

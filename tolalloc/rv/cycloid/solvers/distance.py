@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tolalloc.compiled import in_threads, jit
@@ -189,10 +191,10 @@ def _clearances(designs, pin_angle, turned, clearance):
         design_clearances(designs[d], pin_angle, turned[d], clearance[d])
 
 
-def pin_clearances(designs, pin_angle, turned, clearance):
+def pin_clearances(designs: Any, pin_angle: Any, turned: Any, clearance: Any) -> None:
     """Fill the clearances [m] of pins on the discs of many designs, [design, pin]; ``designs`` are [design, FIELDS]."""
 
-    def fill(part):
+    def fill(part: slice) -> None:
         _clearances(designs[part], pin_angle, turned[part], clearance[part])
 
     in_threads(fill, designs.shape[0], _AT_ONCE)

@@ -8,7 +8,7 @@ the forces that are there.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
@@ -206,10 +206,23 @@ def _advance_sample(s, first, angles, tables, parts, integrator, step, layout, m
             _observe(s, record.slot[time], problem, work.compression, x, v, acceleration, record)
 
 
-def advance(first, angles, tables, parts, integrator, step, layout, mapped, design, errors, state, record):
+def advance(
+    first: Any,
+    angles: Any,
+    tables: Any,
+    parts: Any,
+    integrator: Any,
+    step: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    state: Any,
+    record: Any,
+) -> None:
     """Take all samples through the steps of the tables, the first of which is number ``first``."""
 
-    def take(part):
+    def take(part: slice) -> None:
         given = (first, angles, tables, parts, integrator, step, layout, mapped, design, errors)
         _advance_sample(part.start, *given, state, record)
 

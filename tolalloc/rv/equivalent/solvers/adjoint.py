@@ -10,6 +10,8 @@ other's slope. Where the extreme is smooth both slopes vanish alike and the mean
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tolalloc.compiled import in_threads, jit
@@ -205,26 +207,38 @@ def _rotations(first, last, tables, layout, mapped, design, errors, torque, posi
             derivative.status[s] = _add_derivative(at, 1.0, tables, layout, design, values[0], memory, derivative, s)
 
 
-def solve_peak_to_peak_derivatives(tables, layout, mapped, design, errors, torque, position, step, derivative):
+def solve_peak_to_peak_derivatives(
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    position: Any,
+    step: Any,
+    derivative: Any,
+) -> None:
     """Fill the derivatives of the peak-to-peak from the positions of its two extremes, [sample, 2].
 
     ``step`` is the distance in nodes within which the extremes were found.
     """
 
-    def solve(part):
+    def solve(part: slice) -> None:
         given = (tables, layout, mapped, design, errors, torque)
         _peak_to_peaks(part.start, part.stop, *given, position, step, derivative)
 
     in_threads(solve, errors.shape[0], _AT_ONCE)
 
 
-def solve_rotation_derivatives(tables, layout, mapped, design, errors, torque, position, derivative):
+def solve_rotation_derivatives(
+    tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, position: Any, derivative: Any
+) -> None:
     """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
 
     The derivatives stand in one row, sample by sample, and position by position within a sample.
     """
 
-    def solve(part):
+    def solve(part: slice) -> None:
         given = (tables, layout, mapped, design, errors, torque)
         _rotations(part.start, part.stop, *given, position, derivative)
 

@@ -6,6 +6,8 @@ halving the step around the candidates and not by a parabola.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tolalloc.compiled import in_threads, jit
@@ -89,10 +91,12 @@ def _refine_all(tables, layout, mapped, design, errors, torque, search, turn, fo
             found.residual[s] = max(found.residual[s], worst_residual)
 
 
-def solve_extremes(discs, tables, layout, mapped, design, errors, torque, search, found):
+def solve_extremes(
+    discs: Any, tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, search: Any, found: Any
+) -> None:
     """Fill the extremes of every sample."""
 
-    def solve(part):
+    def solve(part: slice) -> None:
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
         solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)

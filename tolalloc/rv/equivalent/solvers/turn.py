@@ -6,6 +6,8 @@ a sample goes depends on itself alone, so its bits do not depend on the tile tha
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tolalloc.compiled import in_threads, jit, thread_count
@@ -18,7 +20,7 @@ from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE, Solved
 from tolalloc.rv.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
 
 
-def make_turn(samples, angles, retained):
+def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
     """Return an empty turn."""
     return SolvedTurn(
         np.empty((samples, angles)),
@@ -110,7 +112,18 @@ def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, 
             _give_up(turn, s)
 
 
-def solve_tile(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+def solve_tile(
+    discs: Any,
+    first: Any,
+    stride: Any,
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    turn: Any,
+) -> None:
     """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
     if tables.play_stiffness.shape[1] == 0:
         _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn)
@@ -118,13 +131,15 @@ def solve_tile(discs, first, stride, tables, layout, mapped, design, errors, tor
         _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn)
 
 
-def solve_curves(discs, tables, layout, mapped, design, errors, torque, turn):
+def solve_curves(
+    discs: Any, tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, turn: Any
+) -> None:
     """Fill the equilibria of every sample at every node of the tables.
 
     ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
     """
 
-    def solve(part):
+    def solve(part: slice) -> None:
         own = SolvedTurn(*(values[part] for values in turn))
         solve_tile(discs, 0, 1, tables, layout, mapped, design, errors[part], torque, own)
 
@@ -164,10 +179,22 @@ def _forces_of_sample(tables, layout, mapped, design, errors, torque, status, re
             rows[at, row] = tables.row_stiffness[at, row] * compression
 
 
-def solve_forces(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
+def solve_forces(
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    status: Any,
+    retained: Any,
+    pins: Any,
+    rows: Any,
+    elements: Any,
+) -> None:
     """Fill the forces of all samples at all nodes of the tables, those of `tolalloc.rv.equivalent.outputs.Forces`."""
 
-    def fill(part):
+    def fill(part: slice) -> None:
         s = part.start
         own = (status[s], retained[s], pins[s], rows[s], elements[s])
         _forces_of_sample(tables, layout, mapped, design, errors[part], torque, *own)

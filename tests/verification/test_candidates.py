@@ -1,0 +1,98 @@
+"""Which of the verified drawings is the answer: never one that costs more than another that may be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import tolalloc as ta
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.candidates import ALIKE, GRADES, TABLE
+from tolalloc.allocation.verification import VerifiedDesign
+
+ZONE = {"plus": 0.01, "minus": -0.01, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
+
+
+def gap(housing, shaft):
+    return housing - shaft
+
+
+@pytest.fixture(scope="module")
+def graded() -> AllocationAnswer:
+    study = ta.Study(
+        ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+        ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]),
+        limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.13)},
+        questions=[ta.Allocation(grades=True, what_if=False, front=False)],
+        name="fit",
+    )
+    found = study.allocate(effort="quick")
+    assert found.met
+    return found
+
+
+def at_cost(design: VerifiedDesign, cost: float) -> VerifiedDesign:
+    return replace(design, cost=cost)
+
+
+def with_table(answer: AllocationAnswer, cost: float) -> AllocationAnswer:
+    """Return the answer with a table that keeps the limits at a cost."""
+    table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost)
+    alike = answer.free.proportional_tried[1:]
+    return replace(answer, free=replace(answer.free, proportional_tried=(table, *alike)))
+
+
+def test_free_zones_are_never_dearer_than_grades(graded):
+    assert graded.free.chosen.cost <= graded.graded.chosen.cost
+
+
+def test_a_table_that_costs_less_is_kept_and_said_to_be(graded):
+    dearer = with_table(graded, 1.01 * graded.graded.chosen.cost)
+    assert dearer.chosen is graded.graded.chosen
+    assert dearer.title.startswith("The cheapest verified drawing")
+    kept = with_table(graded, 0.99 * graded.graded.chosen.cost)
+    assert kept.keeps_table
+    assert kept.met
+    assert kept.title.startswith("Keep the drawing")
+    (said,) = [sentence for sentence in kept.sentences if sentence.startswith("Keep the drawing: nothing")]
+    assert f"{TABLE} {kept.cost:.2f}" in said
+    assert kept.summary["cost [cost units]"] == kept.cost
+    assert kept.drawing_table["cost [cost units]"].notna().all()
+
+
+def test_where_grades_are_asked_for_no_other_zones_are_drawn(graded):
+    admitted = graded.candidates.admitted(graded.free_label)
+    assert set(admitted) == {TABLE, GRADES}
+    free = replace(graded, graded=None)
+    assert set(free.candidates.admitted(free.free_label)) == {TABLE, ALIKE, free.free_label}
+    assert free.chosen is free.free.chosen
+
+
+def test_zones_beyond_what_they_may_be_are_not_drawn(graded):
+    free, alike = graded.free, graded.free.proportional
+    beyond = at_cost(replace(alike, design=alike.design + 10.0, checks=free.chosen.checks), 0.5 * free.chosen.cost)
+    changed = replace(graded, graded=None, free=replace(free, proportional_tried=(free.baseline, beyond)))
+    assert ALIKE not in changed.candidates.admitted(changed.free_label)
+    assert changed.chosen is free.chosen
+
+
+def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
+    assert graded.bound is not None
+    assert graded.bound <= graded.cost
+    undercut = with_table(graded, 0.9 * graded.bound)
+    assert undercut.bound is None
+    assert undercut.summary["bound by the local models [cost units]"] is None
+    assert any("bound nothing here" in sentence for sentence in undercut.sentences)
+    assert not any(sentence.startswith("By the local models") for sentence in undercut.sentences)
+
+
+def test_a_miss_is_titled_so(graded):
+    (check,) = graded.chosen.checks
+    far = tuple(replace(side, value=side.limit + side.sign * 1.0) for side in check.sides)
+    lost = replace(graded.graded.chosen, checks=(replace(check, sides=far),))
+    answer = replace(graded, graded=replace(graded.graded, chosen=lost))
+    table = replace(answer.free.baseline, checks=lost.checks)
+    answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))
+    assert not answer.met
+    assert answer.title.startswith("No drawing shown to keep its limits")

@@ -1,0 +1,83 @@
+"""Every drawing that was verified on the way, whoever made it: the cheapest one that keeps the limits is the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolalloc.allocation.graded import GradedAllocation
+from tolalloc.allocation.search import ROUNDING, ZoneAllocation
+from tolalloc.allocation.verification import VerifiedDesign
+
+TABLE, ALIKE, ALONE, GRADES = "tolerance table as it is", "all zones scaled alike", "tolerances alone", "grades"
+"""What the drawings that are compared are called, next to what everything free is called."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidates:
+    """What the searches of one question found."""
+
+    fixed: ZoneAllocation | None  # Settings as they are, if the question asks for it and the model has any
+    free: ZoneAllocation  # Tolerances and settings together
+    graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
+
+    def designs(self, free_label: str) -> dict[str, VerifiedDesign]:
+        """Return the designs that a report compares, by what they are called."""
+        alone = {ALONE: self.fixed.chosen} if self.fixed else {}
+        grades = {GRADES: self.graded.chosen} if self.graded else {}
+        return {
+            TABLE: self.free.baseline,
+            ALIKE: self.free.proportional,
+            **alone,
+            free_label: self.free.chosen,
+            **grades,
+        }
+
+    def admitted(self, free_label: str) -> dict[str, VerifiedDesign]:
+        """Return those that may be drawn: the table always, the others where their zones and amounts may be so.
+
+        Where grades are asked for, nothing but them and the table may.
+        """
+        found = self.designs(free_label)
+        if self.graded:
+            return {TABLE: found[TABLE], GRADES: found[GRADES]}
+        return {name: design for name, design in found.items() if name == TABLE or _inside(design)}
+
+    @property
+    def drawn(self) -> VerifiedDesign:
+        """The cheapest admitted design that was shown to keep the limits; the search's least violating one if none."""
+        return _cheapest(self.admitted("free")) or (self.graded or self.free).chosen
+
+    @property
+    def unrestricted(self) -> ZoneAllocation:
+        """The search that found the cheaper zones off the ladders: with the settings as they are, or with them free."""
+        cheapest = _cheapest({name: own.chosen for name, own in self._searches.items()})
+        return next((own for own in self._searches.values() if own.chosen is cheapest), self.free)
+
+    @property
+    def bound(self) -> float | None:
+        """Least cost that the models around the verified designs hold for possible; nothing if one undercuts it.
+
+        The models hold near their designs, and what they say is no better than they are.
+        """
+        free = min(own.bound for own in self._searches.values())
+        bound = self.graded.bound if self.graded else free
+        kept = [own.cost for own in self.admitted("free").values() if own.met]
+        return None if kept and min(kept) < bound * (1 - ROUNDING) else bound
+
+    @property
+    def _searches(self) -> dict[str, ZoneAllocation]:
+        return {"free": self.free, **({ALONE: self.fixed} if self.fixed else {})}
+
+
+def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:
+    """Return the cheapest design that was shown to keep the limits."""
+    return min((own for own in designs.values() if own.met), key=lambda own: own.cost, default=None)
+
+
+def _inside(design: VerifiedDesign) -> bool:
+    """Return whether zones and settings of a design lie between what they may be."""
+    low, high = design.space.lower * (1 - ROUNDING), design.space.upper * (1 + ROUNDING)
+    return bool(np.all((design.design >= low) & (design.design <= high)))
