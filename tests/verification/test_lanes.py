@@ -7,11 +7,14 @@ import pytest
 
 from tests.random_units import random_units
 from tolalloc.compiled import jit
+from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.lane_solver import DEEPEST, _line_contact
+from tolalloc.rv.equivalent.solvers.lane_solver import DEEPEST, _line_contact, solve_tile_at
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, store
+from tolalloc.rv.equivalent.solvers.problem import values_of
+from tolalloc.rv.equivalent.solvers.tile import TILE, make_tile, nonzero_rows, nonzero_waves
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
 
@@ -69,3 +72,21 @@ def test_line_contact_has_the_same_bits_alone_and_among_others(generator):
         apart = model.equilibria(errors[rows], -1.0, angles)
         np.testing.assert_array_equal(apart.transmission_error, together.transmission_error[rows])
         np.testing.assert_array_equal(apart.retained, together.retained[rows])
+
+
+def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
+    """A wrong tangent or balance would leave them to the solver for one sample: the same answers, many times slower."""
+    units, angle = random_units(table4, rv20e.columns, generator, TILE), np.array([0.3])
+    columns, tables = rv20e.error_columns, rv20e.tables_at(angle)
+    layout, careful = columns.layout, np.empty(TILE, np.bool_)
+    values = np.empty((TILE, layout.end))
+    values_of(units, -1.0, layout, columns.map, values)
+    tile = make_tile(layout, tables.load.shape[2], tables.contact_stiffness.shape[1])
+    tile.values[:] = values.T
+    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
+    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
+    solve_tile_at(LINEAR, (0, 0), 0, tables, layout, rows, waves, teeth_deviate, TILE, tile, careful)
+    settled = ~careful
+    found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
+    np.testing.assert_allclose(tile.rotation[settled], found[settled], rtol=1e-9)
+    assert careful.mean() < 0.1
