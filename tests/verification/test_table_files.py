@@ -132,8 +132,14 @@ WRONG = {
     "half zone": ("[µm]", "half zone; numbers are not converted"),
     "weight:shift:spread": ("[µm]", "weight:shift:spread; numbers are not converted"),
     "order:amplitude": ("[µm]", "order:amplitude; numbers are not converted"),
-    "cost units": ("[EUR]", "cost units; numbers are not converted"),
+    "cost units": ("[µm]", "a currency such as EUR, or cost units; numbers are not converted"),
 }
+
+
+@pytest.mark.parametrize("currency", ["EUR", "€"])
+def test_a_currency_is_a_cost_unit(currency, sources, tmp_path):
+    table_frame(sources).rename(columns={HEADERS["cost"]: f"cost [{currency}]"}).to_csv(tmp_path / "t.csv", index=False)
+    assert [own.cost for own in load_tolerance_table(tmp_path / "t.csv")] == [own.cost for own in sources]
 
 
 @pytest.mark.parametrize("column", COLUMNS)

@@ -13,7 +13,7 @@ from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
 from tolalloc.drawings.mixtures import batches_text, parsed_batches
 from tolalloc.drawings.sources import ANGULAR, Source
-from tolalloc.drawings.table_file import usual_signs
+from tolalloc.drawings.table_file import COST_UNITS, usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
 from tolalloc.files import Record
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -188,7 +188,7 @@ class ToleranceRow(Record):
         Field(ge=0, le=1e9),
         Column(
             "cost of the feature at its zone; it falls as 1/zone unless a process cost table says otherwise",
-            "cost units",
+            COST_UNITS,
             "cost",
             write=lambda source: round(source.cost, 12),
         ),

@@ -17,6 +17,9 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, validated
 
 DATA = Path(__file__).parent / "data"
+
+COST_UNITS = "cost units"
+_CURRENCY = re.compile(r"[A-Z]{3}|[€$£¥]")
 """Shipped tables."""
 
 NumberedRow = tuple[int, tuple[str, ...]]
@@ -220,6 +223,8 @@ def read_rows(
 def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> None:
     """Raise if the header of a column states another unit than the one it has, empty where it has none.
 
+    A currency is a cost unit like any other: three letters as in EUR, or its sign.
+
     Raises
     ------
     InputError
@@ -227,8 +232,9 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
     """
     for name, unit in stated:
         known = units.get(name, unit)
-        if unit and unit != known:
+        if unit and unit != known and not (known == COST_UNITS and _CURRENCY.fullmatch(unit)):
             allowed = f"{known}; numbers are not converted" if known else "none"
+            allowed = f"a currency such as EUR, or {allowed}" if known == COST_UNITS else allowed
             raise InputError.at(path, f"the unit of column {name}", unit, allowed)
 
 
