@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from tolalloc.study.limit import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
     from tolalloc.study.questions import Calculation as Calculation
+    from tolalloc.study.questions import Difference as Difference
     from tolalloc.study.questions import Question as Question
     from tolalloc.study.questions import Ranking as Ranking
     from tolalloc.study.study import Study as Study
@@ -64,6 +65,7 @@ _WHERE = {
     "AtYield": "allocation.guarantee",
     "BACKLASH": "rv",
     "Calculation": "study.questions",
+    "Difference": "study.questions",
     "Drawing": "drawings.drawing",
     "EFFICIENCY": "rv",
     "Effort": "study.effort",

@@ -19,6 +19,7 @@ from tolalloc.cli.mount import mount
 from tolalloc.cli.run import allocate, check, rank, run
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
+from tolalloc.cli.whatif import whatif
 from tolalloc.exceptions import TolallocError
 
 app = typer.Typer(
@@ -44,6 +45,7 @@ for command in (
     check,
     rank,
     allocate,
+    whatif,
     costs,
     te,
     contact,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -77,6 +77,49 @@ class Ranking(Question):
             largest_failed_share=study.largest_failed_share,
         )
         return rank(asked, record, prepared.header)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference(Question):
+    """What other zones do to cost, yield and quantiles, on the same random units.
+
+    Parameters
+    ----------
+    zones
+        Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
+    units
+        Random units of either drawing [-].
+
+    Examples
+    --------
+    >>> Difference(zones={"pin.diameter": 3.0}).units
+    1024
+    """
+
+    kind: ClassVar[str] = "difference"
+
+    zones: Mapping[str, float]
+    units: int = 1024
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.units, int) and 100 <= self.units <= 10_000_000):
+            raise InputError.at("question difference", "units", self.units, "a whole number from 100 to 10,000,000")
+
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+        """Return both drawings on the same units."""
+        from tolalloc.allocation.difference import difference
+        from tolalloc.drawings.seeds import SeedTree
+
+        return difference(
+            model=prepared.model,
+            space=prepared.space,
+            requirements=prepared.requirements,
+            zones=self.zones,
+            units=self.units,
+            seeds=SeedTree(prepared.study.seed).child("difference"),
+            record=record,
+            header=prepared.header,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

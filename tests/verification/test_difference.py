@@ -1,0 +1,124 @@
+"""What other zones change, on the same units: exact answers of a linear model, and intervals that cover."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import tolalloc as ta
+from tests.studies.command import tolalloc
+from tolalloc.capability.paired import quantile_change, share_change
+from tolalloc.drawings.seeds import SeedTree
+
+ZONE = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 2}
+
+
+def gap(housing, shaft):
+    return housing - shaft
+
+
+def fit(**changes) -> ta.Study:
+    rows = [{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]
+    return ta.Study(
+        ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+        ta.Drawing.of_rows(rows, **changes),
+        limits={"gap [mm]": ta.Limit(upper=0.12, show=ta.AtYield(target=0.98))},
+        name="fit",
+        seed=3,
+    )
+
+
+def true_change() -> tuple[float, float]:
+    """Return the change of the share within 0.12 mm and of the 98 % quantile [mm] with the housing's zone halved."""
+    before, after = np.hypot(0.02 / 3, 0.02 / 3), np.hypot(0.01 / 3, 0.02 / 3)
+    share = norm.cdf(0.02 / after) - norm.cdf(0.02 / before)
+    return share, norm.ppf(0.98) * (after - before)
+
+
+def test_a_linear_models_change_lies_in_the_intervals():
+    found = fit().ask(ta.Difference(zones={"hous*": 20.0}, units=8192))
+    share, quantile = true_change()
+    assert found.yield_change.low < share < found.yield_change.high
+    assert found.quantile_changes[0].low < quantile < found.quantile_changes[0].high
+    assert found.cost_change == pytest.approx(2.0)  # 1/zone: twice the cost of 2
+    assert found.whole_cost == 4.0
+    assert list(found.zones["source"]) == ["housing"]
+    assert found.warnings == ()
+
+
+def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
+    same = fit().ask(ta.Difference(zones={"housing": 40.0}))
+    assert same.yield_change.estimate == 0.0
+    assert (same.quantile_changes[0].low, same.quantile_changes[0].high) == (0.0, 0.0)
+    little = fit().ask(ta.Difference(zones={"housing": 39.0}, units=8192)).quantile_changes[0]
+    # Two runs of 8,192 units differ by √2 standard errors of either: some 0.3 µm where the change is 0.2 µm.
+    spread = np.sqrt(2) * np.sqrt(0.98 * 0.02 / 8192) / norm.pdf(norm.ppf(0.98)) * np.hypot(0.02, 0.02) / 3
+    assert little.high - little.low < 0.5 * 2 * 1.96 * spread
+    assert little.high < 0.0
+
+
+@pytest.mark.slow
+def test_intervals_cover():
+    """400 samples of 300 pairs: 95 % less two standard errors of 1.1 %; the share's interval is on the safe side."""
+    share, quantile, hits = true_change()[0], true_change()[1], np.zeros(2)
+    for number in range(400):
+        generator = SeedTree(number).generator()
+        housing, shaft = generator.standard_normal((2, 300)) * 0.02 / 3
+        before, after = housing - shaft, 0.5 * housing - shaft
+        own = share_change(before <= 0.02, after <= 0.02)
+        hits[0] += own.low <= share <= own.high
+        if number < 200:
+            middle = quantile_change(before, after, 0.9, generator)
+            hits[1] += middle.low <= quantile * norm.ppf(0.9) / norm.ppf(0.98) <= middle.high
+    assert hits[0] / 400 >= 0.95
+    assert hits[1] / 200 == pytest.approx(0.95, abs=3 * np.sqrt(0.95 * 0.05 / 200) + 0.02)
+
+
+def test_few_units_beyond_a_quantile_are_warned_of():
+    found = fit().ask(ta.Difference(zones={"shaft": 30.0}, units=128))
+    assert found.warnings == (
+        "Of 128 units fewer than 10 lie beyond a quantile: its interval is too narrow. Take more.",
+    )
+
+
+def test_a_process_prices_the_zone_that_it_holds():
+    costs = {"housing": [("turned", 1.0, 0.02, 0.01, 0.1), ("ground", 3.0, 0.02, 0.002, 0.02)]}
+    study = fit(costs=costs)
+    ground = study.ask(ta.Difference(zones={"housing": 10.0}))  # ± 0.005 mm
+    assert ground.after[0].cost == pytest.approx(3.0 + 0.02 / 0.005)
+    with pytest.raises(ta.InputError, match=r"housing is '1 µm'; allowed is 5 to 100 µm, what its processes hold"):
+        study.ask(ta.Difference(zones={"housing": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("zones", "words"),
+    [
+        ({}, "no zone is given"),
+        ({"bolt": 3.0}, "source 'bolt' is not known"),
+        ({"shaft": -1.0}, "shaft is -1.0; allowed is a zone above 0"),
+        ({"shaft": float("nan")}, "shaft is nan; allowed is a zone above 0"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_one_sentence(zones, words):
+    with pytest.raises(ta.TolallocError, match=words):
+        fit().ask(ta.Difference(zones=zones))
+
+
+def test_the_command_says_what_python_says(tmp_path):
+    script = tmp_path / "fit.py"
+    script.write_text(
+        "import tolalloc as ta\nfrom tests.verification.test_difference import fit\nstudy = fit()\n",
+        encoding="utf-8",
+    )
+    result = tolalloc("whatif", script, "hous*=20", "--units", "2048", "--json", "--out", tmp_path / "report")
+    assert result.returncode == 0, result.stderr
+    told, own = json.loads(result.stdout), fit().ask(ta.Difference(zones={"hous*": 20.0}, units=2048)).summary
+    assert told["changes"] == own["changes"]
+    assert (tmp_path / "report" / "report.html").stat().st_size > 0
+    for text in ("shaft", "shaft=x"):
+        refused = tolalloc("whatif", script, text)
+        assert refused.returncode == 2
+        assert "allowed is SOURCE=µm, such as pin.diameter=3" in refused.stderr

@@ -1,0 +1,260 @@
+"""What other zones do to cost, yield and quantiles: both drawings on the same random units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.requirement import Requirement
+from tolalloc.capability.paired import Change, quantile_change, share_change
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_zones
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models import Model
+from tolalloc.progress import RunRecord
+from tolalloc.report.answer import Answer, Header
+from tolalloc.report.document import Section
+from tolalloc.report.wording import short, unit_of
+from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_USUAL = 0.9973
+"""Share at which the quantile of an output is read whose limit asks for no yield [-]."""
+_BEYOND = 10
+"""Units beyond a quantile below which its interval is too narrow [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DifferenceAnswer(Answer):
+    """Two drawings on the same random units."""
+
+    kind: ClassVar[str] = "difference"
+
+    requirements: tuple[Requirement, ...]  # What is limited, the leading output first
+    before: tuple[Source, ...]  # The sources that change, as they are
+    after: tuple[Source, ...]  # The same with other zones and their costs
+    whole_cost: float  # Cost of the whole drawing before [cost units]
+    outputs: tuple[str, ...]  # Names of the outputs
+    values: Float[np.ndarray, "2 unit output"]  # Of the drawing before and after, NaN where a unit has none
+    seeds: SeedTree  # Of the resamples
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return f"Other zones of {self.header.model}: {self.header.name}"
+
+    @property
+    def cost_change(self) -> float:
+        """Change of the cost [cost units]."""
+        return sum(own.cost for own in self.after) - sum(own.cost for own in self.before)
+
+    @cached_property
+    def yield_change(self) -> Change:
+        """Change of the share of units that keep all limits [-]."""
+        return share_change(*(self._kept(side) for side in (0, 1)))
+
+    def _kept(self, side: int) -> Bool[np.ndarray, " unit"]:
+        """Return which units keep all limits."""
+        kept = np.ones(self.values.shape[1], np.bool_)
+        for own in self.requirements:
+            values, limits = self._values(own)[side], own.limits
+            kept &= values >= (-np.inf if limits.lower is None else limits.lower)
+            kept &= values <= (np.inf if limits.upper is None else limits.upper)
+        return kept
+
+    def _values(self, requirement: Requirement) -> Float[np.ndarray, "2 unit"]:
+        return self.values[:, :, self.outputs.index(requirement.output)]
+
+    def _share(self, requirement: Requirement) -> float:
+        target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
+        return target if requirement.limits.upper is not None else 1 - target
+
+    @cached_property
+    def quantile_changes(self) -> tuple[Change, ...]:
+        """Change of the limited quantile of every requirement [unit of the output]."""
+        return tuple(
+            quantile_change(
+                self._values(own)[0],
+                self._values(own)[1],
+                self._share(own),
+                self.seeds.child(own.output).generator(),
+            )
+            for own in self.requirements
+        )
+
+    @cached_property
+    def changes(self) -> pd.DataFrame:
+        """Cost, yield and every limited quantile before and after, with the intervals of what is random."""
+        import pandas as pd
+
+        def row(what: str, unit: str, before: float, after: float, change: Change | None) -> dict[str, object]:
+            own = change or Change(estimate=after - before, low=float("nan"), high=float("nan"))
+            return {
+                "what": what,
+                "unit": unit,
+                "before [unit]": before,
+                "after [unit]": after,
+                "change [unit]": own.estimate,
+                "low 95 % [unit]": own.low,
+                "high 95 % [unit]": own.high,
+            }
+
+        shares, found = [100 * float(self._kept(side).mean()) for side in (0, 1)], self.yield_change
+        percent = Change(estimate=100 * found.estimate, low=100 * found.low, high=100 * found.high)
+        rows = [
+            row("cost", "cost units", self.whole_cost, self.whole_cost + self.cost_change, None),
+            row("yield, all limits", "%", shares[0], shares[1], percent),
+        ]
+        for own, change in zip(self.requirements, self.quantile_changes, strict=True):
+            before, after = (float(np.nanquantile(side, self._share(own))) for side in self._values(own))
+            what = f"{self._share(own):.2%} of {short(own.output)}"
+            rows.append(row(what, unit_of(own.output), before, after, change))
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def zones(self) -> pd.DataFrame:
+        """The zones that change, with their costs."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "source": [own.name for own in self.before],
+                "zone before [µm]": [own.zone / MICROMETRE for own in self.before],
+                "zone after [µm]": [own.zone / MICROMETRE for own in self.after],
+                "cost before [cost units]": [own.cost for own in self.before],
+                "cost after [cost units]": [own.cost for own in self.after],
+            }
+        )
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+        leading, change, found = self.requirements[0], self.quantile_changes[0], self.yield_change
+        unit = unit_of(leading.output)
+        return (
+            f"The drawing costs {self.whole_cost + self.cost_change:.2f} cost units instead of {self.whole_cost:.2f} "
+            f"({self.cost_change:+.2f}).",
+            f"On the same {self.values.shape[1]} random units the share that keeps all limits changes by "
+            f"{100 * found.estimate:+.2f} points (95 % interval {100 * found.low:+.2f}…{100 * found.high:+.2f}), the "
+            f"{self._share(leading):.2%} quantile of the {short(leading.output)} by {change.estimate:+.3g} {unit} "
+            f"({change.low:+.3g}…{change.high:+.3g}).",
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        found, units = [], self.values.shape[1]
+        if any(units * min(self._share(own), 1 - self._share(own)) < _BEYOND for own in self.requirements):
+            found.append(
+                f"Of {units} units fewer than {_BEYOND} lie beyond a quantile: its interval is too narrow. Take more."
+            )
+        if lost := int(np.count_nonzero(np.isnan(self.values).any(axis=2))):
+            found.append(f"{lost} of {2 * units} solutions have no answer; they count as outside the limits.")
+        return tuple(found)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their tables."""
+        return (
+            Section(heading="What changes", paragraphs=(), tables=(("changes", self.changes),)),
+            Section(heading="Which zones", paragraphs=(), tables=(("changed zones", self.zones),)),
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units in the names."""
+        return {
+            "study": self.header.name,
+            "seed": self.header.seed,
+            "units [-]": self.values.shape[1],
+            "changes": self.changes.replace({np.nan: None}).to_dict("records"),
+            "zones": self.zones.to_dict("records"),
+            "statuses": dict(self.header.statuses),
+            "warnings": list(self.warnings),
+        }
+
+
+def difference(
+    model: Model,
+    space: DesignSpace,
+    requirements: tuple[Requirement, ...],
+    zones: Mapping[str, float],
+    units: int,
+    seeds: SeedTree,
+    record: RunRecord,
+    header: Header,
+) -> DifferenceAnswer:
+    """Return what other zones change, with the settings as they are.
+
+    Parameters
+    ----------
+    zones
+        Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A pattern that fits no source with a zone, a zone that is not above 0 or that no process holds.
+    """
+    errors = space.errors
+    wanted = _wanted(errors.active, zones)
+    present = [own.zone for own in errors.active]
+    others = [wanted.get(own.name, own.zone) for own in errors.active]
+    costs = {name: _cheapest(space, name, zone) for name, zone in wanted.items() if name in space.processes}
+    outputs = tuple(dict.fromkeys(own.output for own in requirements))
+    standard = errors.standard_values(np.concatenate([*seeds.uniform_chunks(units, len(errors.columns))]))
+    response, found = model.observed(record.observe).reading(outputs), []
+    with record.stage("difference"):
+        for own in (present, others):
+            evaluation = response(errors.deviations(standard, np.array(own)))
+            found.append(np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan))
+    changed = with_zones(errors.active, others, costs)
+    pairs = [(old, new) for old, new in zip(errors.active, changed, strict=True) if old.name in wanted]
+    return DifferenceAnswer(
+        header=replace(header, statuses=record.counts, stages=record.stages),
+        requirements=requirements,
+        before=tuple(old for old, _ in pairs),
+        after=tuple(new for _, new in pairs),
+        whole_cost=sum(own.cost for own in errors.active),
+        outputs=outputs,
+        values=np.stack(found),
+        seeds=seeds.child("resamples"),
+    )
+
+
+def _wanted(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
+    """Return source → zone [m]; later patterns take over from earlier ones."""
+    names = [own.name for own in sources]
+    found: dict[str, float] = {}
+    if not zones:
+        raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
+    for pattern, zone in zones.items():
+        own = [name for name in names if fnmatchcase(name, pattern)]
+        if not own:
+            raise UnknownNameError.among("difference", "source", pattern, names)
+        if not (isinstance(zone, int | float) and 0 < zone < 1e6):
+            raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
+        found |= dict.fromkeys(own, zone * MICROMETRE)
+    return found
+
+
+def _cheapest(space: DesignSpace, name: str, zone: float) -> float:
+    """Return the cost of a zone by the cheapest process that holds it [cost units]."""
+    made = [float(own.total(np.array(zone))) for own in space.processes[name] if own.minimum <= zone <= own.maximum]
+    if not made:
+        held = f"{min(own.minimum for own in space.processes[name]) / MICROMETRE:.3g} to " + (
+            f"{max(own.maximum for own in space.processes[name]) / MICROMETRE:.3g} µm, what its processes hold"
+        )
+        raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
+    return min(made)

@@ -1,0 +1,48 @@
+"""The command ``tolalloc whatif``: what other zones do to the drawing of a study, on the same random units."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.run import Script
+from tolalloc.cli.study_script import load_study
+from tolalloc.exceptions import InputError
+
+
+def whatif(
+    script: Script,
+    zones: Annotated[
+        list[str],
+        typer.Argument(help="Zones as SOURCE=µm, such as pin.diameter=3 'disc*.pitch=10'.", metavar="zone..."),
+    ],
+    units: Annotated[int, typer.Option(help="Random units of either drawing.")] = 1024,
+    out: ReportFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units."""
+    from tolalloc.function_model import FunctionModel
+    from tolalloc.study.questions import Difference
+
+    study = load_study(script)
+    if not isinstance(study.model, FunctionModel):
+        announce_compilation()
+    question = Difference(zones=dict(_zone(text) for text in zones), units=units)
+    with UnitProgress() as progress:
+        answer = study.ask(question, study.effort, progress)
+    tell(
+        answer, as_json, (answer.to_frame("changes"), "What changes"), (answer.to_frame("changed zones"), "Which zones")
+    )
+    write_report(answer, out)
+
+
+def _zone(text: str) -> tuple[str, float]:
+    """Return pattern and zone [µm] of one argument."""
+    pattern, separator, number = text.partition("=")
+    try:
+        return pattern.strip(), float(number)
+    except ValueError:
+        allowed = "SOURCE=µm, such as pin.diameter=3"
+        raise InputError.at("whatif", "zone", text if separator else f"{text} without =", allowed) from None
