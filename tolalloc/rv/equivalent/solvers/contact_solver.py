@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import Problem, along, assemble, compress, play_force
@@ -31,7 +31,7 @@ _FARTHEST = 1e9  # steps; a contact that resists only beyond is none
 _REACH = 1.0  # metres; the same
 
 
-@jit
+@jit_within
 def solve_tangent(tangent, gradient, step):
     """Solve tangent·step = −gradient by Cholesky in place; return whether a pivot was replaced."""
     size = gradient.size

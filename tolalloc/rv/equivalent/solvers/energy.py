@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_within
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 
 
@@ -61,7 +61,7 @@ def make_work(retained, contacts, elements):
     )
 
 
-@jit
+@jit_within
 def along(by_disc, play_by_retained, vector, compression, play):
     """Set the compressions of pins and elements that a displacement gives."""
     discs, _, pins = by_disc.shape
@@ -76,7 +76,7 @@ def along(by_disc, play_by_retained, vector, compression, play):
                 play[e, i] += play_by_retained[e, i, j] * vector[j]
 
 
-@jit
+@jit_within
 def compress(problem, q, compression, play):
     """Set the compressions of pins and elements with play at the coordinates q."""
     along(problem.by_disc, problem.play_by_retained, q, compression, play)
@@ -99,7 +99,7 @@ def play_force(stiffness, clearance, x, y):
     return taut * x, taut * y, taut + across * x * x, across * x * y, taut + across * y * y
 
 
-@jit
+@jit_within
 def assemble(problem, compression, play, q, gradient, tangent):
     """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact."""
     size, pins = problem.force.size, problem.by_disc.shape[2]

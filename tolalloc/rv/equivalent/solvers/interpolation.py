@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import make_work
@@ -50,7 +50,7 @@ def interpolation(position):
     return int(np.floor(position)) - 1, weights
 
 
-@jit
+@jit_within
 def blend(table, weights, out):
     """Set out to the weighted sum of the table's first four rows."""
     a, b, c, d, flat = table[0].ravel(), table[1].ravel(), table[2].ravel(), table[3].ravel(), out.ravel()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
 from tolalloc.rv.equivalent.solvers.lanes import (
@@ -39,7 +39,7 @@ _BEYOND = 1.000001  # of the way to the next contact
 _ALL = 2**WIDTH - 1
 
 
-@jit
+@jit_within
 def _press(by_disc, v, tile):
     """Set force and stiffness of the contacts of one register; return how many are pressed."""
     discs, _, pins = by_disc.shape
@@ -126,7 +126,7 @@ def _press_line_contacts(at, tables, v, tile):
     return touching, careful
 
 
-@jit
+@jit_within
 def _pressed(law, at, tables, v, tile):
     """Set force and stiffness of the contacts of one register by their law."""
     if law == LINEAR:
@@ -134,7 +134,7 @@ def _pressed(law, at, tables, v, tile):
     return _press_line_contacts(at, tables, v, tile)
 
 
-@jit
+@jit_within
 def _balance(discs, stiffness, v, tile):
     """Set the unbalanced force of one register; return residual, what it may be, and the largest force."""
     size = 3 * len(discs)  # known when compiled, so these loops become straight code
@@ -172,7 +172,7 @@ def _first_touch(by_disc, v, tile):
     return subtract(zero, closest), above(closest, nowhere)
 
 
-@jit
+@jit_within
 def _newton(law, discs, at, tables, v, tile):
     """Bring one register's samples to equilibrium; return one bit per lane that needs more care.
 
@@ -209,7 +209,7 @@ def _newton(law, discs, at, tables, v, tile):
     return _ALL ^ done
 
 
-@jit
+@jit_within
 def solve_tile_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful):
     """Solve the ``used`` samples of a tile at one node from the guesses in ``tile.q``; set which need more care."""
     displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, tile)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_within
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH, fma, load, spread, store
 
 TILE = 128
@@ -93,7 +93,7 @@ def nonzero_waves(layout, values):
     return waves[:count]
 
 
-@jit
+@jit_within
 def _forces(at, tables, rows, used, tile):
     """Set forces and carrier rotation at undisplaced discs."""
     table, by_load, values = tables.load[at], tables.carrier_by_load[at], tile.values
@@ -122,7 +122,7 @@ def _store_four(out, at, a, b, c, d):
     store(out, at + 3 * WIDTH, d)
 
 
-@jit
+@jit_within
 def _add_waves(table, values, first, waves, k, other, p, q, out):
     """Add the disc's harmonic deviations to two contacts of four registers: both share the amplitudes."""
     a, b, c, d = load(out, p), load(out, p + WIDTH), load(out, p + 2 * WIDTH), load(out, p + 3 * WIDTH)
@@ -137,7 +137,7 @@ def _add_waves(table, values, first, waves, k, other, p, q, out):
     _store_four(out, p, a, b, c, d)
 
 
-@jit
+@jit_within
 def _undisturbed(at, tables, layout, waves, teeth_deviate, used, tile):
     """Set the pin compressions at undisplaced discs."""
     pins, values, out = layout.pins, tile.values, tile.undisturbed
@@ -165,7 +165,7 @@ def _undisturbed(at, tables, layout, waves, teeth_deviate, used, tile):
                         store(out, place, fma(factor, load(values, row + v), load(out, place)))
 
 
-@jit
+@jit_within
 def _weigh(at, tables, weighted):
     """Set k·d of all contacts."""
     by_disc, stiffness = tables.contact_by_disc[at], tables.contact_stiffness[at]
@@ -186,7 +186,7 @@ def guess_next(used, tile):
             tile.last[i, s] = q
 
 
-@jit
+@jit_within
 def displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, tile):
     """Set all that the errors do at one node while the discs are undisplaced."""
     _forces(at, tables, rows, used, tile)
