@@ -96,6 +96,8 @@ def test_a_process_prices_the_zone_that_it_holds():
 @pytest.mark.parametrize(
     ("zones", "words"),
     [
+        (3, "zones is 3; allowed is source names with their zones"),
+        ({1: 2.0}, "allowed is source names with their zones"),
         ({}, "no zone is given"),
         ({"bolt": 3.0}, "source 'bolt' is not known"),
         ({"shaft": -1.0}, "shaft is -1.0; allowed is a zone above 0"),

@@ -11,8 +11,9 @@ from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.search import ROUNDING, ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign
 
-TABLE, ALIKE, ALONE, GRADES = "tolerance table as it is", "all zones scaled alike", "tolerances alone", "grades"
-"""What the drawings that are compared are called, next to what everything free is called."""
+TABLE, ALIKE, ALONE = "tolerance table as it is", "all zones scaled alike", "tolerances alone"
+FREE, GRADES = "everything free", "grades"
+"""What the drawings that are compared are called; a model has its own word for everything free."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +24,7 @@ class Candidates:
     free: ZoneAllocation  # Tolerances and settings together
     graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
 
-    def designs(self, free_label: str) -> dict[str, VerifiedDesign]:
+    def designs(self, free_label: str = FREE) -> dict[str, VerifiedDesign]:
         """Return the designs that a report compares, by what they are called."""
         alone = {ALONE: self.fixed.chosen} if self.fixed else {}
         grades = {GRADES: self.graded.chosen} if self.graded else {}
@@ -35,7 +36,7 @@ class Candidates:
             **grades,
         }
 
-    def admitted(self, free_label: str) -> dict[str, VerifiedDesign]:
+    def admitted(self, free_label: str = FREE) -> dict[str, VerifiedDesign]:
         """Return those that may be drawn: the table always, the others where their zones and amounts may be so.
 
         Where grades are asked for, nothing but them and the table may.
@@ -48,7 +49,7 @@ class Candidates:
     @property
     def drawn(self) -> VerifiedDesign:
         """The cheapest admitted design that was shown to keep the limits; the search's least violating one if none."""
-        return _cheapest(self.admitted("free")) or (self.graded or self.free).chosen
+        return _cheapest(self.admitted()) or (self.graded or self.free).chosen
 
     @property
     def unrestricted(self) -> ZoneAllocation:
@@ -64,12 +65,12 @@ class Candidates:
         """
         free = min(own.bound for own in self._searches.values())
         bound = self.graded.bound if self.graded else free
-        kept = [own.cost for own in self.admitted("free").values() if own.met]
+        kept = [own.cost for own in self.admitted().values() if own.met]
         return None if kept and min(kept) < bound * (1 - ROUNDING) else bound
 
     @property
     def _searches(self) -> dict[str, ZoneAllocation]:
-        return {"free": self.free, **({ALONE: self.fixed} if self.fixed else {})}
+        return {FREE: self.free, **({ALONE: self.fixed} if self.fixed else {})}
 
 
 def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:

@@ -66,12 +66,7 @@ class DifferenceAnswer(Answer):
 
     def _kept(self, side: int) -> Bool[np.ndarray, " unit"]:
         """Return which units keep all limits."""
-        kept = np.ones(self.values.shape[1], np.bool_)
-        for own in self.requirements:
-            values, limits = self._values(own)[side], own.limits
-            kept &= values >= (-np.inf if limits.lower is None else limits.lower)
-            kept &= values <= (np.inf if limits.upper is None else limits.upper)
-        return kept
+        return np.asarray(np.all([own.limits.kept_by(self._values(own)[side]) for own in self.requirements], axis=0))
 
     def _values(self, requirement: Requirement) -> Float[np.ndarray, "2 unit"]:
         return self.values[:, :, self.outputs.index(requirement.output)]

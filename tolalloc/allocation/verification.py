@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
@@ -128,7 +128,7 @@ class Verifier:
             for requirement in self.requirements
         )
         values = {output: fresh.values(output) for output in outputs}
-        kept = np.array([_kept(requirement, values[requirement.output]) for requirement in self.requirements])
+        kept = np.array([requirement.limits.kept_by(values[requirement.output]) for requirement in self.requirements])
         return VerifiedDesign(
             name=name,
             space=self.space,
@@ -142,12 +142,6 @@ class Verifier:
             outputs=values,
             by_zone=_by_zone(fresh, checks[0].sides[0].value),
         )
-
-
-def _kept(requirement: Requirement, values: Float[np.ndarray, " unit"]) -> Bool[np.ndarray, " unit"]:
-    """Return which units keep the limits; one without an answer does not."""
-    low, high = requirement.limits.lower, requirement.limits.upper
-    return np.asarray((values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high)))
 
 
 def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"] | None:

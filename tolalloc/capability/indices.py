@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tolalloc.exceptions import InputError
 
@@ -27,6 +27,10 @@ class Limits:
             raise InputError("Capability needs a lower limit, an upper limit or both.")
         if self.lower is not None and self.upper is not None and not self.lower < self.upper:
             raise InputError.at("capability", "upper limit", self.upper, f"a number above the lower one, {self.lower}")
+
+    def kept_by(self, sample: Float[np.ndarray, " unit"]) -> Bool[np.ndarray, " unit"]:
+        """Return which values keep the limits; one that is not a number does not."""
+        return np.asarray((sample >= self._low) & (sample <= self._high))
 
     def outside(self, sample: Float[np.ndarray, " unit"]) -> int:
         """Return how many values lie beyond a limit."""

@@ -102,6 +102,9 @@ class Difference(Question):
     units: int = 1024
 
     def __post_init__(self) -> None:
+        if not isinstance(self.zones, Mapping) or not all(isinstance(name, str) for name in self.zones):
+            allowed = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
+            raise InputError.at("question difference", "zones", self.zones, allowed)
         if not (isinstance(self.units, int) and 100 <= self.units <= 10_000_000):
             raise InputError.at("question difference", "units", self.units, "a whole number from 100 to 10,000,000")
 
