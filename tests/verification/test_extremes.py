@@ -8,6 +8,8 @@ import pytest
 from tests.random_units import random_units
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.records import AngleSearch
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
 from tolalloc.units import ARCSECOND
 
 
@@ -46,3 +48,18 @@ def test_remaining_error_is_stated(rv20e, table4):
     result = rv20e.extremes(table4, -1.0)
     assert 0 <= result.remaining[0] < 0.05 * ARCSECOND
     assert result.solves[0] > rv20e.search.coarse
+
+
+@pytest.mark.parametrize("name", ["rv20e", "rv20e_liu2020"])
+def test_extremes_have_the_same_bits_alone_and_among_others(name, generator):
+    """Whatever stands in the lanes beside it; one of the units has a tilted disc and is solved alone."""
+    model = EquivalentModel(load_reducer(name), AngleSearch(coarse=117))
+    own = load_unit("table4").errors(model.columns, model.reducer.modification.deviations)
+    units = random_units(own, model.columns, generator, 13)
+    units[4, model.columns.index("disc1.bore1.tilt.x")] = 1e-5
+    together = model.extremes(units, -1.0)
+    assert (together.solves > 119 + 2 * 20).all()
+    for rows in (slice(0, 1), slice(3, 12)):
+        apart = model.extremes(units[rows], -1.0)
+        for values in ("largest", "smallest", "carrier_angle", "remaining", "solves", "status"):
+            np.testing.assert_array_equal(getattr(apart, values), getattr(together, values)[rows])

@@ -12,7 +12,7 @@ from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.lane_solver import DEEPEST, _line_contact, solve_tile_at
-from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, store
+from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, spread, store
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.tile import TILE, make_tile, nonzero_rows, nonzero_waves
 from tolalloc.rv.reducer.files import load_reducer
@@ -28,7 +28,7 @@ def logarithms(numbers, found):
 @jit
 def line_contacts(stiffness, log_length, depth, force, slope, far):
     for at in range(0, depth.size, WIDTH):
-        own_force, own_slope, own_far = _line_contact(stiffness, log_length, load(depth, at))
+        own_force, own_slope, own_far = _line_contact(spread(stiffness), spread(log_length), load(depth, at))
         store(force, at, own_force)
         store(slope, at, own_slope)
         far[at // WIDTH] = own_far
@@ -49,7 +49,7 @@ def test_logarithms_are_those_of_numpy_within_two_units_in_the_last_place(genera
     assert found[-8] == 0.0
 
 
-@pytest.mark.parametrize("log_length", [np.log(0.01), np.log(0.3), np.log(0.1) + 12.0])
+@pytest.mark.parametrize("log_length", [np.log(0.01), np.log(0.3), np.log(0.1) + 12.0, np.log(0.1) + 120.0])
 def test_line_contact_is_the_law_of_one_pin(log_length, generator):
     depth = np.sort(np.exp(generator.uniform(np.log(1e-16), np.log(3e-3), 4000)))
     force, slope, far = np.empty_like(depth), np.empty_like(depth), np.empty(depth.size // WIDTH, np.int64)
@@ -81,7 +81,7 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     layout, careful = columns.layout, np.empty(TILE, np.bool_)
     values = np.empty((TILE, layout.end))
     values_of(units, -1.0, layout, columns.map, values)
-    tile = make_tile(layout, tables.load.shape[2], tables.contact_stiffness.shape[1])
+    tile = make_tile(layout, tables.load.shape[2], tables.contact_stiffness.shape[1], TILE)
     tile.values[:] = values.T
     rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
     teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)

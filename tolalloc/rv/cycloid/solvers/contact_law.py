@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit_in_place
 from tolalloc.rv.cycloid.solvers import LINEAR
 
 _STIFFEST = 2.0  # ln(cλ/F) at which the logarithmic law goes on straight: a force that no part carries
 
 
-@jit
+@jit_in_place
 def _logarithmic(stiffness, log_length, compression):
     """Return force and its derivative of Hertzian line contact, theory page equation (30).
 
@@ -32,7 +32,7 @@ def _logarithmic(stiffness, log_length, compression):
     return scale * compression / w, scale / (w - 1.0)
 
 
-@jit
+@jit_in_place
 def pin_force(law, stiffness, log_length, half_tilt, compression):
     """Return force [N] and its derivative [N/m] of one pin contact.
 
@@ -49,7 +49,7 @@ def pin_force(law, stiffness, log_length, half_tilt, compression):
     return _logarithmic(stiffness, log_length, compression)
 
 
-@jit
+@jit_in_place
 def pin_forces(law, stiffness, log_length, compression, force):
     """Fill the forces of several pins, [pin]."""
     for k in range(compression.size):

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.compiled import in_threads, jit
+from tolalloc.compiled import in_threads, jit, jit_in_place
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.contact_solver import solve_tangent
 from tolalloc.rv.equivalent.solvers.energy import assemble, compress, play_force
@@ -33,7 +33,7 @@ def _adjoint(problem, work, carrier_by_retained, q, adjoint):
     solve_tangent(work.tangent, -carrier_by_retained, adjoint)
 
 
-@jit
+@jit_in_place
 def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
     """Set −λ·∂gradient/∂compression of every pin and its derivative by half the tilt; return the derivative by ln C."""
     by_stiffness = 0.0
@@ -55,7 +55,7 @@ def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
     return by_stiffness
 
 
-@jit
+@jit_in_place
 def _add_pins(at, weight, tables, layout, weight_of_pin, out):
     """Add the derivative by all values that act on the pins at one node."""
     pins, table = layout.pins, tables.contact_by_error[at]
@@ -74,7 +74,7 @@ def _add_pins(at, weight, tables, layout, weight_of_pin, out):
                 out[tooth] += own * table[d, 2 + layout.waves + kind, k]
 
 
-@jit
+@jit_in_place
 def _add_tilt(problem, turn, face_width, layout, values, tilt_by_pin, factor, out):
     """Add the derivative by the tilts of the discs."""
     pins = layout.pins
@@ -89,7 +89,7 @@ def _add_tilt(problem, turn, face_width, layout, values, tilt_by_pin, factor, ou
             out[layout.tilt + 2 * d + 1] += own * (turn[0] * nx + turn[1] * ny)
 
 
-@jit
+@jit_in_place
 def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_play, out, by_row):
     """Add the derivative by the spring rows' values and by all their stiffnesses at one node."""
     rows, elements = tables.row_stiffness.shape[1], tables.play_stiffness.shape[1]

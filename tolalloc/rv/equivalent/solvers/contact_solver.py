@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit, jit_within
+from tolalloc.compiled import jit, jit_in_place, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import Problem, along, assemble, compress, play_force
@@ -65,7 +65,7 @@ def solve_tangent(tangent, gradient, step):
     return replaced
 
 
-@jit
+@jit_in_place
 def _slope_at(problem, work, length, slope, curvature):
     """Return first and second derivative of the energy along the step, ``length`` steps from q."""
     first, second = slope + curvature * length, curvature
@@ -97,7 +97,7 @@ def _slope_at(problem, work, length, slope, curvature):
     return first, second
 
 
-@jit
+@jit_in_place
 def _exact_step(problem, work, q):
     """Return how many steps away the energy along the step is least, or −1 where it falls for ever.
 
@@ -139,7 +139,7 @@ def _exact_step(problem, work, q):
     return length
 
 
-@jit
+@jit_in_place
 def _newton(problem, q, work):
     ratio, touching, least, least_touching = np.inf, 0, np.inf, 0
     for _ in range(_ITERATIONS):
@@ -153,7 +153,8 @@ def _newton(problem, q, work):
             return CONVERGED, ratio, touching
         if ratio < least:
             least, least_touching = ratio, touching
-            work.best[:] = q
+            for i in range(q.size):
+                work.best[i] = q[i]
         replaced = solve_tangent(work.tangent, work.gradient, work.step)
         along(problem.by_disc, problem.play_by_retained, work.step, work.rate, work.play_rate)
         changed = work.play.shape[0] > 0 or problem.law != LINEAR
@@ -169,7 +170,8 @@ def _newton(problem, q, work):
             q[i] += length * work.step[i]
             if not abs(q[i]) < _REACH:
                 return NOT_RESISTED, ratio, touching
-    q[:] = work.best
+    for i in range(q.size):
+        q[i] = work.best[i]
     return CONVERGED if least <= _PROMISED else NOT_CONVERGED, least, least_touching
 
 
@@ -193,6 +195,13 @@ def _softened(problem, factor):
 
 
 @jit
+def _decade_by_decade(problem, q, work):
+    """Bring q near the equilibrium of a problem with play, its bearings stiffened from soft ones."""
+    for decade in range(_SOFTEST):
+        _newton(_softened(problem, 10.0 ** (decade - _SOFTEST)), q, work)
+
+
+@jit_in_place
 def equilibrium(problem, q, work):
     """Bring q to equilibrium; return status, residual over the largest force, pins in contact.
 
@@ -201,7 +210,6 @@ def equilibrium(problem, q, work):
     """
     status, ratio, touching = _newton(problem, q, work)
     if status == NOT_CONVERGED and problem.clearance.size:
-        for decade in range(_SOFTEST):
-            _newton(_softened(problem, 10.0 ** (decade - _SOFTEST)), q, work)
+        _decade_by_decade(problem, q, work)
         status, ratio, touching = _newton(problem, q, work)
     return status, ratio, touching

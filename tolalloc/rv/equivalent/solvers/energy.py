@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.compiled import jit, jit_within
+from tolalloc.compiled import jit, jit_in_place, jit_within
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 
 
@@ -87,7 +87,7 @@ def compress(problem, q, compression, play):
         play[e, 1] += problem.play_offset[e, 1]
 
 
-@jit
+@jit_in_place
 def play_force(stiffness, clearance, x, y):
     """Return force (x, y) of an element with play and its derivative (xx, xy, yy), theory page equation (28)."""
     reach = np.sqrt(x * x + y * y)

@@ -1,7 +1,7 @@
 """The two extremes of each sample's transmission error, refined between the coarse angles.
 
-The extremes of the curve are kinks, where one pin takes over from another, so the peak is searched by
-halving the step around the candidates and not by a parabola.
+First the highest peak of either side is followed to its end; then every other one that may still reach what was found.
+Every peak's search depends on its own sample alone, whatever stands in the lanes beside it.
 """
 
 from __future__ import annotations
@@ -11,84 +11,107 @@ from typing import Any
 import numpy as np
 
 from tolalloc.compiled import in_threads, jit
-from tolalloc.rv.equivalent.solvers.interpolation import make_memory, solve_anywhere
+from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.problem import values_of
-from tolalloc.rv.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes
+from tolalloc.rv.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes
+from tolalloc.rv.equivalent.solvers.refinement import make_lent, search_peaks
+from tolalloc.rv.equivalent.solvers.searches import make_peaks, make_searches
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile, tile_size
 
 
 @jit
-def _gain(left, centre, right):
-    """Return how much a peak near ``centre`` may rise above it: the steeper flank carried on for one step."""
-    return max(centre - left, centre - right)
+def _highest(turn, sides, found):
+    """Return the highest peak of every side of every sample."""
+    sample, side, coarse = np.empty(sides, np.int64), np.empty(sides, np.int64), np.empty(sides, np.int64)
+    count = 0
+    for s in range(found.status.size):
+        if found.status[s] != NOT_FINITE:
+            inside = turn.rotation[s, 1:-1]
+            for one, at in ((0, inside.argmax()), (1, inside.argmin())):
+                sample[count], side[count], coarse[count] = s, one, at
+                count += 1
+    return make_peaks(sample[:count], side[:count], coarse[:count])
 
 
 @jit
-def _refine(sign, rotation, retained, search, tables, layout, design, values, memory):
-    """Return the largest sign·rotation, its position, the error that may be left, solves, and the worst outcome.
-
-    ``rotation`` and ``retained`` begin and end one coarse angle outside the turn, so that every angle has two
-    neighbours of its own, also where the ratio leaves the curve not periodic.
-    """
-    inside = sign * rotation[1:-1]
-    best_at = inside.argmax()
-    first, stride = search.nodes_per_coarse + MARGIN, float(search.nodes_per_coarse)
-    best, position = inside[best_at], first + best_at * stride
-    left_over, solves, worst_status, worst_residual = 0.0, 0, CONVERGED, 0.0
-    sides, here, at_side = np.empty(2), np.empty(retained.shape[1]), np.empty((2, retained.shape[1]))
-    peaks = np.flatnonzero((inside >= sign * rotation[:-2]) & (inside >= sign * rotation[2:]))
-    for i in peaks[np.argsort(-inside[peaks])]:
-        left, centre, right = sign * rotation[i], inside[i], sign * rotation[i + 2]
-        at, step = first + i * stride, stride
-        here[:] = retained[i + 1]
-        for _ in range(search.levels):
-            if centre + search.safety * _gain(left, centre, right) <= best and centre < best:
-                break
-            step *= 0.5
-            for side in range(2):
-                at_side[side] = here
-                turned, status, ratio, _ = solve_anywhere(
-                    at + (2 * side - 1) * step, tables, layout, design.face_width, values, at_side[side], memory
-                )
-                sides[side] = sign * turned if status == CONVERGED else -np.inf
-                solves += 1
-                worst_status, worst_residual = max(worst_status, status), max(worst_residual, ratio)
-            if sides[0] > centre and sides[0] >= sides[1]:
-                left, centre, right, at = left, sides[0], centre, at - step
-                here[:] = at_side[0]
-            elif sides[1] > centre:
-                left, centre, right, at = centre, sides[1], right, at + step
-                here[:] = at_side[1]
-            else:
-                left, right = sides[0], sides[1]
-        if centre > best or at == position:
-            best, position, left_over = max(centre, best), at, _gain(left, centre, right)
-    return best, position, left_over, solves, worst_status, worst_residual
-
-
-@jit
-def _refine_all(tables, layout, mapped, design, errors, torque, search, turn, found):
-    """Fill the extremes of some samples whose coarse turn is solved."""
-    values = np.empty((errors.shape[0], layout.end))
-    values_of(errors, torque, layout, mapped, values)
-    memory = make_memory(design.law, tables)
-    for s in range(errors.shape[0]):
-        found.solves[s], found.left_over[s] = turn.rotation.shape[1], 0.0
-        found.status[s], found.residual[s] = turn.status[s].max(), turn.residual[s].max()
+def _others(turn, search, best, highest, found):
+    """Return the other peaks that may reach what was found at the highest ones."""
+    room = turn.rotation.size
+    sample, side, coarse = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
+    count, known = 0, np.full((found.status.size, 2), -1)
+    for p in range(highest.coarse.size):
+        known[highest.sample[p], highest.side[p]] = highest.coarse[p]
+    for s in range(found.status.size):
         if found.status[s] == NOT_FINITE:
-            found.extreme[s], found.position[s] = np.nan, np.nan
             continue
-        memory[2].first[:] = -1
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            best, at, left, count, worst_status, worst_residual = _refine(
-                sign, turn.rotation[s], turn.retained[s], search, tables, layout, design, values[s], memory
-            )
-            found.extreme[s, side], found.position[s, side] = sign * best, at
-            found.left_over[s] += left
-            found.solves[s] += count
-            found.status[s] = max(found.status[s], worst_status)
-            found.residual[s] = max(found.residual[s], worst_residual)
+        for one in range(2):
+            sign = 1.0 - 2.0 * one
+            for i in range(search.coarse):
+                left, centre, right = (
+                    sign * turn.rotation[s, i],
+                    sign * turn.rotation[s, i + 1],
+                    sign * turn.rotation[s, i + 2],
+                )
+                gain = max(centre - left, centre - right)
+                peak = centre >= left and centre >= right and i != known[s, one]
+                if peak and centre + search.safety * gain > best[s, one]:
+                    sample[count], side[count], coarse[count] = s, one, i
+                    count += 1
+    return make_peaks(sample[:count], side[:count], coarse[:count])
+
+
+@jit
+def _keep_best(peaks, best, left_over, found):
+    """Take over what is higher than the best of its sample and side."""
+    for p in range(peaks.coarse.size):
+        s, one = peaks.sample[p], peaks.side[p]
+        if peaks.height[p] > best[s, one]:
+            best[s, one], left_over[s, one] = peaks.height[p], peaks.left_over[p]
+            found.extreme[s, one], found.position[s, one] = (1.0 - 2.0 * one) * peaks.height[p], peaks.position[p]
+
+
+@jit
+def _prepare(layout, mapped, errors, torque, elements, turn, values, found):
+    """Set the values of all samples and what their coarse turns say; return which are solved one by one."""
+    alone = np.empty(errors.shape[0], np.bool_)
+    values_of(errors, torque, layout, mapped, values)
+    for s in range(alone.size):
+        found.solves[s] = turn.rotation.shape[1]
+        found.status[s], found.residual[s] = turn.status[s].max(), turn.residual[s].max()
+        found.extreme[s], found.position[s] = np.nan, np.nan
+        alone[s] = elements > 0 or np.any(values[s, layout.tilt :] != 0.0)
+    return alone
+
+
+def _refine(
+    discs: Any,
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    search: Any,
+    turn: Any,
+    found: Any,
+) -> None:
+    """Fill the extremes of some samples whose coarse turn is solved.
+
+    Not compiled itself: what it calls would be compiled a second time as a part of it.
+    """
+    contacts, values = tables.contact_stiffness.shape[1], np.empty((errors.shape[0], layout.end))
+    best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
+    alone = _prepare(layout, mapped, errors, torque, tables.play_stiffness.shape[1], turn, values, found)
+    own, lent = make_searches(turn.retained.shape[2]), make_lent(layout, 3 * len(discs), contacts)
+    memory = make_memory(design.law, tables)
+    given = (discs, alone, tables, layout, design, values, search, turn, best)
+    highest = _highest(turn, 2 * errors.shape[0], found)
+    search_peaks(*given, highest, own, memory, lent, found)
+    _keep_best(highest, best, left_over, found)
+    others = _others(turn, search, best, highest, found)
+    search_peaks(*given, others, own, memory, lent, found)
+    _keep_best(others, best, left_over, found)
+    found.left_over[:] = left_over.sum(axis=1)
 
 
 def solve_extremes(
@@ -100,6 +123,6 @@ def solve_extremes(
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
         solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)
-        _refine_all(*given, search, turn, SolvedExtremes(*(values[part] for values in found)))
+        _refine(discs, *given, search, turn, SolvedExtremes(*(values[part] for values in found)))
 
     in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.compiled import jit, jit_within
+from tolalloc.compiled import jit, jit_in_place, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import make_work
@@ -23,6 +23,7 @@ class Nodes(NamedTuple):
     force: Float[np.ndarray, "2 4 retained"]
     undisturbed: Float[np.ndarray, "2 4 contact"]
     play_offset: Float[np.ndarray, "2 4 element 2"]
+    turn: Float[np.ndarray, "2"]  # Of the discs' axes, at the position in between [-]
 
 
 @jit
@@ -34,10 +35,11 @@ def make_nodes(retained, contacts, elements):
         np.empty((2, 4, retained)),
         np.empty((2, 4, contacts)),
         np.empty((2, 4, elements, 2)),
+        np.empty(2),
     )
 
 
-@jit
+@jit_in_place
 def interpolation(position):
     """Return the first of four nodes around a position, and the weights of the cubic through them."""
     x = position - np.floor(position)
@@ -53,12 +55,13 @@ def interpolation(position):
 @jit_within
 def blend(table, weights, out):
     """Set out to the weighted sum of the table's first four rows."""
-    a, b, c, d, flat = table[0].ravel(), table[1].ravel(), table[2].ravel(), table[3].ravel(), out.ravel()
-    for i in range(flat.size):
-        flat[i] = (weights[0] * a[i] + weights[1] * b[i]) + (weights[2] * c[i] + weights[3] * d[i])
+    flat, own, size = table.reshape(table.size), out.reshape(out.size), out.size
+    for i in range(size):
+        first = weights[0] * flat[i] + weights[1] * flat[size + i]
+        own[i] = first + (weights[2] * flat[2 * size + i] + weights[3] * flat[3 * size + i])
 
 
-@jit
+@jit_in_place
 def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained):
     """Fill ``own`` with the problem between nodes, all tables interpolated; return the rotation at fixed discs."""
     first, weights = interpolation(position)
@@ -87,16 +90,15 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
     blend(nodes.play_offset[slot], weights, own.play_offset)
     blend(tables.play_stiffness[here], weights, own.play_stiffness)
     blend(tables.carrier_by_retained[here], weights, carrier_by_retained)
-    turn = np.empty(2)
-    blend(tables.turn[here], weights, turn)
-    sample_constants(own, turn, face_width, layout, values)
+    blend(tables.turn[here], weights, nodes.turn)
+    sample_constants(own, nodes.turn, face_width, layout, values)
     rotation = 0.0
     for node in range(4):
         rotation += weights[node] * nodes.rotation[slot, node]
     return rotation
 
 
-@jit
+@jit_in_place
 def solve_between(position, tables, layout, face_width, values, q, memory):
     """Solve one sample between nodes from the guess q; return rotation, status, residual, pins in contact."""
     own, work, nodes, carrier_by_retained = memory

@@ -7,17 +7,22 @@ Samples not settled in some steps, or that so meet no pin, need a line search an
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from tolalloc.compiled import jit, jit_within
+from tolalloc.compiled import jit_in_place, jit_within
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
 from tolalloc.rv.equivalent.solvers.lanes import (
     WIDTH,
+    Apart,
+    Common,
     above,
     add,
     choose,
     divide,
+    entry,
     fma,
     larger,
     load,
@@ -29,34 +34,58 @@ from tolalloc.rv.equivalent.solvers.lanes import (
     store,
     subtract,
 )
-from tolalloc.rv.equivalent.solvers.tile import TILE, displace_nothing
+from tolalloc.rv.equivalent.solvers.tile import displace_nothing
 
 _STEPS = 10
 _CURVED_STEPS = 16  # under a curved law, whose stiffness changes with every step
 DEEPEST = 2.5
 """ln(λ/depth) of the deepest line contact that is solved here; no pin is pressed nearly so far [-]."""
+_FITTED = 60.0  # the same, up to which the first guess is fitted; beyond are pins that bend
+# Polynomials in ln(λ/depth) whose quotient is w within 6e-6 of it, between these two; the highest power first
+_GUESS_ABOVE = (1.005474163226404, 43.38101546887862, 233.56651878989643, 23.804776956823332, -126.06674351599219)
+_GUESS_BELOW = (1.0, 38.406473312790936, 134.0172497759548, -42.19423112046455)
 _BEYOND = 1.000001  # of the way to the next contact
-_ALL = 2**WIDTH - 1
+ALL = 2**WIDTH - 1
+"""One bit for every lane."""
+
+
+class LaneTables(NamedTuple):
+    """What is tabulated at an angle: one angle for all lanes, or an own one for each."""
+
+    stiffness: Common | Apart  # S, by rows [N/m]
+    by_disc: Common | Apart  # D of every disc, direction and pin [m/m]
+    weighted: Common | Apart  # k·d of every direction and contact [N/m], for the linear law
+    # Stiffness [N/m] and ln L of every contact, for line contact
+    contact: Common | Apart
+    log_length: Common | Apart
 
 
 @jit_within
-def _press(by_disc, v, tile):
+def _lever(tables, disc, pins, pin):
+    """Return what a contact is compressed by with its disc's three coordinates."""
+    at = 3 * disc * pins + pin
+    return entry(tables.by_disc, at), entry(tables.by_disc, at + pins), entry(tables.by_disc, at + 2 * pins)
+
+
+@jit_within
+def _press(discs, tables, v, tile):
     """Set force and stiffness of the contacts of one register; return how many are pressed."""
-    discs, _, pins = by_disc.shape
-    zero, one, weighted, undisturbed = spread(0.0), spread(1.0), tile.weighted, tile.undisturbed
+    contacts, width = tile.undisturbed.shape
+    pins = contacts // len(discs)
+    zero, one, undisturbed = spread(0.0), spread(1.0), tile.undisturbed
     touching = zero
-    for d in range(discs):
-        first = 3 * d * TILE + v
-        x, y, turn = load(tile.q, first), load(tile.q, first + TILE), load(tile.q, first + 2 * TILE)
+    for d in range(len(discs)):
+        first = 3 * d * width + v
+        x, y, turn = load(tile.q, first), load(tile.q, first + width), load(tile.q, first + 2 * width)
         gx, gy, gt, xx, xy, yy, xt, yt, tt = zero, zero, zero, zero, zero, zero, zero, zero, zero
         for k in range(pins):
             c = d * pins + k
-            a, b, t = spread(by_disc[d, 0, k]), spread(by_disc[d, 1, k]), spread(by_disc[d, 2, k])
-            depth = fma(t, turn, fma(b, y, fma(a, x, load(undisturbed, c * TILE + v))))
+            a, b, t = _lever(tables, d, pins, k)
+            depth = fma(t, turn, fma(b, y, fma(a, x, load(undisturbed, c * width + v))))
             pressed = above(depth, zero)
-            ka = choose(pressed, spread(weighted[0, c]), zero)
-            kb = choose(pressed, spread(weighted[1, c]), zero)
-            kt = choose(pressed, spread(weighted[2, c]), zero)
+            ka = choose(pressed, entry(tables.weighted, c), zero)
+            kb = choose(pressed, entry(tables.weighted, contacts + c), zero)
+            kt = choose(pressed, entry(tables.weighted, 2 * contacts + c), zero)
             gx, gy, gt = fma(ka, depth, gx), fma(kb, depth, gy), fma(kt, depth, gt)
             xx, xy, yy = fma(ka, a, xx), fma(ka, b, xy), fma(kb, b, yy)
             xt, yt, tt = fma(ka, t, xt), fma(kb, t, yt), fma(kt, t, tt)
@@ -68,50 +97,65 @@ def _press(by_disc, v, tile):
     return touching
 
 
-@jit
+@jit_within
+def _polynomial(coefficients, x):
+    """Return a polynomial by its coefficients, the highest power first."""
+    total = spread(coefficients[0])
+    for i in range(1, len(coefficients)):
+        total = fma(total, x, spread(coefficients[i]))
+    return total
+
+
+@jit_within
+def _halley(w, goal):
+    """Return w after one of Halley's steps to w − ln w = goal."""
+    one = spread(1.0)
+    inverse = divide(one, multiply(w, subtract(w, one)))
+    newton = multiply(multiply(subtract(subtract(w, logarithm(w)), goal), multiply(w, w)), inverse)
+    return subtract(w, multiply(newton, fma(multiply(spread(0.5), newton), inverse, one)))
+
+
+@jit_within
 def _line_contact(stiffness, log_length, depth):
     """Return force, stiffness and one bit per lane that is pressed too far, of Hertzian line contact at depths above 0.
 
     The law of `tolalloc.rv.cycloid.solvers.contact_law`: w − ln w = ln(λ/depth), F = c·depth/w with c twice the
-    stiffness. Halley's steps from w = g + ln(1 + g) triple the digits: two of them end at rounding.
+    stiffness. One of Halley's steps triples the digits of the first guess and so ends at rounding. Quotients share
+    their denominators: a division takes as long as ten products.
     """
-    one, half = spread(1.0), spread(0.5)
-    goal = subtract(spread(log_length), logarithm(depth))
+    one = spread(1.0)
+    goal = subtract(log_length, logarithm(depth))
     far = above(spread(DEEPEST), goal)
     goal = larger(goal, spread(DEEPEST))
-    w = add(goal, logarithm(add(goal, one)))
-    for _ in range(2):
-        below = subtract(w, one)
-        newton = divide(multiply(subtract(subtract(w, logarithm(w)), goal), w), below)
-        bend = divide(multiply(half, newton), multiply(w, below))
-        w = subtract(w, multiply(newton, add(one, bend)))
-    scale = spread(2.0 * stiffness)
-    return divide(multiply(scale, depth), w), divide(scale, subtract(w, one)), far
+    w = divide(_polynomial(_GUESS_ABOVE, goal), _polynomial(_GUESS_BELOW, goal))
+    beyond = above(goal, spread(_FITTED))
+    if beyond:
+        w = choose(beyond, _halley(add(goal, logarithm(add(goal, one))), goal), w)
+    w = _halley(w, goal)
+    below = subtract(w, one)
+    scale = divide(add(stiffness, stiffness), multiply(w, below))
+    return multiply(multiply(scale, below), depth), multiply(scale, w), far
 
 
-@jit
-def _press_line_contacts(at, tables, v, tile):
+@jit_in_place
+def _press_line_contacts(discs, tables, v, tile):
     """Set force and stiffness of the contacts of one register; return how many are pressed, and which too far."""
-    by_disc, stiffness, log_length = (
-        tables.contact_by_disc[at],
-        tables.contact_stiffness[at],
-        tables.contact_log_length[at],
-    )
-    discs, _, pins = by_disc.shape
+    pins, width = tile.undisturbed.shape[0] // len(discs), tile.undisturbed.shape[1]
     zero, one, undisturbed = spread(0.0), spread(1.0), tile.undisturbed
     touching, careful = zero, 0
-    for d in range(discs):
-        first = 3 * d * TILE + v
-        x, y, turn = load(tile.q, first), load(tile.q, first + TILE), load(tile.q, first + 2 * TILE)
+    for d in range(len(discs)):
+        first = 3 * d * width + v
+        x, y, turn = load(tile.q, first), load(tile.q, first + width), load(tile.q, first + 2 * width)
         gx, gy, gt, xx, xy, yy, xt, yt, tt = zero, zero, zero, zero, zero, zero, zero, zero, zero
         for k in range(pins):
             c = d * pins + k
-            a, b, t = spread(by_disc[d, 0, k]), spread(by_disc[d, 1, k]), spread(by_disc[d, 2, k])
-            depth = fma(t, turn, fma(b, y, fma(a, x, load(undisturbed, c * TILE + v))))
+            a, b, t = _lever(tables, d, pins, k)
+            depth = fma(t, turn, fma(b, y, fma(a, x, load(undisturbed, c * width + v))))
             pressed = above(depth, zero)
             if not pressed:
                 continue
-            force, slope, far = _line_contact(stiffness[c], log_length[c], choose(pressed, depth, spread(1e-6)))
+            own = choose(pressed, depth, spread(1e-6))
+            force, slope, far = _line_contact(entry(tables.contact, c), entry(tables.log_length, c), own)
             careful |= far & pressed
             force, slope = choose(pressed, force, zero), choose(pressed, slope, zero)
             gx, gy, gt = fma(force, a, gx), fma(force, b, gy), fma(force, t, gt)
@@ -127,23 +171,23 @@ def _press_line_contacts(at, tables, v, tile):
 
 
 @jit_within
-def _pressed(law, at, tables, v, tile):
+def _pressed(law, discs, tables, v, tile):
     """Set force and stiffness of the contacts of one register by their law."""
     if law == LINEAR:
-        return _press(tables.contact_by_disc[at], v, tile), 0
-    return _press_line_contacts(at, tables, v, tile)
+        return _press(discs, tables, v, tile), 0
+    return _press_line_contacts(discs, tables, v, tile)
 
 
 @jit_within
 def _balance(discs, stiffness, v, tile):
     """Set the unbalanced force of one register; return residual, what it may be, and the largest force."""
-    size = 3 * len(discs)  # known when compiled, so these loops become straight code
+    size, width = 3 * len(discs), tile.q.shape[1]  # the size is known when compiled: straight code
     largest, cancelling, residual = spread(0.0), spread(0.0), spread(0.0)
     for i in range(size):
-        applied, pressing = load(tile.force, i * TILE + v), load(tile.pins, i * WIDTH)
+        applied, pressing = load(tile.force, i * width + v), load(tile.pins, i * WIDTH)
         value, terms = subtract(pressing, applied), spread(0.0)
         for j in range(size):
-            factor, moved = spread(stiffness[i, j]), load(tile.q, j * TILE + v)
+            factor, moved = entry(stiffness, i * size + j), load(tile.q, j * width + v)
             value = fma(factor, moved, value)
             terms = fma(magnitude(factor), magnitude(moved), terms)
         store(tile.gradient, i * WIDTH, value)
@@ -153,71 +197,78 @@ def _balance(discs, stiffness, v, tile):
     return residual, allowed, largest
 
 
-@jit
-def _first_touch(by_disc, v, tile):
+@jit_in_place
+def _first_touch(discs, tables, v, tile):
     """Return how many steps away the next pin touches, and one bit per lane that meets one."""
     zero, nowhere = spread(0.0), spread(-np.inf)
-    discs, _, pins = by_disc.shape
+    pins, width = tile.undisturbed.shape[0] // len(discs), tile.undisturbed.shape[1]
     closest = nowhere  # minus the length
-    for d in range(discs):
-        row, first = 3 * d * WIDTH, 3 * d * TILE + v
-        x, y, turn = load(tile.q, first), load(tile.q, first + TILE), load(tile.q, first + 2 * TILE)
+    for d in range(len(discs)):
+        row, first = 3 * d * WIDTH, 3 * d * width + v
+        x, y, turn = load(tile.q, first), load(tile.q, first + width), load(tile.q, first + 2 * width)
         sx, sy, st = load(tile.step, row), load(tile.step, row + WIDTH), load(tile.step, row + 2 * WIDTH)
         for k in range(pins):
-            a, b, t = spread(by_disc[d, 0, k]), spread(by_disc[d, 1, k]), spread(by_disc[d, 2, k])
-            depth = fma(t, turn, fma(b, y, fma(a, x, load(tile.undisturbed, (d * pins + k) * TILE + v))))
+            a, b, t = _lever(tables, d, pins, k)
+            depth = fma(t, turn, fma(b, y, fma(a, x, load(tile.undisturbed, (d * pins + k) * width + v))))
             rate = fma(t, st, fma(b, sy, multiply(a, sx)))
-            meets = above(rate, zero) & (_ALL ^ above(depth, zero))
+            meets = above(rate, zero) & (ALL ^ above(depth, zero))
             closest = larger(choose(meets, divide(depth, rate), nowhere), closest)
     return subtract(zero, closest), above(closest, nowhere)
 
 
 @jit_within
-def _newton(law, discs, at, tables, v, tile):
-    """Bring one register's samples to equilibrium; return one bit per lane that needs more care.
+def settle(law, discs, tables, v, tile, done):
+    """Bring one register's samples to equilibrium but for those done; return one bit per lane that needs more care.
 
     Steps are whole. With too few pins in contact the tangent is singular: such a lane moves to where the next pin
     touches and a hair beyond.
     """
-    by_disc, stiffness, zero = tables.contact_by_disc[at], tables.stiffness[at], spread(0.0)
-    done = 0
-    touching, careful = _pressed(law, at, tables, v, tile)
+    zero, width = spread(0.0), tile.q.shape[1]
+    touching, careful = _pressed(law, discs, tables, v, tile)
     for _ in range(_STEPS if law == LINEAR else _CURVED_STEPS):
-        residual, allowed, largest = _balance(discs, stiffness, v, tile)
-        fresh = (_ALL ^ above(residual, allowed)) & (_ALL ^ (done | careful))
+        residual, allowed, largest = _balance(discs, tables.stiffness, v, tile)
+        fresh = (ALL ^ above(residual, allowed)) & (ALL ^ (done | careful))
         if fresh:
             ratio = choose(above(largest, zero), divide(residual, largest), zero)
             store(tile.ratio, v, choose(fresh, ratio, load(tile.ratio, v)))
             store(tile.touching, v, choose(fresh, touching, load(tile.touching, v)))
             done |= fresh
-        if (done | careful) == _ALL:
+        if (done | careful) == ALL:
             break
         # A vanishing pivot is replaced by a small one.
-        singular = newton_step(discs, stiffness, tile.stiffness, tile.gradient, tile.step, PIVOT)
-        singular &= _ALL ^ (done | careful)
+        singular = newton_step(discs, tables.stiffness, tile.stiffness, tile.gradient, tile.step, PIVOT)
+        singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:
-            reach, met = _first_touch(by_disc, v, tile)
-            careful |= singular & (_ALL ^ met)
+            reach, met = _first_touch(discs, tables, v, tile)
+            careful |= singular & (ALL ^ met)
             length = choose(singular, multiply(spread(_BEYOND), reach), length)
-        moving = _ALL ^ (done | careful)
+        moving = ALL ^ (done | careful)
         for i in range(3 * len(discs)):
-            q = load(tile.q, i * TILE + v)
-            store(tile.q, i * TILE + v, choose(moving, fma(length, load(tile.step, i * WIDTH), q), q))
-        touching, far = _pressed(law, at, tables, v, tile)
+            q = load(tile.q, i * width + v)
+            store(tile.q, i * width + v, choose(moving, fma(length, load(tile.step, i * WIDTH), q), q))
+        touching, far = _pressed(law, discs, tables, v, tile)
         careful |= far & moving
-    return _ALL ^ done
+    return ALL ^ done
 
 
 @jit_within
 def solve_tile_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful):
     """Solve the ``used`` samples of a tile at one node from the guesses in ``tile.q``; set which need more care."""
     displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, tile)
+    here = LaneTables(
+        Common(tables.stiffness[at]),
+        Common(tables.contact_by_disc[at]),
+        Common(tile.weighted),
+        Common(tables.contact_stiffness[at]),
+        Common(tables.contact_log_length[at]),
+    )
+    width = tile.q.shape[1]
     for v in range(0, used, WIDTH):
-        bits = _newton(law, discs, at, tables, v, tile)
+        bits = settle(law, discs, here, v, tile, 0)
         for lane in range(WIDTH):
             careful[v + lane] = (bits >> lane) & 1
         total = load(tile.rotation, v)
         for i in range(tile.q.shape[0]):
-            total = fma(spread(tables.carrier_by_retained[at, i]), load(tile.q, i * TILE + v), total)
+            total = fma(spread(tables.carrier_by_retained[at, i]), load(tile.q, i * width + v), total)
         store(tile.rotation, v, total)

@@ -7,8 +7,10 @@ what the compiler finds profitable. Machines with shorter registers take the sam
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+from jaxtyping import Float
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -22,6 +24,18 @@ _LOGARITHM_LEFT = float.fromhex("0x1.a39ef35793c76p-33")
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
+
+
+class Common(NamedTuple):
+    """A table of which all eight samples take the same entries."""
+
+    entries: Float[np.ndarray, "..."]
+
+
+class Apart(NamedTuple):
+    """A table of which each of eight samples has its own entries, side by side in the last axis."""
+
+    entries: Float[np.ndarray, "... 8"]
 
 
 class _Lanes(types.Type):  # type: ignore[misc]
@@ -65,6 +79,25 @@ def load(typing, array, at):
         return builder.load(_address(context, builder, signature.args[0], *arguments), align=8)
 
     return lanes(array, types.intp), emit
+
+
+def _entry(context, builder, kind, table, at):
+    """Return an entry of a `Common` or an `Apart` table."""
+    array = builder.extract_value(table, 0)
+    if kind.instance_class is Apart:
+        return builder.load(_address(context, builder, kind[0], array, builder.mul(at, at.type(WIDTH))), align=8)
+    data = context.make_array(kind[0])(context, builder, array).data
+    return _splat(builder, builder.load(builder.gep(data, [at])))
+
+
+@intrinsic
+def entry(typing, table, at):
+    """Return the entry at a flat index of a table that is common to all lanes, or apart for each."""
+
+    def emit(context, builder, signature, arguments):
+        return _entry(context, builder, signature.args[0], *arguments)
+
+    return lanes(table, types.intp), emit
 
 
 @intrinsic
@@ -213,11 +246,11 @@ def newton_step(typing, discs, stiffness, contact, gradient, step, least):
         def multiply_subtract(value, a, b):
             return _call(builder, "fma", (builder.fneg(a), b, value))
 
-        table = context.make_array(kinds["stiffness"])(context, builder, given["stiffness"]).data
         entry = {}
         for i in range(size):
             for j in range(i + 1):
-                own = _splat(builder, builder.load(builder.gep(table, [ir.IntType(64)(i * size + j)])))
+                place = ir.IntType(64)(i * size + j)
+                own = _entry(context, builder, kinds["stiffness"], given["stiffness"], place)
                 if i // 3 == j // 3:
                     row = 6 * (i // 3) + (i % 3) * (i % 3 + 1) // 2 + j % 3
                     own = builder.fadd(own, builder.load(at("contact", row), align=8))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.compiled import jit
+from tolalloc.compiled import jit, jit_in_place
 from tolalloc.rv.equivalent.solvers.contact_solver import equilibrium
 from tolalloc.rv.equivalent.solvers.energy import Problem
 
@@ -44,7 +44,15 @@ def make_problem(law, tables):
     )
 
 
-@jit
+@jit_in_place
+def _any_nonzero(values, first, last):
+    found = False
+    for m in range(first, last):
+        found |= values[m] != 0.0
+    return found
+
+
+@jit_in_place
 def _undisturbed(at, tables, layout, values, out):
     """Set out to the pins' compression at undisplaced discs."""
     discs, pins = tables.contact_by_disc.shape[1], layout.pins
@@ -63,12 +71,12 @@ def _undisturbed(at, tables, layout, values, out):
         first = layout.tooth + d * 2 * layout.teeth
         for kind in range(2):
             start = first + kind * layout.teeth
-            if np.any(values[start : start + layout.teeth] != 0.0):
+            if _any_nonzero(values, start, start + layout.teeth):
                 for k in range(pins):
                     row[k] += coefficient[2 + layout.waves + kind, k] * values[start + tables.tooth[at, d, k]]
 
 
-@jit
+@jit_in_place
 def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
     """Set force, undisturbed compressions and play offsets at a node; return the carrier rotation at fixed discs."""
     rotation = 0.0
@@ -86,7 +94,7 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
     return rotation
 
 
-@jit
+@jit_in_place
 def sample_constants(problem, turn, face_width, layout, values):
     """Set what does not depend on the angle: clearances; and the tilted depths, which need the turned tilt only."""
     for e in range(problem.clearance.size):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.compiled import jit, jit_within
+from tolalloc.compiled import jit, jit_in_place, jit_within
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH, fma, load, spread, store
 
 TILE = 128
@@ -42,7 +42,7 @@ class Tile(NamedTuple):
 
 
 @jit
-def _aligned(rows, width):
+def aligned(rows, width):
     """Return zeros whose rows start where a register does: a load across two lines of the cache takes twice as long."""
     room = np.zeros(rows * width + WIDTH)
     first = (-(room.ctypes.data >> 3)) % WIDTH
@@ -50,22 +50,22 @@ def _aligned(rows, width):
 
 
 @jit
-def make_tile(layout, size, contacts):
+def make_tile(layout, size, contacts, samples):
     """Return an empty tile."""
     return Tile(
-        _aligned(layout.end, TILE),
-        _aligned(contacts, TILE),
-        _aligned(size, TILE),
-        _aligned(1, TILE).reshape(TILE),
-        _aligned(size, TILE),
-        _aligned(size, TILE),
-        _aligned(1, TILE).reshape(TILE),
-        _aligned(1, TILE).reshape(TILE),
+        aligned(layout.end, samples),
+        aligned(contacts, samples),
+        aligned(size, samples),
+        aligned(1, samples).reshape(samples),
+        aligned(size, samples),
+        aligned(size, samples),
+        aligned(1, samples).reshape(samples),
+        aligned(1, samples).reshape(samples),
         np.empty((3, contacts)),
-        _aligned(size, WIDTH),
-        _aligned(2 * size, WIDTH),
-        _aligned(size, WIDTH),
-        _aligned(size, WIDTH),
+        aligned(size, WIDTH),
+        aligned(2 * size, WIDTH),
+        aligned(size, WIDTH),
+        aligned(size, WIDTH),
     )
 
 
@@ -114,7 +114,7 @@ def _forces(at, tables, rows, used, tile):
             _store_four(tile.force, i * TILE + v, a, b, c, d)
 
 
-@jit
+@jit_in_place
 def _store_four(out, at, a, b, c, d):
     store(out, at, a)
     store(out, at + WIDTH, b)
@@ -176,7 +176,7 @@ def _weigh(at, tables, weighted):
                 weighted[i, d * pins + k] = stiffness[d * pins + k] * by_disc[d, i, k]
 
 
-@jit
+@jit_in_place
 def guess_next(used, tile):
     """Go on from the equilibrium as far as it is from that of the last angle."""
     for i in range(tile.q.shape[0]):

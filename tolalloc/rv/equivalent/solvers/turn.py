@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.compiled import in_threads, jit, thread_count
+from tolalloc.compiled import in_threads, jit, jit_in_place, thread_count
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import compress, play_force
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
@@ -80,6 +80,16 @@ def _fill_tile(layout, values, finite, used, tile, tilted):
         tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
 
 
+@jit_in_place
+def _take_over(samples, angle, tile, turn):
+    """Put a tile's equilibria at an angle into the turn."""
+    for s in range(samples):
+        turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
+        turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
+        for i in range(tile.q.shape[0]):
+            turn.retained[s, angle, i] = tile.q[i, s]
+
+
 @jit
 def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
     """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
@@ -87,7 +97,7 @@ def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, 
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
     used = (samples + FOUR - 1) // FOUR * FOUR
-    tile, careful, tilted = make_tile(layout, size, contacts), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    tile, careful, tilted = make_tile(layout, size, contacts, TILE), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
     _fill_tile(layout, values, finite, used, tile, tilted)
     rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
     teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
@@ -95,11 +105,8 @@ def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, 
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
         solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
+        _take_over(samples, angle, tile, turn)
         for s in range(samples):
-            turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
-            turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
-            for i in range(size):
-                turn.retained[s, angle, i] = tile.q[i, s]
             if finite[s] and (careful[s] or tilted[s]):
                 guess[:] = tile.last[:, s]
                 _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
