@@ -52,6 +52,14 @@ def test_the_force_is_the_sum_over_the_rollers(bearing, direction, displacement)
         assert bearing.radial_displacement(wanted, direction) == pytest.approx(displacement, rel=1e-9)
 
 
+@pytest.mark.parametrize("bearing", [NEEDLES, TAPERED, LOOSE, BALLS], ids=["needles", "tapered", "loose", "balls"])
+def test_ways_under_many_forces_are_those_under_each(bearing):
+    forces = np.geomspace(1.0, 2e4, 37)
+    wanted = [bearing.compliance(force) * force for force in forces]
+    np.testing.assert_allclose(bearing.ways(forces), wanted, rtol=1e-7)
+    assert bearing.ways(np.zeros(1)) == pytest.approx(0.0, abs=1e-18)
+
+
 def test_many_rollers_and_balls_share_a_load_as_stribeck_says():
     # Without clearance the most loaded element carries 4.08 F/Z with line and 4.37 F/Z with point contact.
     for bearing, factor in (
@@ -73,7 +81,7 @@ def test_the_balls_of_a_209_bearing_are_as_stiff_as_harris_finds():
 def test_preload_takes_the_play_and_stiffens():
     loose = replace(LOOSE, contact_angle=math.radians(15))
     tight = replace(loose, preload=800.0)
-    assert LOOSE.play == pytest.approx(6e-6)
+    assert LOOSE.play == pytest.approx(6e-6 * (1 + 1 / math.cos(math.pi / 12)) / 2)  # to one roller, and to two
     assert tight.play < loose.play
     assert TAPERED.play == 0.0
     assert tight.compliance(500.0) < loose.compliance(500.0)
@@ -207,7 +215,9 @@ def test_impossible_dimensions_are_refused_with_file_and_field(tmp_path, old, ne
 
 def test_a_clearance_is_given_once(tmp_path):
     loose = BEARINGS.replace("13.6 }\n", "13.6, clearance_um = 8 }\n", 1)
-    assert load_reducer(written(tmp_path, loose)).clearances.crank_disc_bearing == pytest.approx(4e-6)
+    assert load_reducer(written(tmp_path, loose)).clearances.crank_disc_bearing == pytest.approx(
+        4e-6 * (1 + 1 / math.cos(math.pi / 13)) / 2
+    )
     twice = written(tmp_path, loose, "[clearances]\ncrank_disc_bearing_um = 3\n")
     with pytest.raises(TolallocError, match=r"clearances.crank_disc_bearing_um is given twice"):
         load_reducer(twice)

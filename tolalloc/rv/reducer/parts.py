@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+from jaxtyping import Float
+
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 
 
@@ -21,6 +24,11 @@ class Part:
         """Return the way over the force [m/N]."""
         own = _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
         return own / self.stiffer
+
+    def ways(self, force: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+        """Return the way beyond the play under every force [m]."""
+        own = self.yields.ways(force) if isinstance(self.yields, RollingBearing) else self.yields * force
+        return np.asarray(own / self.stiffer)
 
 
 @lru_cache(maxsize=256)

@@ -23,6 +23,9 @@ _LINE = 35948.0
 _LARGEST = 1e-3
 """Displacement within which every force of a bearing is looked for [m]."""
 
+_KNOTS = 20_000
+"""Displacements at which forces are tabulated [-]."""
+
 _STEEL = Material(elastic_modulus=206e9, poisson_ratio=0.3)
 
 Elements = Annotated[int, Field(ge=3, le=200)]
@@ -85,22 +88,36 @@ class RollingBearing(ABC):
         return float((self.preload / (self.elements * self.coefficient * sine)) ** (1.0 / self.exponent) / sine)
 
     @property
-    def play(self) -> float:
-        """How far a ring moves from the middle before an element in its way carries; 0 under preload [m]."""
-        return max(self.clearance / 2.0 - self.axial * tan(self.contact_angle), 0.0)
+    def _directions(self) -> tuple[float, float]:
+        """Directions of an element from the displacement that a turning bearing meets: in it, and two beside it."""
+        return 0.0, pi / self.elements
 
-    def element_loads(self, displacement: float, direction: float = 0.0) -> Float[np.ndarray, " element"]:
+    @property
+    def play(self) -> float:
+        """How far a ring moves from the middle before an element in its way carries; 0 under preload [m].
+
+        The mean of both directions: between two elements it moves a little farther.
+        """
+        return sum(self._until_contact(direction) for direction in self._directions) / 2.0
+
+    def _until_contact(self, direction: float) -> float:
+        return max(self.clearance / 2.0 - self.axial * tan(self.contact_angle), 0.0) / cos(direction)
+
+    def element_loads(
+        self, displacement: float | Float[np.ndarray, " displacement"], direction: float = 0.0
+    ) -> Float[np.ndarray, "*displacement element"]:
         """Return the load of every element along its contact, one standing at a direction from the displacement [N]."""
         cosine = np.cos(direction + 2.0 * pi * np.arange(self.elements) / self.elements)
-        radial = (displacement * cosine - self.clearance / 2.0) * cos(self.contact_angle)
+        radial = (np.multiply.outer(displacement, cosine) - self.clearance / 2.0) * cos(self.contact_angle)
         pressed = radial + self.axial * sin(self.contact_angle)
         return np.asarray(self.coefficient * np.maximum(pressed, 0.0) ** self.exponent)
 
-    def radial_force(self, displacement: float, direction: float = 0.0) -> float:
+    def radial_force(
+        self, displacement: float | Float[np.ndarray, " displacement"], direction: float = 0.0
+    ) -> Float[np.ndarray, "*displacement"]:
         """Return the force along a radial displacement [m] from the middle of the play [N]."""
         cosine = np.cos(direction + 2.0 * pi * np.arange(self.elements) / self.elements)
-        loads = self.element_loads(displacement, direction)
-        return float(self.rows * cos(self.contact_angle) * (loads * cosine).sum())
+        return np.asarray(self.rows * cos(self.contact_angle) * self.element_loads(displacement, direction) @ cosine)
 
     def radial_displacement(self, force: float, direction: float = 0.0) -> float:
         """Return the displacement under a radial force [N] [m].
@@ -124,8 +141,27 @@ class RollingBearing(ABC):
         The mean of the displacements with an element in the direction of the force and with the force between two: a
         turning bearing meets both.
         """
-        moved = [self.radial_displacement(force, direction) for direction in (0.0, pi / self.elements)]
+        moved = [self.radial_displacement(force, direction) for direction in self._directions]
         return (sum(moved) / 2.0 - self.play) / force
+
+    def ways(self, force: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+        """Return the displacement beyond the play under every force, `compliance` times force [m].
+
+        Read off a table, within a ten millionth. Forces are raised to 1/n, because without clearance and preload the
+        displacement goes with that.
+        """
+        raised = force ** (1.0 / self.exponent)
+        return np.asarray(sum(np.interp(raised, *curve) for curve in self._curves) / 2.0 - self.play)
+
+    @cached_property
+    def _curves(self) -> tuple[tuple[Float[np.ndarray, " knot"], Float[np.ndarray, " knot"]], ...]:
+        """Force to 1/n and displacement in both directions [N^(1/n), m]."""
+        beyond = np.concatenate([[0.0], np.geomspace(_LARGEST * 1e-9, _LARGEST, _KNOTS)])
+        found = []
+        for direction in self._directions:
+            moved = self._until_contact(direction) + beyond
+            found.append((self.radial_force(moved, direction).clip(0.0) ** (1.0 / self.exponent), moved))
+        return tuple(found)
 
 
 @dataclass(frozen=True, kw_only=True)
