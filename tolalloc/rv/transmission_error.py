@@ -19,6 +19,7 @@ from tolalloc.rv.equivalent.friction_loop import FrictionLoop, friction_loop
 from tolalloc.rv.equivalent.hysteresis import (
     LOOP_ANGLES,
     LOOP_ASSUMPTION,
+    LOST_MOTION,
     TURN_ANGLES,
     HysteresisLoop,
     both_directions,
@@ -27,6 +28,7 @@ from tolalloc.rv.equivalent.hysteresis import (
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectrum
+from tolalloc.rv.equivalent.own_loads import own_load_loop
 from tolalloc.rv.equivalent.perfect import exact_unit
 from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
 from tolalloc.rv.friction_report import friction_section, friction_sentence, friction_summary
@@ -58,6 +60,8 @@ class TransmissionErrorAnswer(Answer):
     extremes: Extremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
     loop: HysteresisLoop  # Hysteresis loop of this unit, of the perfect reducer, and of exact parts as modified
+    # This unit's loop with every bearing under its own load; none where no bearing is given by its dimensions
+    own_loads: HysteresisLoop | None
     friction: FrictionLoop | None  # This unit's with friction; none where the reducer's file does not say enough for it
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
@@ -158,6 +162,7 @@ class TransmissionErrorAnswer(Answer):
             "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
             "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),
             "torsional_stiffness_nm_per_arcmin": _pair(self.loop.torsional_stiffness, 1 / ARCMINUTE),
+            "every_bearing_under_its_own_load": _own_loads(self.own_loads) if self.own_loads else None,
             "friction": friction_summary(self.friction) if self.friction else None,
             "reversal_arcsec": {
                 "mean": float(reversed_by.mean() / ARCSECOND),
@@ -195,6 +200,7 @@ class TransmissionErrorAnswer(Answer):
             )
             for whose, value in found[field].items()
         )
+        own = found["every_bearing_under_its_own_load"]
         rows = [
             ("peak-to-peak over one output turn [arcsec]", f"{found['peak_to_peak_arcsec']:.2f}"),
             ("finer angles may add [arcsec]", f"{found['remaining_error_arcsec']:.3f}"),
@@ -205,6 +211,14 @@ class TransmissionErrorAnswer(Answer):
             ("largest pin force without torque [N]", _short(found["pin_force_without_torque_n"])),
             ("no-load friction torque of the pins [N·m]", _short(found["no_load_friction_torque_nm"])),
             *loops,
+            *(
+                (f"{name}, this unit, every bearing under its own load [{unit}]", _short(own[field]))
+                for name, field, unit in (
+                    ("lost motion at ±3 % of rated torque", "lost_motion_arcmin", "arcmin"),
+                    ("torsional stiffness", "torsional_stiffness_nm_per_arcmin", "N·m/arcmin"),
+                )
+                if own
+            ),
             ("reversing the direction adds, mean [arcsec]", f"{found['reversal_arcsec']['mean']:.2f}"),
             ("reversing the direction adds, peak-to-peak [arcsec]", f"{found['reversal_arcsec']['peak_to_peak']:.2f}"),
             *((f"angles: {outcome} [-]", str(count)) for outcome, count in found["statuses"].items() if count),
@@ -314,6 +328,7 @@ def transmission_error(
         extremes=extremes,
         preload=preload(model, errors),
         loop=hysteresis_loop(model, loops, LOOP_ANGLES),
+        own_loads=own_load_loop(model, errors, TURN_ANGLES, (LOST_MOTION, 1.0)) if reducer.parts else None,
         friction=friction,
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
@@ -326,6 +341,14 @@ def _pair(values: Float[np.ndarray, " sample"], unit_of_measurement: float) -> d
     """Return a number of this unit and of the perfect reducer; none where an angle has no answer."""
     this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values[:2])
     return {"this_unit": this, "perfect_reducer": perfect}
+
+
+def _own_loads(loop: HysteresisLoop) -> dict[str, float]:
+    """Return what is read off the loop of bearings under their own loads."""
+    return {
+        "lost_motion_arcmin": float(loop.lost_motion[0] / ARCMINUTE),
+        "torsional_stiffness_nm_per_arcmin": float(loop.torsional_stiffness[0] * ARCMINUTE),
+    }
 
 
 def _attributed(found: Attribution) -> dict[str, Any]:

@@ -110,9 +110,19 @@ class EquivalentModel:
         carrier_angle: Float[np.ndarray, " angle"] | None = None,
     ) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles."""
+        angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
+        return self.equilibria_of(tables, errors, torque, angle)
+
+    def equilibria_of(
+        self,
+        tables: CondensedAngles,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float,
+        angle: Float[np.ndarray, " angle"],
+    ) -> Equilibria:
+        """Return the equilibrium of every sample at the carrier angles, whose tables are there already."""
         from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_curves
 
-        angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
         turn = make_turn(errors.shape[0], angle.size, tables.load.shape[2])
         solve_curves(self._discs, tables, *self._given(errors, torque), turn)
         self._mark_out_of_range(turn.rotation, turn.status)

@@ -32,14 +32,18 @@ class Forces:
 
     def of(self, interface: str) -> Float[np.ndarray, "sample angle element"]:
         """Return the magnitude of the force in each element of an interface, named as in `Stiffness` [N]."""
+        vector = self.vectors(interface)
+        return np.asarray(np.hypot(vector[..., 0], vector[..., 1]))
+
+    def vectors(self, interface: str) -> Float[np.ndarray, "sample angle element 2"]:
+        """Return the force x, y in each element of an interface; a mesh has x only [N]."""
         own, bilateral = self.rows_of_stiffness[interface], self.rows.shape[2]
         if own.start >= bilateral:
-            played = self.elements[:, :, own.start - bilateral : own.stop - bilateral]
-            return np.asarray(np.hypot(played[..., 0], played[..., 1]))
+            return self.elements[:, :, own.start - bilateral : own.stop - bilateral]
         rows = self.rows[:, :, own]
         if interface in SINGLE:
-            return np.asarray(np.abs(rows))
-        return np.asarray(np.hypot(rows[:, :, 0::2], rows[:, :, 1::2]))
+            return np.stack([rows, np.zeros_like(rows)], axis=-1)
+        return rows.reshape(*rows.shape[:2], -1, 2)
 
 
 def forces(equilibria: Equilibria) -> Forces:
