@@ -69,6 +69,20 @@ def test_one_bearing_and_one_mesh_by_hand():
     assert found.efficiency[0] == pytest.approx(167.0 / (167.0 + total), rel=1e-12)
 
 
+def test_needles_under_interference_rub_without_a_force():
+    reducer = load_reducer("rv20e")
+    model, errors = ground(reducer)
+    solved = Solved.of(model.equilibria(errors, -167.0, ANGLES[:2]))
+    tight = replace(reducer.friction_dimensions.crank_disc_bearing, clearance=-4e-6)
+    dimensions = replace(reducer.friction_dimensions, crank_disc_bearing=tight)
+    pressed = replace(solved.equilibria, reducer=replace(reducer, friction_dimensions=dimensions))
+    more = friction_torques(replace(solved, equilibria=pressed))["crank_disc_bearing"]
+    needle = 35948.0 * 7.0 ** (8 / 9) * 0.002 ** (10 / 9)  # 13 of 7 mm, each pressed by 2 µm, in four bearings
+    np.testing.assert_allclose(
+        more - friction_torques(solved)["crank_disc_bearing"], 0.0025 * 4 * 13 * needle * 0.0134 / 2 * 40, rtol=1e-9
+    )
+
+
 def test_friction_at_pins_is_that_of_the_preload():
     model, units = drawn_units(3)
     torque = -1e-4 * model.reducer.load.rated_torque

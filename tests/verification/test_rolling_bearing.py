@@ -21,6 +21,7 @@ STEEL = Material(elastic_modulus=206e9, poisson_ratio=0.3)
 NEEDLES = RollerBearing(rollers=12, roller_diameter=4e-3, roller_length=10e-3, pitch_diameter=20e-3)
 TAPERED = replace(NEEDLES, contact_angle=math.radians(15), preload=400.0, rows=2)
 LOOSE = replace(NEEDLES, clearance=12e-6)
+TIGHT = replace(NEEDLES, clearance=-8e-6)
 BALLS = BallBearing(balls=9, ball_diameter=12.7e-3, pitch_diameter=65e-3)
 
 
@@ -42,7 +43,7 @@ def published_force(bearing: RollerBearing, displacement: float, direction: floa
     return bearing.rows * total
 
 
-@pytest.mark.parametrize("bearing", [NEEDLES, TAPERED, LOOSE], ids=["needles", "tapered", "loose"])
+@pytest.mark.parametrize("bearing", [NEEDLES, TAPERED, LOOSE, TIGHT], ids=["needles", "tapered", "loose", "tight"])
 @pytest.mark.parametrize("direction", [0.0, 0.1, math.pi / 12])
 @pytest.mark.parametrize("displacement", [1e-6, 8e-6, 30e-6])
 def test_the_force_is_the_sum_over_the_rollers(bearing, direction, displacement):
@@ -85,6 +86,12 @@ def test_preload_takes_the_play_and_stiffens():
     assert tight.play < loose.play
     assert TAPERED.play == 0.0
     assert tight.compliance(500.0) < loose.compliance(500.0)
+    each = 35948.0 * 10 ** (8 / 9) * 0.004 ** (10 / 9)  # 8 µm of interference press every needle by 4
+    assert TIGHT.idle_load == pytest.approx(12 * each)
+    assert TIGHT.play == 0.0
+    # While all needles are pressed, twelve of them have the stiffness 12/2·dQ/dδ in every direction.
+    assert 1 / TIGHT.compliance(1.0) == pytest.approx(6 * 10 / 9 * each / 4e-6, rel=1e-3)
+    assert TIGHT.compliance(500.0) < NEEDLES.compliance(500.0)
     axial = TAPERED.element_loads(0.0).sum() * math.sin(TAPERED.contact_angle)
     assert axial == pytest.approx(TAPERED.preload)
 
@@ -94,6 +101,10 @@ def test_preload_takes_the_play_and_stiffens():
     [
         ({"rollers": 16}, "rollers is 16; allowed is 3 to 15, else they overlap"),
         ({"clearance": 4.1e-3}, "clearance_um is 4100; allowed is below roller_diameter_mm = 4"),
+        (
+            {"clearance": -3e-6, "contact_angle": 0.2},
+            "clearance_um is -3; allowed is 0 or more with a contact_angle_deg",
+        ),
         ({"preload": 100.0}, "preload_n is 100; allowed is 0 without a contact_angle_deg"),
     ],
 )
@@ -200,7 +211,7 @@ def test_an_identified_stiffness_takes_the_place_of_its_parts(tmp_path):
     ("old", "new", "words"),
     [
         ("rollers = 13", "rollers = 16", "rollers is 16; allowed is 3 to 15, else they overlap"),
-        ("pitch_diameter_mm = 13.6 }\n", "pitch_diameter_mm = 13.6, clearance_um = -3 }\n", "clearance_um"),
+        ("pitch_diameter_mm = 13.6 }\n", "pitch_diameter_mm = 13.6, clearance_um = -300 }\n", "clearance_um"),
         ("span_mm = 32", "span_mm = 8", "crankshaft.span_mm is 8; allowed is above 10"),
         ("rollers = 13", "roller = 13", "roller"),
     ],

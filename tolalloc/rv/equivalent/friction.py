@@ -43,7 +43,7 @@ def _bearing(
     """
     bearing, force = getattr(dimensions, name), found.of(name)
     speed = reducer.cycloid_stage.pin_count if name in CRANK_BEARINGS else 1
-    load = force.sum(axis=2) + force.shape[2] * bearing.rows * bearing.preload
+    load = force.sum(axis=2) + force.shape[2] * bearing.rows * bearing.idle_load
     return np.asarray(getattr(reducer.friction, name) * load * bearing.pitch_diameter / 2.0 * speed)
 
 

@@ -41,9 +41,9 @@ class RollingBearing(ABC):
     """
 
     pitch_diameter: Annotated[Millimetres, Field(alias="pitch_diameter_mm")]  # Of the circle of the elements [m]
-    # Internal clearance s, by how much one ring moves across the other, and contact angle α against the radial plane
-    # [m, rad]
-    clearance: Annotated[float, Field(alias="clearance_um", ge=0, le=1000), times(MICROMETRE)] = 0.0
+    # Internal clearance s, by how much one ring moves across the other, negative for interference, which preloads all
+    # elements; contact angle α against the radial plane [m, rad]
+    clearance: Annotated[float, Field(alias="clearance_um", ge=-100, le=1000), times(MICROMETRE)] = 0.0
     contact_angle: Annotated[float, Field(alias="contact_angle_deg", ge=0, lt=90), times(DEGREE)] = 0.0
     preload: Annotated[float, Field(alias="preload_n", ge=0, le=1e6)] = 0.0  # Axial force that presses the rings [N]
     rows: Annotated[int, Field(ge=1, le=4)] = 1  # Bearings or rows that share the force alike [-]
@@ -69,13 +69,16 @@ class RollingBearing(ABC):
         """Exponent of the compression [-]."""
 
     def _require_sound(self, names: str) -> None:
-        """Raise for elements that overlap or are smaller than their clearance, and for preload without an angle."""
+        """Raise for elements that overlap or are smaller than their clearance, and for preload of the other kind."""
         fitting = int(pi / asin(min(self.diameter / self.pitch_diameter, 1.0)))
         if self.elements > fitting:
             raise ValueError(f"{names} is {self.elements}; allowed is 3 to {fitting}, else they overlap")
         if self.clearance >= self.diameter:
             allowed = f"below {names.removesuffix('s')}_diameter_mm = {self.diameter / MILLIMETRE:g}"
             raise ValueError(f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is {allowed}")
+        if self.clearance < 0.0 and self.contact_angle:
+            given = f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is 0 or more"
+            raise ValueError(f"{given} with a contact_angle_deg, where preload_n presses the elements")
         if self.preload and not self.contact_angle:
             raise ValueError(f"preload_n is {self.preload:g}; allowed is 0 without a contact_angle_deg")
 
@@ -86,6 +89,11 @@ class RollingBearing(ABC):
             return 0.0
         sine = sin(self.contact_angle)
         return float((self.preload / (self.elements * self.coefficient * sine)) ** (1.0 / self.exponent) / sine)
+
+    @property
+    def idle_load(self) -> float:
+        """What rubs in a row without a force on the rings: the preload, or all elements under interference [N]."""
+        return self.preload if self.clearance >= 0.0 else float(self.element_loads(0.0).sum())
 
     @property
     def _directions(self) -> tuple[float, float]:
