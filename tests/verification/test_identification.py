@@ -27,6 +27,9 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
+from tolalloc.rv.equivalent.hysteresis import hysteresis_loop
+from tolalloc.rv.equivalent.kinematics import HARMONICS
+from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.surrogate.regression import fit_box_polynomial, total_degrees
@@ -73,6 +76,34 @@ def test_derivatives_of_every_kind_of_reading_agree_with_differences():
             finest = 0.0 if block.centred else 0.01  # what 0.0004″ of a peak-to-peak make over this step
             allowed = 0.02 * max(np.abs(expected).max(), 1e-3) + finest
             assert np.median(np.abs(own - expected)) < allowed, (item.name, block)
+
+
+@pytest.mark.slow
+def test_parts_have_the_stiffness_of_every_torque_and_parameters_keep_theirs():
+    """Of the RV-20E from parts: its loop is that of `hysteresis_loop`, until the bearings themselves are parameters."""
+    reducer = load_reducer("rv20e")
+    loops = np.array([-167.0, -5.01, -0.0167, 0.0167, 5.01, 167.0])
+    given = bench(peak_to_peak_torque=0.0, loop_torques=loops)
+    measured = simulated_bench(reducer, random_units(ERRORS, 2, SeedTree(3)), given).measurements
+    data = data_of(measured, "test")
+    own, fixed = (
+        KernelPredictor(reducer, tuple(parameter(name, reducer) for name in names), measured, data)
+        for names in (("gear_mesh", "torque"), ("crank_disc_bearing", "crank_carrier_bearing"))
+    )
+    values, constant = own(np.zeros(2)).values, fixed(np.zeros(2)).values
+    for block in (block for block in data.blocks if block.kind == "loop"):
+        found = measured.loops[block.number]
+        model = EquivalentModel(reducer, orders=measured.units[found.unit].orders or HARMONICS)
+        errors = measured.units[found.unit].errors(model.columns, reducer.modification.deviations)
+        twist = hysteresis_loop(model, errors, np.array([found.carrier_angle])).twist[0, :, 0]
+        np.testing.assert_allclose(values[block.rows], twist - twist.mean(), rtol=0, atol=1e-9 * np.ptp(twist))
+        small = slice(block.rows.start + 1, block.rows.stop - 1)  # where bearings under rated torque are too stiff
+        assert np.ptp(constant[small]) < 0.98 * np.ptp(values[small])
+    for step in np.eye(2) * 2e-4:
+        expected = (own(step).values - own(-step).values) / 4e-4
+        allowed = 1e-3 * np.abs(expected).max()
+        slopes = own(np.zeros(2)).by_coordinate @ (step / 2e-4)
+        np.testing.assert_allclose(slopes, expected, rtol=0, atol=allowed)
 
 
 @pytest.mark.slow

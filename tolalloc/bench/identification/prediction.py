@@ -59,9 +59,13 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class KernelPredictor:
-    """The equivalent model itself."""
+    """The equivalent model itself.
 
-    reducer: Reducer  # Nominal design; what is not a parameter keeps its stiffness
+    A stiffness that is a parameter is the same under every torque. Others keep theirs, which under every torque, as it
+    was stated, is that of the parts if the reducer has them.
+    """
+
+    reducer: Reducer  # Nominal design
     parameters: tuple[Parameter, ...]  # The unknowns, in the order of the coordinates
     measurements: Measurements  # Units, angles and torques
     data: AllReadings  # The same readings in one row
@@ -71,7 +75,8 @@ class KernelPredictor:
         """Return readings and derivatives at one point."""
         stiffness, bias, factor = values_at(self.parameters, coordinates)
         orders = sorted({order for unit in self.measurements.units for order in unit.orders})
-        reducer = replace(self.reducer, stiffness=replace(self.reducer.stiffness, **stiffness))
+        others = tuple(part for part in self.reducer.parts if part.interface not in stiffness)
+        reducer = replace(self.reducer, stiffness=replace(self.reducer.stiffness, **stiffness), parts=others)
         model = EquivalentModel(reducer, orders=tuple(orders) or HARMONICS)
         deviations = reducer.modification.deviations
         errors = np.concatenate([unit.errors(model.columns, deviations) for unit in self.measurements.units])
@@ -101,21 +106,43 @@ class KernelPredictor:
             kind, first = blocks[0].kind, blocks[0].number
             if kind == PEAK_TO_PEAK:
                 assert measured.peak_to_peak is not None
-                torque = factor * measured.peak_to_peak.torque
-                extremes, found = model.peak_to_peak_derivatives(errors[measured.peak_to_peak.unit], torque)
+                stated = measured.peak_to_peak.torque
+                own, torque = model.at_torque(stated), factor * stated
+                extremes, found = own.peak_to_peak_derivatives(errors[measured.peak_to_peak.unit], torque)
                 yield blocks, extremes.peak_to_peak, self._by_coordinate(found, torque)
             elif kind == CURVE:
                 curves = [measured.curves[block.number] for block in blocks]
-                torques = factor * np.array([curve.torque for curve in curves])
-                angles, units = measured.curves[first].carrier_angle, [curve.unit for curve in curves]
-                rotation, found = model.rotation_derivatives(errors[units], torques, angles)
-                yield blocks, rotation.ravel(), self._by_coordinate(found, np.repeat(torques, angles.size))
+                torques, units = np.array([curve.torque for curve in curves]), [curve.unit for curve in curves]
+                angles = measured.curves[first].carrier_angle
+                yield blocks, *self._rotations(model, errors[units], torques, angles, factor)
             else:
                 loops = [measured.loops[block.number] for block in blocks]
                 torques = np.concatenate([loop.torque for loop in loops])  # the instrument measures these themselves
                 rows = np.repeat([loop.unit for loop in loops], [loop.torque.size for loop in loops])
-                rotation, found = model.rotation_derivatives(errors[rows], torques, np.array([loops[0].carrier_angle]))
-                yield blocks, rotation.ravel(), self._by_coordinate(found, 0.0)
+                yield blocks, *self._rotations(model, errors[rows], torques, np.array([loops[0].carrier_angle]), None)
+
+    def _rotations(
+        self,
+        model: EquivalentModel,
+        errors: Float[np.ndarray, "row column"],
+        torques: Float[np.ndarray, " row"],
+        angles: Float[np.ndarray, " angle"],
+        factor: float | None,
+    ) -> tuple[Float[np.ndarray, " item"], Float[np.ndarray, "item parameter"]]:
+        """Return the rotations at all angles of every row and their derivatives; no factor where none is on the torque.
+
+        Rows are solved together that have the stiffness of one torque: all, if the reducer has no parts.
+        """
+        rotation = np.empty((torques.size, angles.size))
+        slopes = np.empty((rotation.size, len(self.parameters)))
+        level = np.abs(torques) if model.reducer.parts else np.zeros_like(torques)
+        for size in np.unique(level):
+            own = level == size
+            carried = torques[own] * (1.0 if factor is None else factor)
+            rotation[own], found = model.at_torque(float(size)).rotation_derivatives(errors[own], carried, angles)
+            by_factor = 0.0 if factor is None else np.repeat(carried, angles.size)
+            slopes[np.repeat(own, angles.size)] = self._by_coordinate(found, by_factor)
+        return rotation.ravel(), slopes
 
     def _by_coordinate(
         self, found: Derivatives, torque: float | Float[np.ndarray, " item"]
