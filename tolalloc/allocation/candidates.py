@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tolalloc.allocation.confirmation import Confirmed
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.search import ROUNDING, ZoneAllocation
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.verification import VerifiedDesign, answer
+from tolalloc.models import DrawnAmounts
 
 TABLE, ALIKE, ALONE = "tolerance table as it is", "all zones scaled alike", "tolerances alone"
 FREE, GRADES = "everything free", "grades"
@@ -48,8 +50,26 @@ class Candidates:
 
     @property
     def drawn(self) -> VerifiedDesign:
-        """The cheapest admitted design that was shown to keep the limits; the search's least violating one if none."""
-        return _cheapest(self.admitted()) or (self.graded or self.free).chosen
+        """The cheapest admitted design that was confirmed; the least violating one if none was."""
+        admitted = tuple(self.admitted().values())
+        confirmed = tuple(own for own in admitted if own.confirmed)
+        return answer(confirmed or tuple(own for own in admitted if not own.met) or admitted)
+
+    def with_confirmed(self, found: Confirmed, drawn_amounts: DrawnAmounts) -> Candidates:
+        """Return the candidates with what became of those that were judged."""
+        free, last = self.free, {name: found.last(name) for name, _ in found.judged}
+        hands = {id(own): last[name] for name, own in self.designs().items() if name in (TABLE, ALIKE) and name in last}
+        free = replace(free, proportional_tried=tuple(hands.get(id(own)) or own for own in free.proportional_tried))
+        tried = {name: tuple(own for kind, own in found.judged if kind == name) for name in last}
+        fixed = self.fixed
+        if fixed and (design := last.get(ALONE)):
+            fixed = fixed.with_chosen(design, tried[ALONE])
+        if design := last.get(FREE):
+            free = free.with_chosen(design, tried[FREE])
+        graded = self.graded
+        if graded and (design := last.get(GRADES)):
+            graded = graded.with_chosen(drawn_amounts, design, tried[GRADES])
+        return Candidates(fixed=fixed, free=free, graded=graded)
 
     @property
     def unrestricted(self) -> ZoneAllocation:

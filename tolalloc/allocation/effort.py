@@ -12,6 +12,7 @@ from tolalloc.surrogate import validation
 _FEWEST_ALLOCATING = {
     "": {
         "verification_units": 1,
+        "confirmation_units": 1,
         "shared_units": 2,
         "graded_steps": 1,
         "exact_points": 2,
@@ -103,7 +104,9 @@ class AllocationEffort:
     Parameters
     ----------
     verification_units
-        Fresh units per verified design [-].
+        Fresh units per design of a search [-].
+    confirmation_units
+        Largest number of fresh units that confirm a design in the end; the more, the nearer it lies to its limits [-].
     shared_units
         Common random units of the quantile surrogate [-].
     search
@@ -122,9 +125,11 @@ class AllocationEffort:
         Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
     yields
         Yield targets among which the cheapest good unit is looked for [-].
-    confidence
-        One-sided confidence with which fresh units must show a guarantee; at one half, even odds, small samples aim at
-        the limit itself instead of buying a margin [-].
+    gain
+        Relative gain of cost that a cheaper design must promise to be judged after a confirmed one [-].
+    error
+        Probability up to which an answer may be wrong that says a drawing keeps its limits; at one half, even odds,
+        small samples aim at the limit itself instead of buying a margin [-].
 
     Raises
     ------
@@ -133,6 +138,7 @@ class AllocationEffort:
     """
 
     verification_units: int = 6144
+    confirmation_units: int = 24_576
     shared_units: int = 256
     search: SearchEffort = field(default_factory=SearchEffort)
     graded_steps: int = 8
@@ -143,7 +149,8 @@ class AllocationEffort:
     stiffness_units: int = 2048
     share_blocks: int = 256
     yields: tuple[float, ...] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
-    confidence: float = 0.95
+    gain: float = 0.005
+    error: float = 0.05
 
     def __post_init__(self) -> None:
         _require_enough(self, "")
@@ -158,14 +165,17 @@ class AllocationEffort:
         blocks = self.share_blocks
         if blocks < 2 or blocks & (blocks - 1):
             raise InputError.at("study", "effort.allocation.share_blocks", blocks, "a power of two, 2 or more")
-        if not 0.5 <= self.confidence < 1:
-            raise InputError.at("study", "effort.allocation.confidence", self.confidence, "a share from 0.5 to below 1")
+        if not 0 < self.gain < 1:
+            raise InputError.at("study", "effort.allocation.gain", self.gain, "a share above 0 up to below 1")
+        if not 0 < self.error <= 0.5:
+            raise InputError.at("study", "effort.allocation.error", self.error, "a share above 0 up to 0.5")
         if not self.yields or not all(0 < target < 1 for target in self.yields):
             raise InputError.at("study", "effort.allocation.yields", self.yields, "one share or more between 0 and 1")
 
 
 QUICK_ALLOCATION = AllocationEffort(
     verification_units=1152,
+    confirmation_units=2304,
     shared_units=48,
     search=SearchEffort(
         steps=2,
@@ -179,6 +189,7 @@ QUICK_ALLOCATION = AllocationEffort(
     stiffness_units=1152,
     share_blocks=32,
     yields=(0.7, 0.8, 0.9, 0.95, 0.99, 0.9973),
-    confidence=0.5,
+    gain=0.05,
+    error=0.5,
 )
 """Effort of a quick run: every stage is real, every interval wide."""

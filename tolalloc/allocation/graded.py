@@ -21,6 +21,8 @@ _STEPS_AROUND = 4
 """Steps to either side of the free amounts that are tried; the local models are trusted no further [-]."""
 _SETTLED = 0.2
 """Distance of a kept from a missed margin that ends the search [standard errors]."""
+_MARGINS = (1.0, 2.0, 4.0)
+"""Distances from the limits at which another choice is looked for, one after another [standard errors]."""
 _ROUNDING = 1e-9
 """Distance of a setting from its range up to which it is rounding [unit of the setting]."""
 
@@ -50,6 +52,15 @@ class GradedAllocation:
             scales = ladder.zones / space.first_zones[at]
             found[group] = scales[(scales >= space.lower[at]) & (scales <= space.upper[at])]
         return found
+
+    def with_chosen(
+        self, drawn: DrawnAmounts, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]
+    ) -> GradedAllocation:
+        """Return the allocation with another choice, which was found beside those of the search."""
+        grid, every = _Grid(self.space, drawn, chosen.design), (*self.tried, *tried)
+        return replace(
+            self, chosen=chosen, tried=every, labels=_labels(grid, chosen), solution=_proof(grid, chosen, every)
+        )
 
 
 def with_shared_zones(space: DesignSpace) -> DesignSpace:
@@ -210,6 +221,29 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         labels=_labels(grid, chosen),
         solution=_proof(grid, chosen, tuple(tried)),
     )
+
+
+def choice_beside(
+    drawn: DrawnAmounts, judged: VerifiedDesign, tried: tuple[VerifiedDesign, ...]
+) -> Float[np.ndarray, " variable"] | None:
+    """Return the best other choice by the models of a judged one: as near to the limits as it may be, none if no other.
+
+    Parameters
+    ----------
+    drawn
+        What the drawing says of the settings.
+    judged
+        The choice, in a space whose groups share one zone.
+    tried
+        Choices beside it that correct its models.
+    """
+    grid = _Grid(judged.space, drawn, judged.design)
+    for margin in _MARGINS:
+        found = grid.problem(_inside(judged, [*tried, judged], margin)).solve()
+        choice = None if found is None else grid.design(found)
+        if choice is None or not np.allclose(choice, judged.design, atol=1e-6):
+            return choice
+    return None
 
 
 def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> tuple[Stack, ...]:

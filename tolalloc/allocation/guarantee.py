@@ -20,6 +20,21 @@ _MISSED = 0.005
 """Share of a worst case by which an ascent may have missed it [-]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """What units say of one limited side."""
+
+    sign: Literal[1, -1]  # 1 for an upper limit, −1 for a lower one [-]
+    limit: float  # The limit [unit of the output]
+    value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
+    standard_error: float  # Standard error of the value [unit of the output]
+
+    @property
+    def excess(self) -> float:
+        """How far the value lies beyond the limit, negative inside [unit of the output]."""
+        return self.sign * (self.value - self.limit)
+
+
 @runtime_checkable
 class Guarantee(Protocol):
     """What must be shown of an output for its limits to count as kept."""
@@ -38,9 +53,28 @@ class Guarantee(Protocol):
         ...
 
 
+@runtime_checkable
+class Sampled(Guarantee, Protocol):
+    """A guarantee that random units show, with an error."""
+
+    def levels(
+        self, values: Float[np.ndarray, " good"], failed: int, limits: Limits, confidence: float
+    ) -> tuple[Level, ...]:
+        """Return what units show of every limited side with one-sided confidence, the upper one first.
+
+        Parameters
+        ----------
+        values
+            The output of the units that have one [unit of the output].
+        failed
+            Number of units that have none [-].
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class AtYield(NamedFields):
-    """So many units lie within all limits of the output, shown with one-sided confidence, 95 % in a full run.
+    """So many units lie within all limits of the output, shown with an overall error of at most 5 % in a full run.
 
     Parameters
     ----------
@@ -83,27 +117,20 @@ class AtYield(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        units = trial.values.size + trial.failed
-        allowed = allowed_rejections(units, self.target, trial.confidence) - trial.failed
-        left_out = _shared_out(np.sort(trial.values), limits, max(allowed, 0))
-        return tuple(self._side(trial, sign, limit, left_out[sign], allowed >= 0) for sign, limit in _turned(limits))
+        return _spread_sides(trial, self.levels(trial.values, trial.failed, limits, trial.confidence))
 
-    def _side(self, trial: OutputTrial, sign: int, limit: float, left_out: int, enough: bool) -> Side:
-        turned = np.sort(sign * trial.values)
-        value = float(turned[-1 - left_out])
-        return Side(
-            sign=sign,
-            limit=limit,
-            value=sign * (value if enough else np.inf),
-            standard_error=_order_statistic_error(turned, turned.size - left_out),
-            scale=_scale(trial, limit),
-            stack=_root_sum_square(trial, sign, limit, value),
-        )
+    def levels(
+        self, values: Float[np.ndarray, " good"], failed: int, limits: Limits, confidence: float
+    ) -> tuple[Level, ...]:
+        """Return what units show of every limited side."""
+        allowed = allowed_rejections(values.size + failed, self.target, confidence) - failed
+        left_out = _shared_out(np.sort(values), limits, max(allowed, 0))
+        return tuple(_order_statistic(values, sign, limit, left_out[sign], allowed) for sign, limit in limits.turned)
 
 
 @dataclass(frozen=True)
 class AtCpk(NamedFields):
-    """The capability index of the output reaches a target, shown with one-sided confidence, 95 % in a full run.
+    """The capability index of the output reaches a target, shown with an overall error of about 5 % in a full run.
 
     Parameters
     ----------
@@ -149,21 +176,26 @@ class AtCpk(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
+        return _spread_sides(trial, self.levels(trial.values, trial.failed, limits, trial.confidence))
 
-    def _side(self, trial: OutputTrial, sign: int, limit: float) -> Side:
-        turned = sign * trial.values
-        needed, error = self._needed(turned, trial.confidence)
+    def levels(
+        self,
+        values: Float[np.ndarray, " good"],
+        failed: int,  # noqa: ARG002
+        limits: Limits,
+        confidence: float,
+    ) -> tuple[Level, ...]:
+        """Return what units show of every limited side."""
+        return tuple(self._level(values, sign, limit, confidence) for sign, limit in limits.turned)
+
+    def _level(
+        self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
+    ) -> Level:
+        turned = sign * values
+        needed, error = self._needed(turned, confidence)
         deviation = float(turned.std(ddof=1))
         value = float(turned.mean()) + 3 * needed * deviation
-        return Side(
-            sign=sign,
-            limit=limit,
-            value=sign * value,
-            standard_error=3 * error * deviation,
-            scale=_scale(trial, limit),
-            stack=_root_sum_square(trial, sign, limit, value),
-        )
+        return Level(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
 
     def _needed(self, turned: Float[np.ndarray, " unit"], confidence: float) -> tuple[float, float]:
         """Return the estimate whose lower bound is the target, and its standard error [-]."""
@@ -194,7 +226,7 @@ class WorstCase:
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return tuple(self._side(trial, sign, limit) for sign, limit in _turned(limits))
+        return tuple(self._side(trial, sign, limit) for sign, limit in limits.turned)
 
     def _side(self, trial: OutputTrial, sign: Literal[1, -1], limit: float) -> Side:
         value, gradient = trial.worst(sign)
@@ -257,20 +289,13 @@ class RootSumSquare:
                     slopes=sign * by_setting,
                 ),
             )
-            for sign, limit in _turned(limits)
+            for sign, limit in limits.turned
         )
 
 
 def _left(distance: float, locked: float) -> float:
     """Return what locked zones leave of the distance to a limit, less than nothing beyond it [unit of the output]."""
     return float(np.sqrt(max(distance**2 - locked**2, 0.0))) if distance > locked else distance - locked
-
-
-def _turned(limits: Limits) -> tuple[tuple[Literal[1, -1], float], ...]:
-    """Return the limited sides, the upper one first, each with the sign that makes larger worse."""
-    upper: tuple[tuple[Literal[1, -1], float], ...] = () if limits.upper is None else ((1, limits.upper),)
-    lower: tuple[tuple[Literal[1, -1], float], ...] = () if limits.lower is None else ((-1, limits.lower),)
-    return (*upper, *lower)
 
 
 def _scale(trial: OutputTrial, limit: float) -> float:
@@ -291,6 +316,19 @@ def _shared_out(ordered: Float[np.ndarray, " unit"], limits: Limits, allowed: in
     return {1: int(excess.argmin()), -1: allowed - int(excess.argmin())}
 
 
+def _order_statistic(
+    values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, left_out: int, allowed: int
+) -> Level:
+    """Return the outermost value but so many; beyond every limit where not even that many failures are allowed."""
+    turned = np.sort(sign * values)
+    return Level(
+        sign=sign,
+        limit=limit,
+        value=sign * (float(turned[-1 - left_out]) if allowed >= 0 else np.inf),
+        standard_error=_order_statistic_error(turned, turned.size - left_out),
+    )
+
+
 def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> float:
     """Return the standard error of the value at a rank, counted from 1 [unit of the output].
 
@@ -301,6 +339,26 @@ def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> fl
 
     weights = np.diff(beta.cdf(np.linspace(0, 1, ordered.size + 1), rank, ordered.size - rank + 1))
     return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
+
+
+def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...]) -> tuple[Side, ...]:
+    """Return the sides of what spreads, each with its local model."""
+    return tuple(
+        Side(
+            sign=level.sign,
+            limit=level.limit,
+            value=level.value,
+            standard_error=level.standard_error,
+            scale=_scale(trial, level.limit),
+            stack=_root_sum_square(trial, level.sign, level.limit, reached(level, trial.values)),
+        )
+        for level in levels
+    )
+
+
+def reached(level: Level, values: Float[np.ndarray, " good"]) -> float:
+    """Return the turned value of a level, the outermost unit's where it is infinite [unit of the output]."""
+    return min(level.sign * level.value, float((level.sign * values).max()))
 
 
 def _root_sum_square(trial: OutputTrial, sign: int, limit: float, value: float) -> Stack:

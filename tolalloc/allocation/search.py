@@ -59,6 +59,17 @@ class ZoneAllocation:
         """The same with the budget of the limits themselves."""
         return kept_stacks(self.chosen, self.tried, margin=0.0)
 
+    def with_chosen(self, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> ZoneAllocation:
+        """Return the allocation with another design, which was found beside those of the search."""
+        every = (*self.tried, *tried)
+        return replace(
+            self,
+            chosen=chosen,
+            tried=every,
+            optimum=cheapest_by_models(chosen.space, chosen, every, margin=0.0),
+            inside=cheapest_by_models(chosen.space, chosen, every, margin=1.0),
+        )
+
     @property
     def bound(self) -> float:
         """Lower bound on the cost of every design that the models let keep the limits, without the solver's word."""

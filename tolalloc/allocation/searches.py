@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.candidates import Candidates
+from tolalloc.allocation.candidates import ALONE, FREE, GRADES, Candidates
+from tolalloc.allocation.confirmation import Judge, confirm, error_of_look
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
-from tolalloc.allocation.graded import GradedAllocation, allocate_grades, group_options, with_shared_zones
+from tolalloc.allocation.graded import (
+    GradedAllocation,
+    allocate_grades,
+    choice_beside,
+    group_options,
+    with_shared_zones,
+)
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
@@ -22,8 +30,8 @@ from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness, robustness
 from tolalloc.allocation.search import ZoneAllocation, allocate, require_groups
 from tolalloc.allocation.trade import SettingTrade, setting_trade
-from tolalloc.allocation.trust_region import kept_stacks
-from tolalloc.allocation.verification import Verifier, answer
+from tolalloc.allocation.trust_region import kept_stacks, step_from
+from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import Experiment
@@ -36,6 +44,8 @@ from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
+_REACH = 1.25
+"""Factor by which a variable may change from a judged design to the next one [-]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -65,6 +75,17 @@ class DrawingQuestion:
         limits = self.requirements[0].limits
         return limits.lower is None and (limits.upper or 0.0) > 0.0
 
+    @property
+    def search_confidence(self) -> float:
+        """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-].
+
+        What a guarantee takes beyond the middle of the units falls with the root of their number.
+        """
+        from scipy.stats import norm
+
+        units, final = self.effort.verification_units, self.effort.confirmation_units
+        return float(norm.cdf(norm.ppf(1 - error_of_look(self.effort.error, 1)) * np.sqrt(units / final)))
+
     def seeds(self, name: str) -> SeedTree:
         """Return the node of the seed tree of a stage."""
         return SeedTree(self.seed).child("allocate", name)
@@ -83,13 +104,16 @@ class DrawingQuestion:
         if self.unit_price and not self.limits_one_side_above:
             leading = self.requirements[0].output
             raise InputError(f"{self.place}: unit_price needs one upper limit above 0 on {leading}, the first limit.")
-        asked = {"verification_units": self.effort.verification_units}
+        asked = {
+            "confirmation_units": (self.effort.confirmation_units, 1 - error_of_look(self.effort.error, 1)),
+            "verification_units": (self.effort.verification_units, self.search_confidence),
+        }
         if self.what_if and self.model.uncertain:
-            asked["allocation.stiffness_units"] = self.effort.stiffness_units
+            asked["allocation.stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
         for requirement in self.requirements:
-            for name, units in asked.items():
+            for name, (units, confidence) in asked.items():
                 try:
-                    requirement.guarantee.require_enough(units, self.effort.confidence)
+                    requirement.guarantee.require_enough(units, confidence)
                 except InputError as error:
                     raise InputError(f"{self.place}, effort.{name} for {requirement.output}, {error}") from None
 
@@ -104,7 +128,7 @@ class DrawingQuestion:
             seeds=direct if search == "direct" else self.seeds("verification").child(search),
             units=self.effort.verification_units,
             largest_failed_share=self.largest_failed_share,
-            confidence=self.effort.confidence,
+            confidence=self.search_confidence,
         )
 
     def quantile(self, spread: float) -> QuantileResponse:
@@ -148,6 +172,33 @@ class DrawingQuestion:
             return free
         verifier = self.verifier("beside grades", self.space)
         return allocate(verifier, free.proportional_tried, self.effort.search, graded.chosen)
+
+    def confirmed(self, found: Candidates) -> Candidates:
+        """Return what the searches found with the drawing that fresh units confirm."""
+        judge = Judge(
+            model=self.model,
+            seeds=self.seeds("confirmation"),
+            units=self.effort.confirmation_units,
+            error=self.effort.error,
+            largest_failed_share=self.largest_failed_share,
+        )
+        promising = {name: own for name, own in found.admitted().items() if own.met}
+        result = confirm(judge, promising, partial(self._following, found))
+        return found.with_confirmed(result, self.model.drawn_amounts)
+
+    def _following(self, found: Candidates, kind: str, judged: VerifiedDesign, attempt: int) -> VerifiedDesign | None:
+        """Return the design that the search of a judged one would try next, none where it would try no other."""
+        searches = {ALONE: found.fixed, FREE: found.free}
+        if kind == GRADES and found.graded:
+            design = choice_beside(self.model.drawn_amounts, judged, found.graded.tried[1:])
+        elif search := searches.get(kind):
+            design = step_from(judged, search.tried, margin=1.0, reach=_REACH)
+        else:
+            return None
+        worth = (1 - self.effort.gain) * judged.cost if judged.confirmed else np.inf
+        if design is None or judged.space.cost(design) > worth:
+            return None
+        return self.verifier("confirmation", judged.space).verify(design, f"beside attempt {attempt}")
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -252,6 +303,11 @@ def allocate_drawing(
         if question.grades:
             with record.stage("grades"):
                 graded = question.graded(free, fixed)
+        with record.stage("confirmation"):
+            found = question.confirmed(Candidates(fixed=fixed, free=free, graded=graded))
+            fixed, free, graded = found.fixed, found.free, found.graded
+        if graded:
+            with record.stage("free zones beside grades"):
                 free = question.beside_grades(free, graded)
         if question.what_if:
             with record.stage("modification trade"):

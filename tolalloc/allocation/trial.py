@@ -89,14 +89,24 @@ class FreshUnits:
 
     def derived(self, output: str) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return an output of some units and its derivative by every variable [unit of the output]."""
+        values, slopes = self.of_first(output)
+        known = np.isfinite(values) & np.isfinite(slopes).all(axis=1)
+        return values[known], slopes[known]
+
+    def of_first(self, output: str) -> tuple[Float[np.ndarray, " first"], Float[np.ndarray, "first variable"]]:
+        """Return an output of the first units and its derivative by every variable, NaN where a unit has none.
+
+        These are all units where the model knows the derivatives exactly.
+        """
         if output not in self.exact:
             values, slopes = self._differences
             at = self._others.index(output)
             return values[:, at], slopes[:, at]
         found = self.exact[output]
-        good = found.evaluation.good
+        slopes = np.full((len(self.standard), self.design.size), np.nan)
         by_scale = self.space.by_scale(self.by_zone(output))
-        return self.values(output)[good], np.concatenate([by_scale, found.by_setting[good]], axis=1)
+        slopes[found.evaluation.good] = np.concatenate([by_scale, found.by_setting[found.evaluation.good]], axis=1)
+        return self.values(output), slopes
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output].
@@ -143,7 +153,7 @@ class FreshUnits:
     @cached_property
     def _differences(
         self,
-    ) -> tuple[Float[np.ndarray, "known output"], Float[np.ndarray, "known output variable"]]:
+    ) -> tuple[Float[np.ndarray, "first output"], Float[np.ndarray, "first output variable"]]:
         """Other outputs of the first units, and their derivatives by central differences with the same units."""
         standard, groups = self.standard[: self.slope_units], len(self.space.groups)
         steps = np.append(_SCALE_STEP * self.design[:groups], self.space.setting_steps)
@@ -151,9 +161,7 @@ class FreshUnits:
         for at, step in enumerate(np.diag(steps)):
             ends = [self._others_of(self.design + side * step, standard) for side in (1, -1)]
             slopes[..., at] = (ends[0] - ends[1]) / (2 * steps[at])
-        values = np.where(self.others.good[:, np.newaxis], self.others.values, np.nan)[: len(standard)]
-        known = np.isfinite(values).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
-        return values[known], slopes[known]
+        return np.where(self.others.good[:, np.newaxis], self.others.values, np.nan)[: len(standard)], slopes
 
     def _others_of(
         self, design: Float[np.ndarray, " variable"], standard: Float[np.ndarray, "unit column"]

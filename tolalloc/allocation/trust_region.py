@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.programs import SETTLED, Programs
@@ -31,16 +32,15 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     Notes
     -----
     The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
-    each limit. Where the models of the last design also explain earlier ones near by, their mean deviation from them
-    corrects them, so the noise averages out.
+    each limit. Where the models of the last design also explain other ones near by, their mean deviation from them
+    corrects them, each with the weight of its units, so the noise averages out.
     """
     similar = [item for item in tried if _is_similar(item, last)]
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        stacks.append(
-            replace(side.stack, budget=side.stack.budget - margin * side.standard_error - float(np.mean(found)))
-        )
+        deviation = float(np.average(found, weights=[item.achieved.units for item in similar]))
+        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
     return tuple(stacks)
 
 
@@ -66,6 +66,28 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     loads = [float(side.stack.load(chosen.scales, chosen.settings)) for side in chosen.sides]
     stacks = aimed(chosen, list(tried), margin)
     return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
+
+
+def step_from(
+    last: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float, reach: float
+) -> Float[np.ndarray, " variable"]:
+    """Return the cheapest design near a verified one that its models let keep the limits, made by the same processes.
+
+    Parameters
+    ----------
+    last
+        The verified design.
+    tried
+        Designs beside it that correct its models.
+    margin
+        How far inside each limit the aim is [standard errors].
+    reach
+        Factor by which a variable may change [-].
+    """
+    processes = last.space.process_positions(last.design)
+    return Programs(last.space, len(last.sides)).step(
+        aimed(last, [*tried, last], margin), processes, last.design, reach
+    )
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:

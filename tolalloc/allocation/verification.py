@@ -10,7 +10,7 @@ from jaxtyping import Float
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
-from tolalloc.allocation.trial import FreshUnits, OutputTrial
+from tolalloc.allocation.trial import FreshUnits
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, proportion, require_few_failures
 from tolalloc.drawings.seeds import SeedTree
@@ -35,6 +35,8 @@ class VerifiedDesign:
     # Change of the leading output's value with the zone of each active source; none where the model does not know its
     # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
+    confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
+    confirmed: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
 
     @property
     def scales(self) -> Float[np.ndarray, " group"]:
@@ -48,7 +50,7 @@ class VerifiedDesign:
 
     @property
     def met(self) -> bool:
-        """Whether every requirement is shown to be met."""
+        """Whether every requirement is met, as far as these units tell."""
         return all(check.met for check in self.checks)
 
     @property
@@ -63,7 +65,7 @@ class VerifiedDesign:
 
     @property
     def quantile_bound(self) -> float:
-        """What of the leading output is compared with its limit: at a yield, the smallest limit shown kept."""
+        """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
         return self.checks[0].sides[0].value
 
     @property
@@ -90,7 +92,7 @@ class Verifier:
     units: int  # Units per verification [-]
     slope_units: int = 1024  # How many of them derivatives that the model does not know exactly are averaged over [-]
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
-    confidence: float = CONFIDENCE  # With which guarantees must be shown, one-sided [-]
+    confidence: float = CONFIDENCE  # With which guarantees are judged, one-sided [-]
 
     def __post_init__(self) -> None:
         for requirement in self.requirements:
@@ -111,7 +113,7 @@ class Verifier:
             More units failed.
         """
         seeds, errors = self.seeds.child(name), self.space.errors
-        outputs = tuple(dict.fromkeys(requirement.output for requirement in self.requirements))
+        outputs = tuple(dict.fromkeys(name for requirement in self.requirements for name in requirement.outputs))
         fresh = FreshUnits(
             space=self.space,
             model=self.model,
@@ -124,11 +126,10 @@ class Verifier:
         for sample in fresh.samples:
             require_few_failures(sample, name, self.largest_failed_share)
         checks = tuple(
-            requirement.check(OutputTrial(units=fresh, output=requirement.output, confidence=self.confidence))
-            for requirement in self.requirements
+            requirement.check(requirement.trial(fresh, self.confidence)) for requirement in self.requirements
         )
         values = {output: fresh.values(output) for output in outputs}
-        kept = np.array([requirement.limits.kept_by(values[requirement.output]) for requirement in self.requirements])
+        kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])
         return VerifiedDesign(
             name=name,
             space=self.space,
@@ -141,6 +142,7 @@ class Verifier:
             joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
             outputs=values,
             by_zone=_by_zone(fresh, checks[0].sides[0].value),
+            confidence=self.confidence,
         )
 
 

@@ -31,12 +31,12 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
 
     Notes
     -----
-    The smallest limit that the verified units show kept at the other yield, with one-sided 95 % confidence, takes the
-    place of what was compared with the limit; at the yield asked for they are the same. What the zones spread is in
+    The smallest limit that the verified units show kept at the other yield, with the same confidence, takes the place
+    of what was compared with the limit; at the yield asked for they are the same. What the zones spread is in
     proportion to it, so the weights of the model are, too. Other requirements stay.
     """
     chosen, (first, *others) = allocation.chosen, allocation.asked_stacks
-    shown = chosen.sample.quantile_bound(target)
+    shown = chosen.sample.quantile_bound(target, chosen.confidence)
     if not np.isfinite(shown):
         return np.nan
     spread = float(first.load(chosen.scales, np.zeros(chosen.settings.size)))

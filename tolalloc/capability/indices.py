@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -27,6 +28,13 @@ class Limits:
             raise InputError("Capability needs a lower limit, an upper limit or both.")
         if self.lower is not None and self.upper is not None and not self.lower < self.upper:
             raise InputError.at("capability", "upper limit", self.upper, f"a number above the lower one, {self.lower}")
+
+    @property
+    def turned(self) -> tuple[tuple[Literal[1, -1], float], ...]:
+        """The limited sides, the upper one first, each with the sign that makes larger worse."""
+        upper: tuple[tuple[Literal[1, -1], float], ...] = () if self.upper is None else ((1, self.upper),)
+        lower: tuple[tuple[Literal[1, -1], float], ...] = () if self.lower is None else ((-1, self.lower),)
+        return (*upper, *lower)
 
     def kept_by(self, sample: Float[np.ndarray, " unit"]) -> Bool[np.ndarray, " unit"]:
         """Return which values keep the limits; one that is not a number does not."""

@@ -64,8 +64,8 @@ class MonteCarlo:
         """Return the empirical quantile of the good units."""
         return float(np.quantile(self.values, share))
 
-    def quantile_bound(self, target: float) -> float:
-        """Return the smallest limit at which this sample shows the target yield with one-sided 95 % confidence.
+    def quantile_bound(self, target: float, confidence: float = CONFIDENCE) -> float:
+        """Return the smallest limit at which this sample shows the target yield with one-sided confidence.
 
         Notes
         -----
@@ -73,7 +73,7 @@ class MonteCarlo:
         sample is too small to show the target at all. Like the bound of `Yield`, it holds for independent units alone.
         """
         units = self.evaluation.status.size
-        allowed = allowed_rejections(units, target) - self.failed
+        allowed = allowed_rejections(units, target, confidence) - self.failed
         return float(np.sort(self.values)[-1 - allowed]) if allowed >= 0 else float("inf")
 
 
@@ -93,13 +93,17 @@ def proportion(units: int, rejected: int) -> Yield:
 
 
 def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE) -> int:
-    """Return how many rejected units still show the target yield with one-sided confidence; −1 if none do."""
-    from scipy.stats import beta
+    """Return how many rejected units still show the target yield with one-sided confidence; −1 if none do.
 
-    rejected = -1
-    while rejected + 1 < units and beta.ppf(1 - confidence, units - rejected - 1, rejected + 2) >= target:
-        rejected += 1
-    return rejected
+    Notes
+    -----
+    As many as a design just at the target rejects with at most the error that is left: what Clopper–Pearson's bound
+    says.
+    """
+    from scipy.stats import binom
+
+    least = int(binom.ppf(1 - confidence, units, 1 - target))  # the fewest that are rejected with that error or more
+    return least if binom.cdf(least, units, 1 - target) <= 1 - confidence else least - 1
 
 
 def monte_carlo(

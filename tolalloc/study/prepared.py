@@ -81,9 +81,18 @@ class Prepared:
             name: Limit(upper=upper) for name, upper in self.model.own_limits.items() if name not in self.study.limits
         }
         return tuple(
-            Requirement(output=name, limits=limit.limits, guarantee=limit.guarantee)
+            Requirement(output=name, limits=limit.limits, guarantee=limit.show or self.study.joint or limit.guarantee)
             for name, limit in {**asked, **own}.items()
         )
+
+    @property
+    def requirements_with_joint(self) -> tuple[Requirement, ...]:
+        """What the study limits, and last that a share of the units keeps all limits at once, if it asks for that."""
+        from tolalloc.allocation.requirement import JointRequirement
+
+        if self.study.joint is None or len(self.requirements) == 1:
+            return self.requirements
+        return (*self.requirements, JointRequirement.of(self.requirements, self.study.joint))
 
     @property
     def target(self) -> float:
@@ -117,7 +126,7 @@ class Prepared:
         study = self.study
         content = (
             (study.name, study.seed, study.largest_failed_share, study.effort, study.questions),
-            dict(study.limits),
+            (dict(study.limits), study.joint),
             self.model.content,
             self.errors.sources,
             self.errors.correlation,

@@ -152,6 +152,7 @@ class Allocation(Question):
     """
 
     kind: ClassVar[str] = "allocation"
+    reads: ClassVar[frozenset[str]] = Question.reads | {"joint"}
 
     grades: bool = False
     fixed_first: bool = True
@@ -179,7 +180,7 @@ class Allocation(Question):
         question = DrawingQuestion(
             model=prepared.model.observed(record.observe),
             space=prepared.space,
-            requirements=prepared.requirements,
+            requirements=prepared.requirements_with_joint,
             effort=study.effort.allocation,
             seed=study.seed,
             largest_failed_share=study.largest_failed_share,

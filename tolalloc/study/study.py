@@ -15,6 +15,7 @@ from tolalloc.study.questions import Allocation, Question, Ranking, named
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer
+    from tolalloc.allocation.guarantee import AtYield
     from tolalloc.drawings.drawing import Drawing
     from tolalloc.models import ModelSource
     from tolalloc.progress import Progress
@@ -48,6 +49,12 @@ def _is_source(model: object) -> bool:
     return hasattr(model, "bound") and not isinstance(model, type)
 
 
+def _is_yield(joint: object) -> bool:
+    from tolalloc.allocation.guarantee import AtYield
+
+    return isinstance(joint, AtYield)
+
+
 def _is_share(value: object) -> bool:
     return is_number(value) and 0 <= cast("float", value) < 0.5
 
@@ -69,6 +76,9 @@ class Study(NamedFields):
     limits
         Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
         None lifts a limit that the model has of its own: no unit of a reducer may be jammed, `PRELOAD`.
+    joint
+        Share of units that must keep all limits at once, ``AtYield(target=…)``; a limit that says nothing else of its
+        own need only be kept by them.
     questions
         What is asked, in the order of the report.
     name
@@ -98,6 +108,7 @@ class Study(NamedFields):
     model: ModelSource | None = None
     drawing: Drawing | None = None
     limits: Mapping[str, Limit | None] = field(default_factory=dict)
+    joint: AtYield | None = None
     questions: Sequence[Question] = (Ranking(), Allocation())
     name: str = "study"
     seed: int = 1
@@ -115,6 +126,7 @@ class Study(NamedFields):
             ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
             ("drawing", self.drawing is None or hasattr(self.drawing, "errors"), "ta.drawing(...)"),
             ("limits", isinstance(self.limits, Mapping), "a dictionary of outputs and their ta.Limit(...)"),
+            ("joint", self.joint is None or _is_yield(self.joint), "ta.AtYield(...) or None"),
             ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
             ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
             ("questions", _are_questions(self.questions), "ta.Ranking(...), ta.Allocation(...) and other questions"),

@@ -114,8 +114,8 @@ class AllocationAnswer(Answer):
 
     @property
     def met(self) -> bool:
-        """Whether fresh units show every requirement to be kept."""
-        return self.chosen.met
+        """Whether fresh units that no search has seen show every requirement to be kept, with the stated error."""
+        return self.chosen.confirmed
 
     @property
     def cost(self) -> float:

@@ -1,0 +1,137 @@
+"""The one stated error of an answer: how often designs just at their limits are confirmed, and better ones are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+import tolalloc as ta
+from tolalloc.allocation.confirmation import ATTEMPTS, LOOKS, Judge, confirm, error_of_look
+from tolalloc.allocation.effort import AllocationEffort
+from tolalloc.allocation.verification import VerifiedDesign, Verifier
+from tolalloc.capability.monte_carlo import allowed_rejections
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.study.prepared import Prepared
+
+ANSWERS, ERROR, TARGET = 400, 0.05, 0.99
+MEAN, DEVIATION = 37.7, 8.0
+"""Of an output that has its 99.73 % quantile near 60, as the peak-to-peak of the shipped study [µm]."""
+GAP, PLAY = "gap [µm]", "play [µm]"
+
+
+def independent(first, second):
+    return MEAN + 1e3 * first, MEAN + 1e3 * second
+
+
+def prepared(limits: dict[str, ta.Limit], joint: ta.AtYield | None = None, deviation: float = DEVIATION) -> Prepared:
+    """Return a study of two independent normal outputs."""
+    sizes = {"plus": 3e-3 * deviation, "minus": -3e-3 * deviation, "unit": "mm"}
+    row = {**sizes, "min": 1e-3, "max": 1.0, "cost": 1, "distribution": "normal", "Cp": 1.0}
+    return Prepared(
+        study=ta.Study(
+            ta.model(independent, inputs=("first", "second"), outputs=(GAP, PLAY)),
+            ta.Drawing.of_rows([{"id": name, "nominal": 0.0, **row} for name in ("first", "second")]),
+            limits=limits,
+            joint=joint,
+            questions=[ta.Allocation()],
+        )
+    )
+
+
+def designed(study: Prepared) -> VerifiedDesign:
+    """Return the design of the table, with the models of a small search."""
+    requirements, space = study.requirements_with_joint, study.space
+    own = Verifier(space=space, model=study.model, requirements=requirements, seeds=SeedTree(1), units=1200)
+    return own.verify(space.uniform(1.0), "table")
+
+
+def judge_of(study: Prepared, seed: int, units: int = 2048) -> Judge:
+    return Judge(model=study.model, seeds=SeedTree(seed), units=units, error=ERROR)
+
+
+def at(share: float) -> float:
+    """Return the value that a share of the units lies below [µm]."""
+    return float(MEAN + DEVIATION * norm.ppf(share))
+
+
+SHOWN = ta.AtYield(TARGET)
+ON_THE_LIMIT = {
+    "one limit": ({GAP: ta.Limit(upper=at(TARGET), show=SHOWN)}, None),
+    "two limits": ({GAP: ta.Limit(upper=at(1 - 0.005), lower=at(0.005), show=SHOWN)}, None),
+    "joint": ({name: ta.Limit(upper=at(np.sqrt(TARGET))) for name in (GAP, PLAY)}, SHOWN),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limits", ON_THE_LIMIT)
+def test_of_designs_just_at_their_limit_no_more_than_the_stated_error_are_drawn(limits):
+    """Each of 400 answers judges as many such designs as it may; their number has three standard errors of room."""
+    study = prepared(*ON_THE_LIMIT[limits])
+    design, costs = designed(study), count(10)
+
+    def another(kind, judged, attempt):
+        return replace(design, cost=float(next(costs)))
+
+    answers = [
+        confirm(judge_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another)
+        for seed in range(ANSWERS)
+    ]
+    drawn = sum(found.drawn is not None for found in answers)
+    assert max(len(found.judged) for found in answers) == ATTEMPTS
+    assert drawn <= ERROR * ANSWERS + 3 * np.sqrt(ERROR * (1 - ERROR) * ANSWERS)
+    assert drawn > 0
+
+
+def test_the_errors_of_all_designs_and_looks_add_up_to_less_than_the_one_stated():
+    spent = [error_of_look(ERROR, attempt, look) for attempt in range(1, ATTEMPTS + 1) for look in range(len(LOOKS))]
+    assert 0.99 * ERROR < sum(spent) < ERROR
+
+
+def test_a_design_well_inside_is_confirmed_at_the_first_look_and_one_beyond_given_up_there():
+    inside = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
+    beyond = prepared({GAP: ta.Limit(upper=at(0.97), show=SHOWN)})
+    found, lost = (judge_of(study, 1).judge(designed(study), 1) for study in (inside, beyond))
+    assert (found.confirmed, lost.confirmed) == (True, False)
+    assert found.achieved.units == lost.achieved.units == 2048 * LOOKS[0][0]
+    assert found.confidence == 1 - error_of_look(ERROR, 1, 0)
+    for side in (*found.sides, *lost.sides):
+        assert side.predicted(found.design) == pytest.approx(side.excess)
+
+
+@pytest.mark.slow
+def test_with_the_full_effort_designs_two_percent_inside_are_confirmed_in_most_cases():
+    """The share of 99.73 % lies at 60·0.98; 100 designs."""
+    effort, target = AllocationEffort(), 0.9973
+    limit = at(target) / 0.98
+    study = prepared({GAP: ta.Limit(upper=limit, show=ta.AtYield(target))})
+    design = designed(study)
+    confirmed = [judge_of(study, seed, effort.confirmation_units).judge(design, 1).confirmed for seed in range(100)]
+    assert np.mean(confirmed) > 0.8
+
+
+def test_of_what_was_confirmed_one_cheaper_design_is_tried_and_a_miss_changes_nothing():
+    study = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
+    design = designed(study)
+    beyond = replace(design, design=1.5 * design.design, cost=0.5 * design.cost)
+    asked = []
+
+    def cheaper(kind, judged, attempt):
+        asked.append(judged.confirmed)
+        return beyond
+
+    found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper)
+    assert [(kind, own.confirmed) for kind, own in found.judged] == [("table", True), ("table", False)]
+    assert found.drawn == found.judged[0]
+    assert found.last("table") is found.judged[0][1]
+    assert asked == [True]
+
+
+def test_as_many_units_are_allowed_to_fail_as_leave_the_error(generator):
+    for units, target, confidence in ((100, 0.9973, 0.95), (1152, 0.9973, 0.5), (2048, 0.99, 0.97)):
+        allowed = allowed_rejections(units, target, confidence)
+        assert allowed < 0 or binom.cdf(allowed, units, 1 - target) <= 1 - confidence
+        assert binom.cdf(allowed + 1, units, 1 - target) > 1 - confidence

@@ -1,0 +1,218 @@
+"""The last word on a design: fresh units that no search has seen, judged with one stated error for the whole answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.guarantee import Level, Sampled, reached
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.monte_carlo import MonteCarlo, proportion, require_few_failures
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Evaluation, Model
+
+LOOKS = ((0.25, 0.125), (0.5, 0.125), (1.0, 0.75))
+"""Share of the units after which a design is judged, and share of the attempt's error that this may spend [-]."""
+_SPENT = 0.75
+"""Share of the error left that a design may spend [-]."""
+ATTEMPTS = 4
+"""Largest number of designs that one answer may try to confirm [-]."""
+_EVEN_ODDS = 0.5
+
+
+def error_of_look(error: float, attempt: int, look: int = -1) -> float:
+    """Return the error that one look at one design may spend [-].
+
+    Parameters
+    ----------
+    error
+        Probability with which an answer may be wrong [-].
+    attempt
+        Number of the design, from 1; each may spend three quarters of what those before it left [-].
+    look
+        Position in `LOOKS`, the last one unless given [-].
+    """
+    return error * _SPENT * (1 - _SPENT) ** (attempt - 1) * LOOKS[look][1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judge:
+    """Confirms designs on fresh units.
+
+    Notes
+    -----
+    Every design and every look has units, or an order, fixed before any of them is solved, and an error of its own;
+    the errors add up to less than the one stated (Bonferroni), however the designs were found and whichever is taken
+    in the end. All requirements must be shown at a look, each with the whole error of it: a design that misses one is
+    wrongly confirmed only if that one is wrongly shown.
+    """
+
+    model: Model  # The real model
+    seeds: SeedTree  # Node of the seed tree; every attempt takes its own child
+    units: int  # Largest number of units for a design [-]
+    error: float  # Probability with which the answer may be wrong [-]
+    largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
+
+    def judge(self, design: VerifiedDesign, attempt: int) -> VerifiedDesign:
+        """Return a design with what its fresh units say of it.
+
+        Parameters
+        ----------
+        design
+            A design with the local models of its search.
+        attempt
+            Number of designs judged for this answer, with this one [-].
+
+        Raises
+        ------
+        SolveError
+            More units failed.
+
+        Notes
+        -----
+        A look that finds the design beyond a limit by more than a standard error ends the attempt; giving up spends no
+        error.
+        """
+        seeds, found = self.seeds.child(f"attempt {attempt}"), design
+        drawn: list[MonteCarlo] = []
+        for look, (share, _) in enumerate(LOOKS):
+            missing = int(np.ceil(share * self.units)) - sum(len(own.x) for own in drawn)
+            drawn.append(self._drawn(design, seeds.child(f"look {look + 1}"), missing))
+            sample = _joined(drawn)
+            require_few_failures(sample, f"{design.name}, confirmation", self.largest_failed_share)
+            found = _judged(design, sample, 1 - error_of_look(self.error, attempt, look))
+            if found.confirmed or _is_hopeless(found):
+                break
+        return found
+
+    def _drawn(self, design: VerifiedDesign, seeds: SeedTree, units: int) -> MonteCarlo:
+        """Return fresh units with all outputs that are limited, the leading one first."""
+        space, errors = design.space, design.space.errors
+        zones, chunks = space.zones(design.design), seeds.uniform_chunks(units, len(errors.columns))
+        x = np.concatenate([errors.deviations(errors.standard_values(chunk), zones) for chunk in chunks])
+        response = self.model.at(design.settings).reading(tuple(design.outputs))
+        return MonteCarlo(x=x, evaluation=response(x))
+
+
+def _joined(samples: list[MonteCarlo]) -> MonteCarlo:
+    """Return all units of several samples."""
+    return MonteCarlo(
+        x=np.concatenate([own.x for own in samples]),
+        evaluation=Evaluation(
+            values=np.concatenate([own.evaluation.values for own in samples]),
+            status=np.concatenate([own.evaluation.status for own in samples]),
+        ),
+    )
+
+
+def _judged(design: VerifiedDesign, sample: MonteCarlo, confidence: float) -> VerifiedDesign:
+    """Return a design with what other units say of it; its derivatives stay those of its search."""
+    found = np.where(sample.evaluation.good[:, np.newaxis], sample.evaluation.values, np.nan)
+    values = dict(zip(design.outputs, found.T, strict=True))
+    checks = tuple(_checked(check, design, values, confidence) for check in design.checks)
+    kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
+    return replace(
+        design,
+        sample=sample,
+        achieved=proportion(len(found), int(np.count_nonzero(~kept[0]))),
+        checks=checks,
+        joint=proportion(len(found), int(np.count_nonzero(~kept.all(axis=0)))),
+        outputs=values,
+        confidence=confidence,
+        confirmed=all(check.met for check in checks),
+    )
+
+
+def _levels(
+    check: Check, values: Mapping[str, Float[np.ndarray, " unit"]], confidence: float
+) -> tuple[tuple[Level, ...], Float[np.ndarray, " good"]]:
+    """Return what units say of a guarantee, nothing where units are not what shows it, and what they have of it."""
+    requirement, read = check.requirement, check.requirement.read(values)
+    good = np.asarray(read[np.isfinite(read)])
+    if not isinstance(requirement.guarantee, Sampled):
+        return (), good
+    return requirement.guarantee.levels(good, read.size - good.size, requirement.limits, confidence), good
+
+
+def _checked(
+    check: Check, design: VerifiedDesign, values: Mapping[str, Float[np.ndarray, " unit"]], confidence: float
+) -> Check:
+    """Return how a design stands against a requirement; what needs no units stands as it was."""
+    levels, good = _levels(check, values, confidence)
+    if not levels:
+        return check
+    sides = zip(check.sides, levels, strict=True)
+    return replace(check, sides=tuple(_moved(side, level, design, reached(level, good)) for side, level in sides))
+
+
+def _moved(side: Side, level: Level, design: VerifiedDesign, value: float) -> Side:
+    """Return a side at another value, its model with the same slopes through it."""
+    load = float(side.stack.load(design.scales, design.settings))
+    stack = replace(side.stack, budget=load - (value - level.sign * level.limit))
+    return replace(side, value=level.value, standard_error=level.standard_error, stack=stack)
+
+
+def _is_hopeless(design: VerifiedDesign) -> bool:
+    """Return whether even the middle of what the units say lies beyond a limit, by more than a standard error."""
+    levels = [level for check in design.checks for level in _levels(check, design.outputs, _EVEN_ODDS)[0]]
+    return any(np.isfinite(level.value) and level.excess > level.standard_error for level in levels)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confirmed:
+    """What became of the designs that an answer could draw."""
+
+    drawn: tuple[str, VerifiedDesign] | None  # Kind and design that is drawn, none where nothing was confirmed
+    judged: tuple[tuple[str, VerifiedDesign], ...]  # All that were judged with their kinds, in order
+
+    def last(self, kind: str) -> VerifiedDesign | None:
+        """Return the design of a kind that stands: the drawn one, or the last that was judged."""
+        if self.drawn and self.drawn[0] == kind:
+            return self.drawn[1]
+        return next((design for name, design in reversed(self.judged) if name == kind), None)
+
+
+def confirm(
+    judge: Judge,
+    candidates: Mapping[str, VerifiedDesign],
+    following: Callable[[str, VerifiedDesign, int], VerifiedDesign | None],
+) -> Confirmed:
+    """Return the cheapest design that fresh units confirm.
+
+    Parameters
+    ----------
+    judge
+        Judges designs on fresh units.
+    candidates
+        Kind → design that its search holds for good.
+    following
+        Makes of a kind, a judged design of it and the attempt the design that its search would try next: a cheaper
+        one after a confirmed design, a safer one after any other; none where there is no such design.
+
+    Notes
+    -----
+    The cheapest design that was not yet judged is judged next. The first one confirmed is the answer, unless the one
+    cheaper design that is tried after it is confirmed as well.
+    """
+    waiting, judged = dict(candidates), list[tuple[str, VerifiedDesign]]()
+    drawn: tuple[str, VerifiedDesign] | None = None
+    for attempt in range(1, ATTEMPTS + 1):
+        kind = min(waiting, key=lambda own: waiting[own].cost, default=None)
+        if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
+            break
+        found = judge.judge(waiting.pop(kind), attempt)
+        judged.append((kind, found))
+        was_drawn = drawn is not None
+        drawn = (kind, found) if found.confirmed else drawn
+        if was_drawn:
+            break
+        after = following(kind, found, attempt) if attempt < ATTEMPTS else None
+        if after is not None:
+            waiting[kind] = after
+    return Confirmed(drawn=drawn, judged=tuple(judged))
