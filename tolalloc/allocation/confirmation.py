@@ -17,17 +17,17 @@ from tolalloc.capability.monte_carlo import MonteCarlo, proportion, require_few_
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Evaluation, Model
 
-LOOKS = ((0.25, 0.125), (0.5, 0.125), (1.0, 0.75))
-"""Share of the units after which a design is judged, and share of the attempt's error that this may spend [-]."""
-_SPENT = 0.75
-"""Share of the error left that a design may spend [-]."""
 ATTEMPTS = 4
 """Largest number of designs that one answer may try to confirm [-]."""
+_SPENT = 0.75
+"""Share of the error left that a design may spend [-]."""
+_LOOKS = (0.25, 0.5, 1.0)
+"""Shares of the units after which a design may be given up; it is confirmed after the last one alone [-]."""
 _EVEN_ODDS = 0.5
 
 
-def error_of_look(error: float, attempt: int, look: int = -1) -> float:
-    """Return the error that one look at one design may spend [-].
+def error_of(error: float, attempt: int) -> float:
+    """Return the error that one design may spend [-].
 
     Parameters
     ----------
@@ -35,10 +35,20 @@ def error_of_look(error: float, attempt: int, look: int = -1) -> float:
         Probability with which an answer may be wrong [-].
     attempt
         Number of the design, from 1; each may spend three quarters of what those before it left [-].
-    look
-        Position in `LOOKS`, the last one unless given [-].
     """
-    return error * _SPENT * (1 - _SPENT) ** (attempt - 1) * LOOKS[look][1]
+    return error * _SPENT * (1 - _SPENT) ** (attempt - 1)
+
+
+def confidence_of_fewer(confidence: float, units: int, final: int) -> float:
+    """Return the confidence with which fewer units find what the final ones are expected to find [-].
+
+    Notes
+    -----
+    What a guarantee takes beyond the middle of the units falls with the root of their number.
+    """
+    from scipy.stats import norm
+
+    return float(norm.cdf(norm.ppf(confidence) * np.sqrt(units / final))) if units != final else confidence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,15 +57,15 @@ class Judge:
 
     Notes
     -----
-    Every design and every look has units, or an order, fixed before any of them is solved, and an error of its own;
-    the errors add up to less than the one stated (Bonferroni), however the designs were found and whichever is taken
-    in the end. All requirements must be shown at a look, each with the whole error of it: a design that misses one is
-    wrongly confirmed only if that one is wrongly shown.
+    Every design has fresh units, their number fixed beforehand, and an error of its own; the errors add up to less than
+    the one stated (Bonferroni), however the designs were found and whichever is taken in the end. All requirements must
+    be shown, each with the whole error of the design: one that misses a requirement is wrongly confirmed only if that
+    one is wrongly shown.
     """
 
     model: Model  # The real model
     seeds: SeedTree  # Node of the seed tree; every attempt takes its own child
-    units: int  # Largest number of units for a design [-]
+    units: int  # Units that confirm a design; fewer may give it up [-]
     error: float  # Probability with which the answer may be wrong [-]
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
 
@@ -76,20 +86,21 @@ class Judge:
 
         Notes
         -----
-        A look that finds the design beyond a limit by more than a standard error ends the attempt; giving up spends no
-        error.
+        Units that find the design beyond a limit by more than a standard error before all are solved end the attempt:
+        giving up spends no error.
         """
         seeds, found = self.seeds.child(f"attempt {attempt}"), design
         drawn: list[MonteCarlo] = []
-        for look, (share, _) in enumerate(LOOKS):
-            missing = int(np.ceil(share * self.units)) - sum(len(own.x) for own in drawn)
-            drawn.append(self._drawn(design, seeds.child(f"look {look + 1}"), missing))
+        for look, share in enumerate(_LOOKS, start=1):
+            units = int(np.ceil(share * self.units))
+            drawn.append(self._drawn(design, seeds.child(f"look {look}"), units - sum(len(own.x) for own in drawn)))
             sample = _joined(drawn)
             require_few_failures(sample, f"{design.name}, confirmation", self.largest_failed_share)
-            found = _judged(design, sample, 1 - error_of_look(self.error, attempt, look))
-            if found.confirmed or _is_hopeless(found):
+            confidence = confidence_of_fewer(1 - error_of(self.error, attempt), units, self.units)
+            found = _judged(design, sample, confidence)
+            if _is_hopeless(found):
                 break
-        return found
+        return replace(found, confirmed=found.met and found.achieved.units == self.units)
 
     def _drawn(self, design: VerifiedDesign, seeds: SeedTree, units: int) -> MonteCarlo:
         """Return fresh units with all outputs that are limited, the leading one first."""
@@ -125,7 +136,6 @@ def _judged(design: VerifiedDesign, sample: MonteCarlo, confidence: float) -> Ve
         joint=proportion(len(found), int(np.count_nonzero(~kept.all(axis=0)))),
         outputs=values,
         confidence=confidence,
-        confirmed=all(check.met for check in checks),
     )
 
 

@@ -21,8 +21,8 @@ _STEPS_AROUND = 4
 """Steps to either side of the free amounts that are tried; the local models are trusted no further [-]."""
 _SETTLED = 0.2
 """Distance of a kept from a missed margin that ends the search [standard errors]."""
-_MARGINS = (1.0, 2.0, 4.0)
-"""Distances from the limits at which another choice is looked for, one after another [standard errors]."""
+_FURTHER = (1.0, 2.0, 4.0)
+"""Factors of the distance from the limits at which another choice is looked for, one after another [-]."""
 _ROUNDING = 1e-9
 """Distance of a setting from its range up to which it is rounding [unit of the setting]."""
 
@@ -224,7 +224,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
 
 
 def choice_beside(
-    drawn: DrawnAmounts, judged: VerifiedDesign, tried: tuple[VerifiedDesign, ...]
+    drawn: DrawnAmounts, judged: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
 ) -> Float[np.ndarray, " variable"] | None:
     """Return the best other choice by the models of a judged one: as near to the limits as it may be, none if no other.
 
@@ -236,10 +236,12 @@ def choice_beside(
         The choice, in a space whose groups share one zone.
     tried
         Choices beside it that correct its models.
+    margin
+        How far inside each limit the aim is, or further where that makes no other choice [standard errors].
     """
     grid = _Grid(judged.space, drawn, judged.design)
-    for margin in _MARGINS:
-        found = grid.problem(_inside(judged, [*tried, judged], margin)).solve()
+    for factor in _FURTHER:
+        found = grid.problem(_inside(judged, [*tried, judged], factor * margin)).solve()
         choice = None if found is None else grid.design(found)
         if choice is None or not np.allclose(choice, judged.design, atol=1e-6):
             return choice

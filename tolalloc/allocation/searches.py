@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.candidates import ALONE, FREE, GRADES, Candidates
-from tolalloc.allocation.confirmation import Judge, confirm, error_of_look
+from tolalloc.allocation.confirmation import Judge, confidence_of_fewer, confirm, error_of
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
@@ -46,6 +46,9 @@ from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 _REACH = 1.25
 """Factor by which a variable may change from a judged design to the next one [-]."""
+_MARGIN = 1.0
+"""How far inside the limits a cheaper design is aimed after a confirmed one, and half as far as a safer one after a miss
+[standard errors of all units]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -77,14 +80,9 @@ class DrawingQuestion:
 
     @property
     def search_confidence(self) -> float:
-        """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-].
-
-        What a guarantee takes beyond the middle of the units falls with the root of their number.
-        """
-        from scipy.stats import norm
-
-        units, final = self.effort.verification_units, self.effort.confirmation_units
-        return float(norm.cdf(norm.ppf(1 - error_of_look(self.effort.error, 1)) * np.sqrt(units / final)))
+        """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
+        shown, units = 1 - error_of(self.effort.error, 1), self.effort.verification_units
+        return confidence_of_fewer(shown, units, self.effort.confirmation_units)
 
     def seeds(self, name: str) -> SeedTree:
         """Return the node of the seed tree of a stage."""
@@ -105,7 +103,7 @@ class DrawingQuestion:
             leading = self.requirements[0].output
             raise InputError(f"{self.place}: unit_price needs one upper limit above 0 on {leading}, the first limit.")
         asked = {
-            "confirmation_units": (self.effort.confirmation_units, 1 - error_of_look(self.effort.error, 1)),
+            "confirmation_units": (self.effort.confirmation_units, 1 - error_of(self.effort.error, 1)),
             "verification_units": (self.effort.verification_units, self.search_confidence),
         }
         if self.what_if and self.model.uncertain:
@@ -189,10 +187,13 @@ class DrawingQuestion:
     def _following(self, found: Candidates, kind: str, judged: VerifiedDesign, attempt: int) -> VerifiedDesign | None:
         """Return the design that the search of a judged one would try next, none where it would try no other."""
         searches = {ALONE: found.fixed, FREE: found.free}
+        errors = _MARGIN if judged.confirmed else 2 * _MARGIN
+        # The next design is judged by all units, where this one may have been given up by few of them.
+        margin = errors * np.sqrt(judged.achieved.units / self.effort.confirmation_units)
         if kind == GRADES and found.graded:
-            design = choice_beside(self.model.drawn_amounts, judged, found.graded.tried[1:])
+            design = choice_beside(self.model.drawn_amounts, judged, found.graded.tried[1:], margin)
         elif search := searches.get(kind):
-            design = step_from(judged, search.tried, margin=1.0, reach=_REACH)
+            design = step_from(judged, search.tried, margin, _REACH)
         else:
             return None
         worth = (1 - self.effort.gain) * judged.cost if judged.confirmed else np.inf
