@@ -28,8 +28,8 @@ housing.pitch,ground,reciprocal,,,,today
 housing.pitch,broached,reciprocal,0.8,5,{change},another machine
 """
 SMALL = """AllocationEffort(
-        verification_units=128, shared_units=16, graded_steps=2, exact_points=8, setting_steps=(2, 2), changed_costs=4,
-        changed_stiffnesses=1, stiffness_units=128, share_blocks=8, yields=(0.9, 0.95),
+        verification_units=128, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
+        setting_steps=(2, 2), changed_costs=4, changed_stiffnesses=1, stiffness_units=128, share_blocks=8, yields=(0.9, 0.95),
         search=SearchEffort(steps=2, front=FrontEffort(population=8, generations=4, population_on_kernel=8,
             generations_on_kernel=2, designs=10, rounds=1, points=3)))"""
 STUDY = """import tolalloc as ta
@@ -295,11 +295,11 @@ def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
         ({"others": f", {LOST}: ta.Limit(lower=2.0, upper=1.0)"}, ["upper limit is 1.0", "above the lower one"]),
         (
             {"others": f", {LOST}: ta.Limit(upper=1.0, show=ta.AtYield(target=0.999))"},
-            ["effort.verification_units for lost motion", "128", "2995 or more"],
+            ["effort.confirmation_units for lost motion", "512", "3282 or more"],
         ),
         (
             {"first": "upper=50.0, show=ta.AtYield(target=0.999)"},
-            ["effort.verification_units for peak-to-peak", "128", "2995 or more"],
+            ["effort.confirmation_units for peak-to-peak", "512", "3282 or more"],
         ),
         ({"asked": "unit_price=ta.UnitPrice(inspection=-1.0)"}, ["inspection is -1.0", "0 or above"]),
         ({"asked": "unit_price=5.0"}, ["unit_price is 5.0", "UnitPrice"]),

@@ -35,7 +35,8 @@ SMALL = replace(
     changed_costs=3,
     share_blocks=8,
     yields=(0.8, 0.95, 0.9999),
-    confidence=0.95,
+    confirmation_units=1024,
+    error=0.05,
 )
 
 

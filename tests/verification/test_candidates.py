@@ -9,6 +9,7 @@ import pytest
 import tolalloc as ta
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.candidates import ALIKE, GRADES, TABLE
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign
 
 ZONE = {"plus": 0.01, "minus": -0.01, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
@@ -36,9 +37,14 @@ def at_cost(design: VerifiedDesign, cost: float) -> VerifiedDesign:
     return replace(design, cost=cost)
 
 
+def confirming(allocation: ZoneAllocation) -> ZoneAllocation:
+    """Return an allocation whose design was confirmed."""
+    return replace(allocation, chosen=replace(allocation.chosen, confirmed=True))
+
+
 def with_table(answer: AllocationAnswer, cost: float) -> AllocationAnswer:
     """Return the answer with a table that keeps the limits at a cost."""
-    table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost)
+    table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost, confirmed=True)
     alike = answer.free.proportional_tried[1:]
     return replace(answer, free=replace(answer.free, proportional_tried=(table, *alike)))
 
@@ -64,7 +70,7 @@ def test_a_table_that_costs_less_is_kept_and_said_to_be(graded):
 def test_where_grades_are_asked_for_no_other_zones_are_drawn(graded):
     admitted = graded.candidates.admitted(graded.free_label)
     assert set(admitted) == {TABLE, GRADES}
-    free = replace(graded, graded=None)
+    free = replace(graded, graded=None, free=confirming(graded.free))
     assert set(free.candidates.admitted(free.free_label)) == {TABLE, ALIKE, free.free_label}
     assert free.chosen is free.free.chosen
 
@@ -72,9 +78,9 @@ def test_where_grades_are_asked_for_no_other_zones_are_drawn(graded):
 def test_zones_beyond_what_they_may_be_are_not_drawn(graded):
     free, alike = graded.free, graded.free.proportional
     beyond = at_cost(replace(alike, design=alike.design + 10.0, checks=free.chosen.checks), 0.5 * free.chosen.cost)
-    changed = replace(graded, graded=None, free=replace(free, proportional_tried=(free.baseline, beyond)))
+    changed = replace(graded, graded=None, free=confirming(replace(free, proportional_tried=(free.baseline, beyond))))
     assert ALIKE not in changed.candidates.admitted(changed.free_label)
-    assert changed.chosen is free.chosen
+    assert changed.chosen is changed.free.chosen
 
 
 def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
@@ -90,7 +96,7 @@ def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
 def test_a_miss_is_titled_so(graded):
     (check,) = graded.chosen.checks
     far = tuple(replace(side, value=side.limit + side.sign * 1.0) for side in check.sides)
-    lost = replace(graded.graded.chosen, checks=(replace(check, sides=far),))
+    lost = replace(graded.graded.chosen, checks=(replace(check, sides=far),), confirmed=False)
     answer = replace(graded, graded=replace(graded.graded, chosen=lost))
     table = replace(answer.free.baseline, checks=lost.checks)
     answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))

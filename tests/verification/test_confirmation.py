@@ -137,3 +137,49 @@ def test_as_many_units_are_allowed_to_fail_as_leave_the_error(generator):
         allowed = allowed_rejections(units, target, confidence)
         assert allowed < 0 or binom.cdf(allowed, units, 1 - target) <= 1 - confidence
         assert binom.cdf(allowed + 1, units, 1 - target) > 1 - confidence
+
+
+def test_a_joint_requirement_judges_what_all_limits_together_do():
+    """Excess and derivative are those of the limit that a unit exceeds most."""
+    limits = {GAP: ta.Limit(upper=at(0.99), lower=at(0.001)), PLAY: ta.Limit(upper=at(0.98))}
+    study = prepared(limits, ta.AtYield(0.95))
+    design = designed(study)
+    gap, play = design.outputs[GAP], design.outputs[PLAY]
+    kept = (gap <= at(0.99)) & (gap >= at(0.001)) & (play <= at(0.98))
+    joint = design.checks[-1].requirement
+    np.testing.assert_array_equal(joint.read(design.outputs) <= 0, kept)
+    assert design.joint.rejected == np.count_nonzero(~kept)
+    assert [check.requirement.guarantee.target for check in design.checks] == [0.95] * 3
+    (side,) = design.checks[-1].sides
+    assert (side.excess <= 0) == (design.joint.rejected <= allowed_rejections(1200, 0.95))
+    step, own = 1e-4, study.space
+    ends = []
+    for sign in (1, -1):
+        verifier = Verifier(
+            space=own,
+            model=study.model,
+            requirements=study.requirements_with_joint,
+            seeds=SeedTree(1),
+            units=1200,
+        )
+        ends.append(joint.read(verifier.verify(own.uniform(1 + sign * step), "table").outputs))
+    mean, derivative = joint.read(design.outputs), (ends[0] - ends[1]) / (2 * step)
+    spread = (side.value - mean.mean()) / mean.std()
+    expected = np.mean((1 + spread * (mean - mean.mean()) / mean.std()) * derivative)
+    gradient = (
+        side.stack.root_sum_square**2 * design.scales / np.linalg.norm(side.stack.root_sum_square * design.scales)
+    )
+    assert gradient.sum() == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_joint_yield_is_refused_where_no_question_reads_it_or_it_is_none():
+    with pytest.raises(ta.InputError, match=r"joint is 0\.9"):
+        ta.Study(joint=0.9, questions=[ta.Allocation()])
+    with pytest.raises(ta.InputError, match="no question of it reads joint"):
+        ta.Study(joint=ta.AtYield(0.9), questions=[ta.Ranking()])
+
+
+def test_one_limit_alone_needs_no_joint_requirement():
+    study = prepared({GAP: ta.Limit(upper=at(0.99))}, ta.AtYield(0.9))
+    assert study.requirements_with_joint == study.requirements
+    assert study.requirements[0].guarantee == ta.AtYield(0.9)

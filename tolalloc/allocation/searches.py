@@ -47,7 +47,7 @@ from tolalloc.sensitivity.sobol_analysis import SobolIndices
 _REACH = 1.25
 """Factor by which a variable may change from a judged design to the next one [-]."""
 _MARGIN = 1.0
-"""How far inside the limits a cheaper design is aimed after a confirmed one, and half as far as a safer one after a miss
+"""How far inside the limits a cheaper design is aimed after a confirmed one, half as far as a safer one after a miss
 [standard errors of all units]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
@@ -340,4 +340,5 @@ def allocate_drawing(
         robustness=robust,
         prices=question.prices(free),
         loss=question.quality_loss,
+        error=question.effort.error,
     )

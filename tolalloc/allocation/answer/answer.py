@@ -61,6 +61,8 @@ class AllocationAnswer(Answer):
         Price of a good unit over yield targets, if the question states what becomes of the others.
     loss
         What the leading output costs a user, if the question states it.
+    error
+        Probability up to which the answer may call a design met that misses a limit [-].
     """
 
     kind: ClassVar[str] = "allocation"
@@ -81,6 +83,7 @@ class AllocationAnswer(Answer):
     robustness: Robustness | None
     prices: YieldLadder | None
     loss: QualityLoss | None
+    error: float
 
     @property
     def free_label(self) -> str:
@@ -215,7 +218,8 @@ class AllocationAnswer(Answer):
             "yield target [-]": getattr(guarantee, "target", None),
             "seed": self.header.seed,
             "quick": self.header.quick,
-            "met": chosen.met,
+            "met": self.met,
+            "overall error of the verification [-]": self.error,
             "yield [-]": chosen.achieved.estimate,
             "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],
             "yield lower bound, one-sided 95 % [-]": chosen.achieved.bound,
@@ -231,10 +235,10 @@ class AllocationAnswer(Answer):
             "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
             f"cost of {self.free_label} [cost units]": free.chosen.cost,
             "cost on grades [cost units]": self.graded.chosen.cost if self.graded else None,
-            "bound by the local models [cost units]": self.bound if chosen.met else None,
+            "bound by the local models [cost units]": self.bound if self.met else None,
             "gap of the convex program [-]": free.optimum.gap,
-            "blocking requirement": None if chosen.met else chosen.blocking.requirement.output,
-            "beyond its limit by [unit of the output]": None if chosen.met else -chosen.blocking.slack,
+            "blocking requirement": None if self.met else chosen.blocking.requirement.output,
+            "beyond its limit by [unit of the output]": None if self.met else -chosen.blocking.slack,
             **self.model.amounts(chosen.settings),
             "requirements": _records(self.requirements_table),
             "drawing": _records(self.drawing_table),

@@ -151,7 +151,7 @@ def _quantiles(answer: AllocationAnswer) -> tuple[str, ...]:
             said.append(
                 f"{quantity(check.requirement.output)}: {guarantee.target:.2%} of these units keep "
                 f"{'at most' if check.sides[0].sign > 0 else 'at least'} {kept:.4g} {unit}; {value:.4g} {unit} is what "
-                f"{answer.chosen.joint.units:,} units show with 95 % confidence."
+                f"{answer.chosen.joint.units:,} units show with {answer.chosen.confidence:.1%} confidence."
             )
     return tuple(said)
 

@@ -22,11 +22,16 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen = answer.chosen
     achieved = chosen.achieved
     found = [
-        f"{'Met' if chosen.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units} fresh units keep "
+        f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
     if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
+    if answer.met and not answer.header.quick:
+        found.append(
+            "No search has seen these units; over all designs that were tried on such units, the probability that a "
+            f"design is called met that misses a limit is at most {answer.error:.0%}."
+        )
     found.append(_cost(answer))
     return (
         *found,
@@ -90,7 +95,7 @@ def _compared(answer: AllocationAnswer) -> str:
         f"{name} {own.cost:.2f}{'' if own.met else ' (misses a limit)'}"
         for name, own in answer.candidates.designs(answer.free_label).items()
     ]
-    listed = f"Verified: {'; '.join(costs)}."
+    listed = f"Found by the searches, of which the drawing alone is confirmed: {'; '.join(costs)}."
     if answer.met and answer.keeps_table:
         return f"Keep the drawing: nothing that may be drawn and keeps every limit was found cheaper. {listed}"
     return listed
@@ -222,10 +227,10 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen, found = answer.chosen, []
     if answer.header.quick:
         found.append(
-            "Quick run: small samples, wide intervals, limits shown at even odds. Run without --quick before setting a "
-            "drawing."
+            "Quick run: small samples, wide intervals, a design just at its limits is called met at even odds. "
+            "Run without --quick before setting a drawing."
         )
-    if not chosen.met:
+    if not answer.met:
         found.append(
             "No design was verified to meet all limits. This is the least violating one; what blocks is "
             f"{missed(chosen)}."

@@ -59,7 +59,7 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
     guarantee = check.requirement.guarantee
     if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
         return float("nan")
-    sign, values = check.sides[0].sign, design.outputs[check.requirement.output]
+    sign, values = check.sides[0].sign, check.requirement.read(design.outputs)
     turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))
     return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])
 
