@@ -59,10 +59,13 @@ def at(share: float) -> float:
 
 
 SHOWN = ta.AtYield(TARGET)
+EACH = np.sqrt(TARGET)
 ON_THE_LIMIT = {
     "one limit": ({GAP: ta.Limit(upper=at(TARGET), show=SHOWN)}, None),
-    "two limits": ({GAP: ta.Limit(upper=at((1 + TARGET) / 2), lower=at((1 - TARGET) / 2), show=SHOWN)}, None),
-    "joint": ({name: ta.Limit(upper=at(np.sqrt(TARGET))) for name in (GAP, PLAY)}, SHOWN),
+    "jointly, one with both sides": (
+        {GAP: ta.Limit(upper=at((1 + EACH) / 2), lower=at((1 - EACH) / 2)), PLAY: ta.Limit(upper=at(EACH))},
+        SHOWN,
+    ),
 }
 
 
