@@ -84,7 +84,8 @@ def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
     """Return an allocation whose design keeps so much more than its limit."""
     first, *others = allocation.chosen.checks
     side = replace(first.sides[0], value=first.sides[0].limit + beyond)
-    return replace(allocation, chosen=replace(allocation.chosen, checks=(replace(first, sides=(side,)), *others)))
+    chosen = replace(allocation.chosen, checks=(replace(first, sides=(side,)), *others), confirmed=False)
+    return replace(allocation, chosen=chosen)
 
 
 def test_the_certificate_says_what_the_dual_bound_says(results):
