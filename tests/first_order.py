@@ -12,7 +12,6 @@ from jaxtyping import Float, Int
 from scipy.optimize import minimize_scalar
 from scipy.special import log_ndtr, logsumexp, ndtr
 
-from tolalloc.capability.rare_failure.importance import FEWEST_EFFECTIVE_SAMPLES
 from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, RareFailure
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
@@ -202,6 +201,7 @@ METHOD = "Importance sampling"
 WIDE_SHARE = 0.2
 LARGEST_MISSED_SHARE = 0.05
 FEWEST_EXPECTED_HITS = 10.0
+FEWEST_EFFECTIVE_SAMPLES = 50.0
 _FEWEST_SAMPLES = 100
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.importance import widened_sampling
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
 from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -29,7 +29,6 @@ ERRORS = ErrorModel(
     (Source(name="a", part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0),)
 )
 SEEDS = SeedTree(0)
-FAILING = (np.full((5, 1), 3.5),) * 2
 
 
 class Itself:
@@ -55,8 +54,8 @@ ESTIMATORS = {
     "moment_units": lambda units: moment_independent(drawn(units), ERRORS, SEEDS, resamples=2),
     "surrogate_units": lambda units: answers_of(Itself(), drawn(units).x, SEEDS),
     "level_units": lambda units: subset_simulation(LIMIT, SEEDS, samples=units),
-    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, weighted=100),
-    "widened_units": lambda units: widened_sampling(LIMIT, FAILING, SEEDS, samples=units),
+    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, widened=100),
+    "widened_units": lambda units: widened_sampling(LIMIT, SEEDS, samples=units),
     "permutations": lambda count: shapley_effects(Experiment.of(Itself(), ERRORS, SEEDS), count),
 }
 SMALLEST = {
@@ -87,9 +86,10 @@ def test_the_smallest_number_is_the_smallest_that_the_estimator_takes(field):
         ESTIMATORS[field](SMALLEST[field] - 1)
 
 
-def test_a_level_is_made_of_whole_chains():
-    with pytest.raises(InputError, match="level_units is 105; allowed is a multiple of 10"):
-        RankingEffort(level_units=105)
+@pytest.mark.parametrize("field", ["level_units", "widened_units"])
+def test_a_level_is_made_of_whole_chains(field):
+    with pytest.raises(InputError, match=f"{field} is 105; allowed is a multiple of 10"):
+        RankingEffort(**{field: 105})
     with pytest.raises(InputError):
         subset_simulation(LIMIT, SEEDS, samples=105)
 

@@ -6,6 +6,7 @@ reads both in the same way, to the last bit, has not used the output.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,9 +16,9 @@ from tests.first_order import DesignPoints, design_point, design_points, importa
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.importance import widened_sampling
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -137,16 +138,15 @@ def test_subset_simulation_counts_it_as_safe_and_cautions(at):
 
 @pytest.mark.parametrize("at", [0, 150, 999])
 def test_weighted_samples_count_it_as_safe_and_caution(at):
-    failing = subset_simulation(limit_state((), "NaN"), SEEDS, samples=500, runs=2).failing
     points = DesignPoints.only(design_point(limit_state((), "NaN")))
     for estimate in (
-        lambda state: widened_sampling(state, failing, SEEDS, samples=1000),
+        lambda state: widened_sampling(state, SEEDS, samples=1000),
         lambda state: importance_sampling(state, points, SEEDS, samples=1000),
     ):
         found = [estimate(limit_state((at,), kind)) for kind in KINDS]
         assert found[0] == found[1]
         assert found[0].failed == 1
-        assert "1 of 1000 samples have no usable answer" in found[0].status
+        assert re.search(r"1 of \d+ samples have no usable answer", found[0].status)
 
 
 def test_searches_for_design_points_count_it():
@@ -161,7 +161,7 @@ def planted_yield(at: tuple[int, ...], kind: str, units: int, *share: float) -> 
     """Return the yield from random units of which some fail, which no later sample does."""
     state = limit_state(at, kind, *share)
     sample = monte_carlo(replace(state.experiment, largest_failed_share=0.1), units)
-    return yield_at_limit(state, sample, samples=200, runs=2)
+    return yield_at_limit(state, sample, samples=200, runs=2, widened=100)
 
 
 @pytest.mark.parametrize("at", [0, 1999])
@@ -177,15 +177,10 @@ def test_yield_at_a_limit_counts_it_as_rejected(at):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_rare_failures_stop_above_one_per_cent_unless_told_otherwise(kind):
-    failing = (np.full((5, 3), 3.0),) * 2
-    for estimate in (
-        lambda state, **allowed: subset_simulation(state, SEEDS, samples=500, **allowed),
-        lambda state, **allowed: widened_sampling(state, failing, SEEDS, samples=500, **allowed),
-    ):
-        with pytest.raises(SolveError, match="no usable answer"):
-            estimate(limit_state(tuple(range(6)), kind))
-        cautions = estimate(limit_state(tuple(range(6)), kind), largest_failed_share=0.02).cautions
-        assert any("no usable answer" in text for text in cautions)
+    with pytest.raises(SolveError, match="no usable answer"):
+        subset_simulation(limit_state(tuple(range(6)), kind), SEEDS, samples=500)
+    allowed = subset_simulation(limit_state(tuple(range(6)), kind), SEEDS, samples=500, largest_failed_share=0.02)
+    assert any("no usable answer" in text for text in allowed.cautions)
     with pytest.raises(SolveError, match="no usable answer"):
         planted_yield(tuple(range(6)), kind, 500)
     found = planted_yield(tuple(range(6)), kind, 500, 0.02)

@@ -42,7 +42,7 @@ _FEWEST = {
 }
 """Smallest numbers that the estimators take [-]."""
 _CHAIN = 10
-"""Units of a level come in chains of so many [-]."""
+"""Units of a level or width come in chains of so many [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,19 +86,20 @@ class RankingEffort:
     derivative_units: int = 1024
     inverse_units: int = 2048
     surrogate_units: int = 2048
-    # Units of a level and runs of the subset simulation, and units of the widened distribution that checks it, all for
-    # limits that are rarely exceeded [-]
+    # Units of a level of the subset simulation, runs of it and of the widened sampling that checks it, and units of a
+    # width of that, all for limits that are rarely exceeded [-]
     level_units: int = 4000
     level_runs: int = 5
-    widened_units: int = 20_000
+    widened_units: int = 2000
     permutations: int = 1000  # Permutations behind Shapley effects, where sources are correlated [-]
 
     def __post_init__(self) -> None:
         for field_name, fewest in _FEWEST.items():
             if getattr(self, field_name) < fewest:
                 raise self._refusal(field_name, getattr(self, field_name), f"{fewest} or more")
-        if self.level_units % _CHAIN:
-            raise self._refusal("level_units", self.level_units, f"a multiple of {_CHAIN}")
+        for field_name in ("level_units", "widened_units"):
+            if getattr(self, field_name) % _CHAIN:
+                raise self._refusal(field_name, getattr(self, field_name), f"a multiple of {_CHAIN}")
         sobol = self.sobol
         if sobol.limit < sobol.start:
             raise self._refusal("sobol.limit", sobol.limit, f"the first number of blocks, {sobol.start}, or more")
@@ -122,7 +123,7 @@ QUICK_RANKING = RankingEffort(
     surrogate_units=512,
     level_units=200,
     level_runs=3,
-    widened_units=500,
+    widened_units=100,
     permutations=100,
 )
 """Effort of a quick run: every measure is real, every interval wide."""

@@ -78,7 +78,7 @@ def beyond_table(answer: RankingAnswer) -> pd.DataFrame:
                 "relied on": "yes" if item is found.estimate else "no",
                 "cautions": "; ".join(item.cautions),
             }
-            for item in found.estimates
+            for item in dict.fromkeys((*found.estimates, found.estimate))
         ]
     )
 

@@ -165,7 +165,7 @@ class Measures:
             self.one_sided.of_sample(sample),
             samples=self.effort.level_units,
             runs=self.effort.level_runs,
-            weighted=self.effort.widened_units,
+            widened=self.effort.widened_units,
         )
 
     def inverse(self, choice: Choice) -> InverseSensitivity:

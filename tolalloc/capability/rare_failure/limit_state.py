@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -80,19 +80,6 @@ class CountedLimitState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level:
-    """One level of a subset simulation."""
-
-    run: int  # Which of the independent runs, from 0 [-]
-    # Value of the limit state that bounds the next level, 0 at the last one [unit of the limited output]
-    threshold: float
-    share: float  # Share of this level's samples beyond the threshold [-]
-    correlation: float  # Factor γ by which correlated chains raise the variance of the share to (1 + γ) times [-]
-    accepted: float  # Share of accepted chain steps, 1 at the first level, which has no chains [-]
-    coefficient_of_variation: float  # Of the share [-]
-
-
-@dataclass(frozen=True, kw_only=True)
 class RareFailure:
     """Probability of failure with its standard error and what it took."""
 
@@ -105,25 +92,11 @@ class RareFailure:
     method: str  # Name of the method
     cautions: tuple[str, ...]  # Reasons not to rely on the estimate; empty if the method sees none
     effective_samples: float  # Number of equally weighted failures that would know as much; 0 if no sample failed [-]
-    levels: tuple[Level, ...] = ()  # Levels of a subset simulation, run by run; empty for other methods
-    # Failing states of every run of a subset simulation, not independent of each other; empty for other methods [-]
-    failing: tuple[Float[np.ndarray, "_state variable"], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def coefficient_of_variation(self) -> float:
         """Standard error over probability, infinite for a probability of zero [-]."""
         return self.standard_error / self.probability if self.probability > 0 else float("inf")
-
-    def difference_from(self, other: RareFailure) -> float:
-        """Return the difference from an independent estimate in standard errors of that difference [-].
-
-        Notes
-        -----
-        Beyond 3 the two methods contradict each other, and one of them has missed something. An estimate without a
-        failure contradicts nothing, so the difference from it is 0.
-        """
-        error = float(np.hypot(self.standard_error, other.standard_error))
-        return (self.probability - other.probability) / error
 
     @property
     def trustworthy(self) -> bool:
