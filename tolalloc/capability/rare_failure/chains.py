@@ -1,9 +1,9 @@
 """Markov chains in standard normal space that carry a population of samples from one level of an estimate to the next.
 
 The chains stay exactly normal through conditional sampling, so every rejected step means "outside" and none is lost on
-the density. Their spread is adapted between groups of chains, never within a chain, and
-follows that of the starts coarsely: otherwise a variable whose starts are wide by chance takes larger steps back, and in
-100 variables the probability comes out a fifth too low.
+the density. Their spread is adapted between groups of chains, never within a chain, and follows that of the starts
+coarsely: otherwise a variable whose starts are wide by chance takes larger steps back, and in 100 variables the
+probability comes out a fifth too low.
 """
 
 from __future__ import annotations
