@@ -115,6 +115,14 @@ def test_a_check_that_stops_is_a_caution():
     assert not found.estimate.trustworthy
 
 
+def test_random_units_alone_are_not_relied_on_where_few_fail_and_nothing_else_does():
+    """A small island that no slope leads to and that ends further out."""
+    case = replace(flat(2, 4.0), margin=lambda u: np.where(np.linalg.norm(u - [3.0, 0.0], axis=1) < 0.3, -1.0, 4.0))
+    found = [asked(case, seed, samples=100, runs=2, widened=100) for seed in range(3)]
+    assert any("neither subset" in item.verdict for item in found)
+    assert all(item.verdict.startswith("Do not rely") for item in found)
+
+
 def test_random_units_may_contradict():
     case = flat(2, 3.5)
     levels = subset_simulation(case, SeedTree(0), samples=1000, runs=3)

@@ -113,7 +113,7 @@ def yield_at_limit(
     return YieldAtLimit(
         limit=limit,
         interval=ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
-        if found.estimate is plain
+        if found.estimate.method == METHOD
         else log_normal_interval(found.estimate, runs),
         estimate=found.estimate,
         estimates=found.estimates,

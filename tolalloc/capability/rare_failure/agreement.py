@@ -7,7 +7,7 @@ ends further out. Whatever misses a region gives too little, never too much.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -114,8 +114,11 @@ def judged(plain: RareFailure, levels: ChainedEstimate, widened: WidenedEstimate
     """
     methods = (levels,) if isinstance(widened, SolveError) else (levels, widened)
     if not any(item.probability for item in methods):
-        verdict = "Rely on the random units alone: neither subset simulation nor widened sampling met a failure."
-        return Agreement(estimate=plain, estimates=(plain, *methods), verdict=verdict)
+        few = f"{plain.effective_samples:.0f} of them lie beyond the limit where other methods meet none"
+        plain = replace(plain, cautions=plain.cautions + (few,) * bool(plain.probability))
+        reliance = "Do not rely on the random units" if plain.cautions else "Rely on the random units alone"
+        said = "; ".join(("neither subset simulation nor widened sampling met a failure", *plain.cautions))
+        return Agreement(estimate=plain, estimates=(plain, *methods), verdict=f"{reliance}: {said}.")
     common = _common(levels, widened)
     doubts = common.doubts
     if np.exp(LARGEST_DIFFERENCE * np.sqrt(np.log1p((common.error / common.probability) ** 2))) > FACTOR_IN_DOUBT:
