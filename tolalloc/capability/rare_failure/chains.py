@@ -57,8 +57,8 @@ class Chains:
         """Return chains from chosen states, numbered row by row, that keep values up to the largest, group by group."""
         first = self.u.reshape(-1, self.u.shape[2])[chosen]
         values, scale = self.values.ravel()[chosen], self.scale
-        # Whole powers of two follow a narrow failure, but not the chance in the starts.
-        spread = np.exp2(np.round(np.log2(np.maximum(first.std(axis=0), 1e-3))))
+        # Whole powers of two, 1 at most, follow a narrow failure, but hardly the chance in the starts.
+        spread = np.exp2(np.round(np.log2(np.clip(first.std(axis=0), 1e-3, 1.0))))
         states, answers, rates = [], [], []
         groups = int(np.clip(chosen.size // _FEWEST_CHAINS, 1, _GROUPS))
         for number, group in enumerate(np.array_split(np.arange(chosen.size), groups), start=1):
