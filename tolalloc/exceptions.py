@@ -10,12 +10,41 @@ TolallocError                 one sentence for a person; the command line prints
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+_LONGEST_VALUE = 200
+"""Most characters of a value that a sentence quotes [-]."""
+_LONGEST_SENTENCE = 2000
+"""Most characters of a sentence [-]."""
+_UNBROKEN = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
+"""What is written without a blank and is longer than any word or path that a sentence needs."""
+
+
+def in_short(text: str, longest: int = _LONGEST_VALUE) -> str:
+    """Return a text, with its middle left out if it has more characters than that."""
+    head = longest // 2
+    return text if len(text) <= longest else f"{text[:head]}…{text[head + 1 - longest :]}"
+
+
+def quoted(value: object) -> str:
+    """Return a value as a sentence shows it, 200 characters at most."""
+    try:
+        return in_short(repr(value))
+    except (ValueError, RecursionError):  # Python writes no whole number of more than 4300 digits
+        return f"a {type(value).__name__} too long to be shown"
+
 
 class TolallocError(Exception):
-    """Base of all errors that a user can mend; its text is one sentence."""
+    """Base of all errors that a user can mend; its text is one sentence, or one to each line."""
+
+    def __init__(self, sentences: str = "") -> None:
+        short = (
+            in_short(_UNBROKEN.sub(lambda found: in_short(found[0]), line), _LONGEST_SENTENCE)
+            for line in sentences.split("\n")
+        )
+        super().__init__("\n".join(short))
 
 
 class InputError(TolallocError):
@@ -24,7 +53,7 @@ class InputError(TolallocError):
     @classmethod
     def at(cls, place: Path | str, field: str, value: object, allowed: str) -> InputError:
         """Say in one sentence where the value stands, what it is and what is allowed."""
-        return cls(f"{place}: {field} is {value!r}; allowed is {allowed}.")
+        return cls(f"{place}: {field} is {quoted(value)}; allowed is {allowed}.")
 
 
 class UnknownNameError(TolallocError):
@@ -33,7 +62,7 @@ class UnknownNameError(TolallocError):
     @classmethod
     def among(cls, place: Path | str, what: str, name: str, known: Iterable[str]) -> UnknownNameError:
         """Name the unknown, the kind of thing it should be, and the nearest known names."""
-        names = sorted(known)
+        names, name = sorted(known), in_short(name)
         near: Sequence[str] = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or names[:6]
         nearest = f"the nearest known {'is' if len(near) == 1 else 'are'} {', '.join(near)}" if near else "it has none"
         return cls(f"{place}: {what} {name!r} is not known; {nearest}.")

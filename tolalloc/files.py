@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,12 +15,20 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import pydantic
 
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import InputError, UnknownNameError, quoted
+from tolalloc.file_content import is_file, read_text
 
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 """Folder that relative paths are meant from; the current one unless a script is being read."""
 
 Model = TypeVar("Model", bound=pydantic.BaseModel)
+
+_DEEP = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++\s*+\.\s*+){32}")
+"""A name of more parts than any has; reading it takes time and memory by the square of their number."""
+
+_FORMULA = re.compile(r"\s*[=+\-@]")
+"""How a text begins that a spreadsheet calculates."""
+_SIGNED = re.compile(r"[+-][0-9.]+(e[+-]?[0-9]+)?", re.IGNORECASE)
 
 _NUMBER = "constrained-float"
 """How pydantic calls the kind of a field that may be a number in a range or a record."""
@@ -63,16 +72,17 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file is missing, not text, or not complete TOML.
+        The file is missing, not text, not complete TOML, or nested more deeply than any of ours.
     """
+    text = read_text(path, "a text file in TOML")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except (IsADirectoryError, PermissionError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a text file ({error}).") from None
-    except tomllib.TOMLDecodeError as error:
+        if not _DEEP.search(text):
+            return tomllib.loads(text)
+    except RecursionError:
+        pass
+    except ValueError as error:  # of tomllib, or of a whole number with more digits than Python reads
         raise InputError(f"{path}: not complete TOML; is the file truncated? ({error}).") from None
+    raise InputError(f"{path}: its tables or lists stand in each other too deeply; allowed are a few levels.")
 
 
 def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) -> Model:
@@ -111,7 +121,7 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
         if isinstance(problem["input"], Mapping):  # a check of several fields together names their values itself
             whole = f"{field}: " if field else ""
             raise InputError(f"{place}: {whole}{message}.") from None
-        raise InputError(f"{place}: {field} is {problem['input']!r}; {message}.") from None
+        raise InputError(f"{place}: {field} is {quoted(problem['input'])}; {message}.") from None
 
 
 def _place_in_file(location: tuple[int | str, ...], data: Any, missing: bool) -> list[int | str]:
@@ -164,12 +174,14 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
     UnknownNameError
         Neither a shipped name nor an existing file.
     """
+    if not isinstance(name, str | Path):
+        raise InputError.at(f"{what} file", "name", name, "a shipped name or a path")
     shipped = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
     if str(name) in shipped:
         return shipped[str(name)]
     path = found_from_here(name)
-    if path.suffix or path.exists():
-        if not path.is_file():
+    if path.suffix or is_file(path):
+        if not is_file(path):
             raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
         return path
     raise UnknownNameError.among(f"shipped {what} files", "name", str(name), shipped)
@@ -203,6 +215,20 @@ def write_new(path: Path, text: str) -> None:
             file.write(text)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); name another file.") from None
+
+
+def no_formula(cell: object) -> object:
+    """Return a cell as a CSV file holds it: text that a spreadsheet would calculate stands behind an apostrophe."""
+    return f"'{cell}" if isinstance(cell, str) and is_formula(cell) else cell
+
+
+def is_formula(text: str) -> bool:
+    """Return whether a spreadsheet would calculate a text; a number is none.
+
+    >>> is_formula("=1+1"), is_formula("-cmd"), is_formula("-1.5"), is_formula("bore")
+    (True, True, False, False)
+    """
+    return bool(_FORMULA.match(text)) and not _SIGNED.fullmatch(text)
 
 
 def as_toml(value: str | float | tuple[str, ...]) -> str:

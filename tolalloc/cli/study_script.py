@@ -23,10 +23,11 @@ def load_study(path: Path) -> Study:
     InputError
         The script is missing, broken, or defines no study.
     """
+    from tolalloc.file_content import is_file
     from tolalloc.files import relative_to
     from tolalloc.study.study import Study
 
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such study script.")
     folder, name = path.resolve().parent, path.stem
     spec = importlib.util.spec_from_file_location(name, path)

@@ -13,6 +13,8 @@ from tolalloc.drawings.fields import ToleranceRow
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import require_columns
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
+from tolalloc.exceptions import InputError
+from tolalloc.file_content import is_file
 from tolalloc.files import found_from_here, write_new
 
 if TYPE_CHECKING:
@@ -161,12 +163,14 @@ def load_drawing(
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:
     """Return where a file is that a study names; a shipped name stays as it is."""
+    if not isinstance(name, str | Path):
+        raise InputError.at("drawing", "a file", name, "a shipped name or a path")
     path = Path(name)
-    return folder / path if folder and name and (path.suffix or (folder / path).is_file()) else name
+    return folder / path if folder and name and (path.suffix or is_file(folder / path)) else name
 
 
 def _placed(costs: Costs) -> Costs:
     """Return costs with their path as it is meant now; they are read later, when no script is being read any more."""
     if isinstance(costs, Mapping) or not costs:
         return costs
-    return found_from_here(costs) if Path(costs).suffix or found_from_here(costs).is_file() else costs
+    return found_from_here(costs) if Path(costs).suffix or is_file(found_from_here(costs)) else costs

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,13 +13,17 @@ from types import MappingProxyType
 from typing import Literal, TypeVar, get_args, get_origin
 
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.file_content import read_text
 from tolalloc.files import Record, validated
 
 DATA = Path(__file__).parent / "data"
+"""Shipped tables."""
+
+MOST_COLUMNS, MOST_CELLS = 4000, 2_000_000
+"""Largest table that is read, a million readings of two columns; workbooks have a limit of their own [-]."""
 
 COST_UNITS = "cost units"
-_CURRENCY = re.compile(r"[A-Z]{3}|[€$£¥]")
-"""Shipped tables."""
+_CURRENCY = re.compile(r"^([A-Z]{3}|[€$£¥])")
 
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
@@ -30,6 +33,10 @@ _DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """Number that is a thousand times as large where the sign separates thousands."""
+
+
+_APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
+"""What `tolalloc.files.no_formula` writes before a text."""
 
 
 def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
@@ -42,24 +49,51 @@ def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
     InputError
         The file is missing, no table, or cells stand under no header.
     """
-    rows = _sheet(path) if path.suffix.lower() in (".xlsx", ".xlsm") else _records(path)
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        from tolalloc.drawings.workbook import first_sheet
+
+        texts = first_sheet(path)
+        rows = _under_headers(path, texts, "each needs one")
+    else:
+        rows = _records(path)
     if not rows:
         raise InputError(f"{path}: the table is empty; a header and rows are needed.")
     width = len(rows[0][1])
     return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
 
 
+def require_believable(path: Path, row: int, columns: int, cells: int) -> None:
+    """Raise if a table is larger than is believed, so that none takes the memory of a machine.
+
+    Raises
+    ------
+    InputError
+        The row in which the columns or the cells so far are too many.
+    """
+    if columns > MOST_COLUMNS or cells > MOST_CELLS:
+        raise InputError(
+            f"{path}, row {row}: the table is too large, with {columns} columns and {cells} cells so far; allowed are "
+            f"{MOST_COLUMNS} columns and {MOST_CELLS} cells."
+        )
+
+
 def _records(path: Path) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
-    text = _text(path)
+    text = read_text(path, "a table in CSV")
     lines = ["" if line.startswith("#") else line for line in StringIO(text)]
     header = next((line for line in lines if line.strip()), "")
     separator = next((mark for mark in ";\t" if mark in header), ",")
-    rows: list[tuple[str, ...]] = []
+    rows, so_far = list[tuple[str, ...]](), 0
     try:
         for record in csv.reader(lines, delimiter=separator, strict=True):
-            rows.append(tuple(cell.strip() for cell in record))
+            rows.append(tuple(_APOSTROPHE.sub("", cell.strip()) for cell in record))
+            so_far += len(record)
+            require_believable(path, len(rows), len(record), so_far)
     except csv.Error as error:
+        if "field larger" in str(error):
+            raise InputError(
+                f"{path}, row {len(rows) + 1}: a cell is too long; allowed are {csv.field_size_limit()} characters."
+            ) from None
         raise InputError(
             f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
         ) from None
@@ -71,22 +105,6 @@ def _records(path: Path) -> list[NumberedRow]:
             f"{path}, row {number}: {len(cells)} of {len(kept[0][1])} cells are there; is the file truncated?"
         )
     return kept if separator == "," else kept[:1] + _with_decimal_points(path, kept[1:])
-
-
-def _text(path: Path) -> str:
-    """Return the text of a file."""
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except UnicodeDecodeError as error:
-        other = "UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else "Windows-1252 (cp1252)"
-        row = error.object[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}: cannot be read as a table in CSV (UTF-8), row {row} looks like {other}; save it as CSV UTF-8."
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a table in CSV (UTF-8) ({error}).") from None
 
 
 def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> list[NumberedRow]:
@@ -119,28 +137,6 @@ def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[Number
         (number, tuple(cell.replace(",", ".") if cell in decimals else cell for cell in cells))
         for number, cells in rows
     ]
-
-
-def _sheet(path: Path) -> list[NumberedRow]:
-    """Return the first sheet of a workbook, whole numbers without decimals."""
-    from openpyxl import load_workbook
-
-    try:
-        book = load_workbook(path, read_only=True, data_only=True)
-        try:
-            sheet = book.worksheets[0]
-            sheet.reset_dimensions()  # what a program noted there need not be true
-            rows = list(sheet.iter_rows(values_only=True))
-        finally:
-            book.close()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except (OSError, zipfile.BadZipFile, KeyError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: not a complete workbook (XLSX); is the file truncated? ({reason}).") from None
-    whole = ((int(cell) if isinstance(cell, float) and cell.is_integer() else cell for cell in row) for row in rows)
-    texts = [tuple("" if cell is None else str(cell).strip() for cell in row) for row in whole]
-    return _under_headers(path, texts, "each needs one")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,10 +227,11 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
         The column and its unit.
     """
     for name, unit in stated:
-        known = units.get(name, unit)
-        if unit and unit != known and not (known == COST_UNITS and _CURRENCY.fullmatch(unit)):
+        known = units.get(name, "")
+        priced = known.startswith(COST_UNITS)
+        if unit and known not in (unit, _CURRENCY.sub(COST_UNITS, unit, count=1) if priced else unit):
             allowed = f"{known}; numbers are not converted" if known else "none"
-            allowed = f"a currency such as EUR, or {allowed}" if known == COST_UNITS else allowed
+            allowed = f"a currency such as EUR, or {allowed}" if priced else allowed
             raise InputError.at(path, f"the unit of column {name}", unit, allowed)
 
 
@@ -275,10 +272,23 @@ def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> di
     }
 
 
+def plain_number(text: str) -> float:
+    """Return the number that a cell shows; what else Python takes for a number is a slip in a table.
+
+    Raises
+    ------
+    ValueError
+        The text is no number, or one with ``_`` or with digits of another script.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is no plain number")
+    return float(text)
+
+
 def _typed(annotation: object, header: str, value: str, place: str) -> object:
     """Return the text of a cell as the type of its field."""
     if annotation is int:
-        if not value.isdecimal():
+        if not (value.isascii() and value.isdecimal() and len(value) < 10):
             raise InputError.at(place, header, value, "a whole number, 1 or more")
         return int(value)
     if annotation is bool:
@@ -288,7 +298,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
         return answers[value.lower()]
     if annotation is float or float in get_args(annotation):
         try:
-            return float(value)
+            return plain_number(value)
         except ValueError:
             raise InputError.at(place, header, value, "a number with a decimal point") from None
     words: tuple[str, ...] = get_args(annotation) if get_origin(annotation) is Literal else ()

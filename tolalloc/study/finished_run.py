@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from tolalloc.exceptions import InputError
+from tolalloc.file_content import is_file, read_text
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
@@ -74,12 +76,17 @@ def read_run(folder: Path) -> FinishedRun:
     )
 
 
+def _text(path: Path, what: str) -> str:
+    if not is_file(path):
+        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?")
+    return read_text(path, what)
+
+
 def _read_json(path: Path) -> dict[str, Any]:
+    text = _text(path, "a text file in JSON")
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
-    except (OSError, ValueError) as error:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read as JSON; is the file truncated? ({error}).") from None
     if not isinstance(found, dict):
         raise InputError(f"{path}: holds a {type(found).__name__}; allowed is what a run writes.")
@@ -87,11 +94,10 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
+    text = _text(path, "a table in CSV")
     try:
-        found = pd.read_csv(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is {path.parent} the folder of a finished run?") from None
-    except (OSError, ValueError) as error:
+        found = pd.read_csv(StringIO(text))
+    except ValueError as error:
         raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
     _with(dict.fromkeys(found.columns), columns, path)
     return found

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.exceptions import InputError
+from tolalloc.file_content import read_text
 from tolalloc.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.rv.reducer.design import Catalogue, Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.rv.reducer.friction import Friction
@@ -159,7 +160,7 @@ def write_modified(name: str | Path, modification: Modification, path: Path) -> 
         f"shift_um = {as_toml(modification.shift / MICROMETRE)}\n"
         'convention = "plus"\n\n'
     )
-    text, found = _MODIFICATION.subn(table, source.read_text(encoding="utf-8"))
+    text, found = _MODIFICATION.subn(table, read_text(source, "a text file in TOML"))
     if found != 1:
         raise InputError(f"{source}: no table [modification] of its own; without it nothing can be put in its place.")
     validated(ReducerRecord, tomllib.loads(text), path)

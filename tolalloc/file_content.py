@@ -1,0 +1,76 @@
+"""The one door through which users' files are read: what is no file of a believable size is refused unread."""
+
+from __future__ import annotations
+
+import re
+import stat
+from pathlib import Path
+
+from tolalloc.exceptions import InputError
+
+LARGEST_FILE = 32 * 2**20
+"""Largest file that is read [B]; a million readings of two columns take about 20 MB."""
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+"""Characters that no page, workbook or terminal shows."""
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a path leads to a file; one that no file can have, such as a name too long, leads nowhere."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_bytes(path: Path, what: str) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        What it should be, for messages.
+
+    Raises
+    ------
+    InputError
+        The file is missing, cannot be read, is none (a folder, a device, a pipe), or is larger than is believed.
+    """
+    try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for, a device never ends
+            raise InputError(f"{path}: cannot be read as {what}; allowed is a file, and this is a folder or device.")
+        if found.st_size > LARGEST_FILE:
+            raise InputError(f"{path}: cannot be read as {what}; allowed are {LARGEST_FILE // 2**20} MB at most.")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as {what} ({getattr(error, 'strerror', error)}).") from None
+
+
+def read_text(path: Path, what: str) -> str:
+    """Return the text of a file in UTF-8, its lines ended as Python ends them.
+
+    Raises
+    ------
+    InputError
+        As of `read_bytes`; also text that is not UTF-8, or a control character.
+    """
+    content = read_bytes(path, f"{what} (UTF-8)")
+    try:
+        text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        other = "UTF-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "Windows-1252 (cp1252)"
+        row = content[: error.start].count(b"\n") + 1
+        kind = what.split()[-1]
+        raise InputError(
+            f"{path}: cannot be read as {what} (UTF-8), row {row} looks like {other}; save it as {kind} UTF-8."
+        ) from None
+    if found := _CONTROL.search(text):
+        row = text.count("\n", 0, found.start()) + 1
+        sign = f"the control character {found[0]!r}"
+        raise InputError(f"{path}: cannot be read as {what} (UTF-8), row {row} holds {sign}; allowed is text.")
+    return text
