@@ -137,7 +137,7 @@ BAD_ROWS = [
     (PITCH | {"spectrum": "random:1/2"}, "on 4 to 400 teeth"),
     (PITCH | {"spectrum": "random:1/40 random:1/40"}, "at most one random part"),
     (PITCH | {"spectrum": "21:1 random:1/40"}, "highest order must be 20 or less"),
-    (PITCH | {"spectrum": "1:2 1:3"}, "1:3 must be an order from 1 up, each once"),
+    (PITCH | {"spectrum": "1:2 1:3"}, "1:3 must be an order from 1 up to 100, each once"),
     ({"sorted": "maybe"}, "sorted is 'maybe'; allowed is yes or no"),
     ({"distribution": "mixture", "batches": "1:2:0.1", "sorted": "yes"}, "would leave less than 1% of all parts"),
 ]

@@ -15,7 +15,7 @@ from tolalloc.allocation.cost.closed_forms import (
     reciprocal_squared,
 )
 from tolalloc.allocation.cost.points import load_shop_points
-from tolalloc.allocation.cost.process_costs_file import ProcessCostRow, load_process_costs, priced, today
+from tolalloc.allocation.cost.process_costs_file import UNITS, ProcessCostRow, load_process_costs, priced, today
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -70,7 +70,7 @@ def test_todays_processes_of_the_shipped_table_cost_what_the_tolerance_table_say
 
 
 def test_every_alternative_of_the_shipped_table_pays_somewhere_and_is_marked_as_assumed():
-    rows = read_rows(DATA / "rv20e.process_costs.csv", ProcessCostRow, "sources")
+    rows = read_rows(DATA / "rv20e.process_costs.csv", ProcessCostRow, "sources", UNITS)
     assert all(row.note.startswith("assumed: ") for _, row in rows)
     for processes in load_process_costs("rv20e", SOURCES).values():
         assert len(processes) >= 2
@@ -191,7 +191,10 @@ BAD = [
     (("disc1.pitch,own,reciprocal,0,20,2,,,,,,,s",), "model reciprocal takes no exponent"),
     (("disc1.pitch,own,spline,0,20,,,,,,,,s",), "model spline needs points"),
     (("disc1.pitch,own,spline,0,20,,,shop.csv,,,,,s",), "model spline takes no factor and no fixed"),
-    (("disc1.pitch,own,reciprocal,0,-20,,,,,,,,s",), "factor is -20.0; input should be greater than 0"),
+    (
+        ("disc1.pitch,own,reciprocal,0,-20,,,,,,,,s",),
+        "factor is -20.0; input should be greater than or equal to 0.000000000001",
+    ),
     (("disc1.pitch,own,reciprocal,0,nan,,,,,,,,s",), "factor is nan; input should be a finite number"),
     (("disc1.pitch,own,reciprocal,0,20,,,,9,8,,,s",), "min must not be above max: 9, 8 µm"),
     (("disc1.pitch,own,reciprocal,0,20,,,,,,,,",), "note is missing"),
@@ -227,7 +230,7 @@ def test_unknown_and_missing_columns_are_refused(tmp_path):
     [
         ("30,µm", "3,mm", r"row 2 \(hobbed\): tolerance is '3 mm'; allowed is 2000 µm or less"),
         ("30,µm", "30,inch", "unit is 'inch'"),
-        ("30,µm", "-30,µm", "tolerance is -30.0; input should be greater than 0"),
+        ("30,µm", "-30,µm", "tolerance is -30.0; input should be greater than or equal to 0.000001"),
         ("hobbed,,30", ",,30", r"row 2 \(no process\): process is missing"),
         ("µm,1.2", "µm,cheap", "cost is 'cheap'; allowed is a number"),
         ("tolerance [unit]", "zone [µm]", "column 'zone' is not known"),

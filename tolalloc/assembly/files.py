@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.plan import LARGEST_PRECISION, AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
-from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.rv.reducer.files import PRESETS
@@ -331,7 +331,7 @@ def _columns(table: TextTable) -> list[int]:
 def _arcseconds(cell: str, header: str, place: str) -> float:
     """Return the number in a cell."""
     try:
-        value = float(cell)
+        value = plain_number(cell)
     except ValueError:
         value = np.nan
     if not (isfinite(value) and abs(value) <= LARGEST):

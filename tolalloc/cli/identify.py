@@ -10,6 +10,7 @@ import typer
 
 from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, note, tell, write_report
 from tolalloc.cli.options import ReducerOption, named_reducer
+from tolalloc.drawings.table_file import plain_number
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -165,6 +166,6 @@ def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> t
 def _number(text: str, option: str, whole: str) -> float:
     """Return a number of an option."""
     try:
-        return float(text)
+        return plain_number(text)
     except ValueError:
         raise InputError.at(PLACE, option, whole, f"numbers; {text!r} is none") from None

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.distributions import ndtri
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import read_table_file
+from tolalloc.drawings.table_file import plain_number, read_table_file
 from tolalloc.exceptions import InputError, UnknownNameError
 
 _ROUNDING = 1e-10
@@ -275,6 +275,6 @@ def _pairs_of_matrix(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, .
 def _number(text: str, place: str) -> float:
     """Return a cell as a number."""
     try:
-        return float(text)
+        return plain_number(text)
     except ValueError:
         raise InputError.at(place, "correlation", text, "a number from -1 to 1 with a decimal point") from None

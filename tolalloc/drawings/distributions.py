@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 Numbers = Float[np.ndarray, "..."]
 
-NUMBER = r"\d+(?:\.\d*)?(?:e-?\d+)?"
+NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:e-?[0-9]+)?"
 """How a table writes a number inside a cell that holds several."""
 
 INSIDE_AT_CP_1 = 0.9973

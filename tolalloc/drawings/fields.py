@@ -21,6 +21,12 @@ from tolalloc.units import MICROMETRE, MILLIMETRE
 LARGEST_ZONE = 2000.0
 """Largest zone that is believed [µm]; a metre typed for a millimetre is far above it, and a model may ask for less."""
 
+SMALLEST_ZONE = 1e-6
+"""Smallest zone that is believed unless it is 0; below, a zone is lost beside its nominal size [µm]."""
+
+SMALLEST_COST = 1e-9
+"""Smallest cost that is believed unless there is none [cost units]."""
+
 _DECIMALS = 12
 """Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""
 
@@ -143,7 +149,7 @@ class ToleranceRow(Record):
     ] = ""
     measured_zone: Annotated[
         float | None,
-        Field(gt=0, le=LARGEST_ZONE),
+        Field(ge=SMALLEST_ZONE, le=LARGEST_ZONE),
         Column(
             "the zone that the measured parts were made to; today's unless given",
             "unit",
@@ -215,7 +221,7 @@ class ToleranceRow(Record):
     ] = 1
     over: Annotated[
         float | None,
-        Field(gt=0, le=1000),
+        Field(ge=0.001, le=1000),
         Column(
             "for tilt, phase and rotation: the length over which the zone limits the deviation",
             "mm",
@@ -241,8 +247,14 @@ class ToleranceRow(Record):
                 f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:g} µm: "
                 f"min {self.min:g}, zone {zone:g}, max {self.max:g} {self.unit}"
             )
-        if zone > 0 and not self.locked and self.cost == 0:
-            raise ValueError("the cost must be above 0 for a zone that allocation may change; or lock it")
+        if self.plus != self.minus and zone * factor < SMALLEST_ZONE:
+            raise ValueError(
+                f"the zone plus − minus is {zone * factor:g} µm and must be 0, or {SMALLEST_ZONE:g} µm or more"
+            )
+        if zone > 0 and not self.locked and self.cost < SMALLEST_COST:
+            raise ValueError(
+                f"the cost must be {SMALLEST_COST:g} or more for a zone that allocation may change; or lock it"
+            )
         angular = self.id.rsplit(".", 1)[-1] in ANGULAR
         if angular != (self.over is not None):
             raise ValueError(

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.distributions import RAYLEIGH, Distribution
-from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.units import MICROMETRE
@@ -182,7 +182,7 @@ def _column(table: TextTable, at: int) -> list[float]:
     values = []
     for row, cells in zip(table.rows, table.cells, strict=True):
         try:
-            value = float(cells[at]) * _FACTORS[unit]
+            value = plain_number(cells[at]) * _FACTORS[unit]
         except ValueError:
             value = float("nan")
         if not (isfinite(value) and abs(value) <= LARGEST_DEVIATION):

@@ -21,6 +21,9 @@ from tolalloc.drawings.distributions import (
     ndtri,
 )
 
+_MOST_BATCHES = 20
+"""Most batches of a mixture that are believed [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
@@ -45,9 +48,11 @@ def parsed_batches(text: str) -> tuple[Batch, ...]:
         if match is None:
             raise ValueError("the batches must read like '0.7:-0.3:0.8 0.3:0.5:0.6' (weight:shift:spread)")
         batch = Batch(weight=float(match[1]), shift=float(match[2]), spread=float(match[3]))
-        if batch.weight <= 0 or abs(batch.shift) > 2 or not 0.01 <= batch.spread <= 10:
-            raise ValueError(f"the batch {item} must have a weight above 0, shift -2 to 2, spread 0.01 to 10")
+        if not 1e-6 <= batch.weight <= 1e6 or abs(batch.shift) > 2 or not 0.01 <= batch.spread <= 10:
+            raise ValueError(f"the batch {item} must have a weight from 1e-6 to 1e6, shift -2 to 2, spread 0.01 to 10")
         batches.append(batch)
+    if len(batches) > _MOST_BATCHES:
+        raise ValueError(f"a mixture must have {_MOST_BATCHES} batches or less: {len(batches)}")
     return tuple(batches)
 
 

@@ -14,6 +14,9 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record, shipped_or_path
 
+_UNITS = {"Cp": "-", "shift": "half zone", "shape": "-"}
+"""Field → unit that its header may state."""
+
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
 
 
@@ -61,7 +64,7 @@ def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
     """
     path = shipped_or_path(name, DATA, ".processes.csv", "process capability library")
     found: dict[tuple[str, Feature], ProcessCapability] = {}
-    for place, capability in read_rows(path, ProcessCapability, "process"):
+    for place, capability in read_rows(path, ProcessCapability, "process", _UNITS):
         key = capability.process, capability.feature
         if key in found:
             raise InputError(

@@ -23,7 +23,7 @@ from tolalloc.drawings.table_file import (
     usual_signs,
 )
 from tolalloc.exceptions import InputError
-from tolalloc.files import shipped_or_path, validated
+from tolalloc.files import no_formula, shipped_or_path, validated
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def table_text(sources: Sequence[Source], folder: Path | None = None) -> str:
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADERS.values())
-    writer.writerows(table_rows(sources, folder))
+    writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 
 

@@ -46,6 +46,16 @@ KNOWN_RANGES: Mapping[Spectrum, float] = {
 FEWEST_TEETH, MOST_TEETH = 4, 400
 """Teeth between which a random spectrum is believed; their spectrum has half as many orders [-]."""
 
+HIGHEST_ORDER, MOST_ORDERS = 100, 20
+"""Highest order and most orders of a spectrum that are believed, as the range over a turn takes memory by both [-]."""
+
+SMALLEST_AMPLITUDE, LARGEST_AMPLITUDE = 1e-6, 1e6
+"""Relative amplitudes between which the ratio of two is a number that computes well [-]."""
+
+
+def _is_believed(amplitude: float) -> bool:
+    return SMALLEST_AMPLITUDE <= amplitude <= LARGEST_AMPLITUDE
+
 
 class Feature(StrEnum):
     """Kind of drawing callout, which says how a zone is read and which columns it moves."""
@@ -84,22 +94,28 @@ def parsed_spectrum(text: str) -> tuple[Spectrum, int]:
     amplitudes: dict[int, float] = {}
     teeth, random = 0, 0.0
     for item in text.split():
-        if pair := re.fullmatch(rf"(\d+):({NUMBER})", item):
+        if pair := re.fullmatch(rf"([0-9]{{1,9}}):({NUMBER})", item):
             order, amplitude = int(pair[1]), float(pair[2])
-            if order < 1 or amplitude <= 0 or order in amplitudes:
-                raise ValueError(f"the spectrum's {item} must be an order from 1 up, each once, with more than 0 of it")
-            amplitudes[order] = amplitude
-        elif (noise := re.fullmatch(rf"random:({NUMBER})/(\d+)", item)) and not teeth:
-            random, teeth = float(noise[1]), int(noise[2])
-            if random <= 0 or not FEWEST_TEETH <= teeth <= MOST_TEETH:
+            if not 1 <= order <= HIGHEST_ORDER or not _is_believed(amplitude) or order in amplitudes:
                 raise ValueError(
-                    f"the spectrum's {item} must have more than 0 of it on {FEWEST_TEETH} to {MOST_TEETH} teeth"
+                    f"the spectrum's {item} must be an order from 1 up to {HIGHEST_ORDER}, each once, with "
+                    f"{SMALLEST_AMPLITUDE:g} to {LARGEST_AMPLITUDE:g} of it"
+                )
+            amplitudes[order] = amplitude
+        elif (noise := re.fullmatch(rf"random:({NUMBER})/([0-9]{{1,9}})", item)) and not teeth:
+            random, teeth = float(noise[1]), int(noise[2])
+            if not _is_believed(random) or not FEWEST_TEETH <= teeth <= MOST_TEETH:
+                raise ValueError(
+                    f"the spectrum's {item} must have {SMALLEST_AMPLITUDE:g} to {LARGEST_AMPLITUDE:g} of it on "
+                    f"{FEWEST_TEETH} to {MOST_TEETH} teeth"
                 )
         else:
             raise ValueError(
                 "the spectrum must read like '1:9.2 2:4.3 4:1.0' (order:amplitude), with at most one random part like "
                 "'random:1.0/40' (standard deviation/teeth)"
             )
+    if len(amplitudes) > MOST_ORDERS:
+        raise ValueError(f"the spectrum must have {MOST_ORDERS} orders or less: {len(amplitudes)}")
     if teeth and max(amplitudes, default=0) > teeth // 2:
         raise ValueError(f"the spectrum's highest order must be {teeth // 2} or less, all that {teeth} teeth see")
     for order in range(1, teeth // 2 + 1):

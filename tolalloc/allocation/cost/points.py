@@ -11,11 +11,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tolalloc.drawings.fields import LARGEST_ZONE, UNITS
-from tolalloc.drawings.table_file import read_rows
+from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_COST, SMALLEST_ZONE, UNITS
+from tolalloc.drawings.table_file import COST_UNITS, read_rows
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record
+
+MOST_POINTS = 200
+"""Most prices of one process; a fit leaves out each of them in turn, and a workbook's formula names all [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +76,9 @@ class ShopPrice(Record):
 
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
-    tolerance: Annotated[float, Field(gt=0)]
+    tolerance: Annotated[float, Field(ge=SMALLEST_ZONE)]
     unit: Literal["µm", "um", "mm"]
-    cost: Annotated[float, Field(gt=0, le=1e9)]
+    cost: Annotated[float, Field(ge=SMALLEST_COST, le=1e9)]
     note: str = ""
 
 
@@ -94,13 +97,15 @@ def load_shop_points(path: Path) -> ShopPoints:
         The file, row, field and value that are not allowed, or a process with less than two tolerances.
     """
     prices: dict[tuple[str, Feature | None], list[tuple[float, float]]] = {}
-    for place, row in read_rows(path, ShopPrice, "process", {"cost": "cost units"}):
+    for place, row in read_rows(path, ShopPrice, "process", {"cost": COST_UNITS, "tolerance": "unit"}):
         zone = row.tolerance * UNITS[row.unit]
         if zone > LARGEST_ZONE:
             raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")
         prices.setdefault((row.process, row.feature), []).append((zone, row.cost))
     found = {}
     for (process, feature), pairs in prices.items():
+        if len(pairs) > MOST_POINTS:
+            raise InputError.at(path, f"number of prices of process {process}", len(pairs), f"{MOST_POINTS} or less")
         zones, costs = zip(*pairs, strict=True)
         found[process, feature] = Points.sorted(zones, costs, f"{path} ({process}, zones in µm)")
     return found

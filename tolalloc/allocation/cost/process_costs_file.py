@@ -23,20 +23,23 @@ from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel, Process
 from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.drawings.fields import LARGEST_ZONE
+from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import DATA, read_rows
+from tolalloc.drawings.table_file import COST_UNITS, DATA, read_rows
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.file_content import is_file
 from tolalloc.files import Record, shipped_or_path
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 Cost = Annotated[float, Field(ge=0, le=1e9)]
-Zone = Annotated[float | None, Field(gt=0, le=LARGEST_ZONE)]
-Positive = Annotated[float | None, Field(gt=0, le=1e12)]
+Zone = Annotated[float | None, Field(ge=SMALLEST_ZONE, le=LARGEST_ZONE)]
+Positive = Annotated[float | None, Field(ge=1e-12, le=1e12)]
 
-_UNITS = {
+UNITS = {
     **dict.fromkeys(("scale", "min", "max"), "µm"),
-    **dict.fromkeys(("fixed", "change", "inspection"), "cost units"),
+    **dict.fromkeys(("fixed", "change", "inspection"), COST_UNITS),
+    "factor": f"{COST_UNITS} µm^n",
+    "exponent": "-",
 }
 """Field → unit that its header may state."""
 
@@ -70,7 +73,7 @@ class ProcessCostRow(Record):
     model: CostCurve
     fixed: Annotated[float | None, Field(ge=0, le=1e9)] = None
     factor: Positive = None
-    exponent: Annotated[float | None, Field(gt=0, le=10)] = None
+    exponent: Annotated[float | None, Field(ge=0.01, le=10)] = None
     scale: Positive = None
     points: str | None = None
     min: Zone = None
@@ -224,11 +227,11 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
         The file, row, field and value that are not allowed, or a feature that no process can hold.
     """
     path = shipped_or_path(name, DATA, ".process_costs.csv", "process cost table")
-    rows = read_rows(path, ProcessCostRow, "sources", _UNITS)
+    rows = read_rows(path, ProcessCostRow, "sources", UNITS)
     for place, row in rows:
         if not any(fnmatchcase(source.name, row.sources) for source in sources):
             raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
-        if row.points and not (path.parent / row.points).is_file():
+        if row.points and not is_file(path.parent / row.points):
             folder = path.absolute().parent
             raise InputError(f"{place}: points {row.points}: no such file; allowed is a CSV file in {folder}.")
     shops = {row.points: load_shop_points(path.parent / row.points) for _, row in rows if row.points}

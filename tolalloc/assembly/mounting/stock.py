@@ -16,7 +16,7 @@ from tolalloc.assembly.mounting.places import PartTurn, Place, mounted, own_name
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
-from tolalloc.drawings.table_file import read_text_table
+from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -241,7 +241,7 @@ def _deviation(place: str, error: str, cell: str, unit: str) -> float:
         raise InputError.at(place, f"unit of {error}", unit, " or ".join(allowed))
     largest = LARGEST_ANGLE if angle else LARGEST_LENGTH
     try:
-        value = float(cell)
+        value = plain_number(cell)
     except ValueError:
         value = float("nan")
     if not (isfinite(value) and abs(value) <= largest):

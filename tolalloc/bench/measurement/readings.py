@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import InputError
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
@@ -84,7 +84,7 @@ def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarr
         if cells[position].lower() in MISSING:
             continue
         try:
-            value = float(cells[position])
+            value = plain_number(cells[position])
         except ValueError:
             value = np.inf
         if not isfinite(value):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from tolalloc.files import Record, times
 from tolalloc.rv.reducer.design import CycloidStage, Reducer
@@ -201,6 +201,16 @@ class IdentifiedValue(Record):
 
     value: NewtonPerMetre
     standard_uncertainty: Annotated[float, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _is_known(self) -> IdentifiedValue:
+        # It is read as that of ln K; bounds with a factor of a hundred between them leave 1.3 of the value.
+        if self.standard_uncertainty > 2 * self.value:
+            raise ValueError(
+                f"standard_uncertainty is {self.standard_uncertainty:g} N/m; allowed is twice the value, "
+                f"{2 * self.value:g} N/m, or less"
+            )
+        return self
 
 
 class IdentifiedStiffnessRecord(Record):

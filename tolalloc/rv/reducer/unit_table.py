@@ -9,9 +9,9 @@ from math import isfinite
 from pathlib import Path
 
 from tolalloc.drawings.sources import ANGULAR
-from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import InputError
-from tolalloc.files import write_new
+from tolalloc.files import no_formula, write_new
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.units import MICROMETRE, MICRORADIAN
 
@@ -87,7 +87,7 @@ def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[Built
         deviations = {}
         for place, (column, factor, largest) in columns.items():
             try:
-                value = float(cells[place])
+                value = plain_number(cells[place])
             except ValueError:
                 value = float("nan")
             if not (isfinite(value) and abs(value) <= largest):
@@ -117,8 +117,7 @@ def write_table(
     text = StringIO(newline="")
     text.writelines(f"# {comment}\n" for comment in comments)
     writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
-    writer.writerow(headers)
-    writer.writerows(rows)
+    writer.writerows(map(no_formula, row) for row in (headers, *rows))
     write_new(path, text.getvalue())
 
 
