@@ -11,6 +11,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import neglected_columns
 from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import is_number
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -198,9 +199,17 @@ def reducer(
     """
     for field, own in (("flank_clearance", flank_clearance), ("radial_clearance", radial_clearance)):
         if own is not None and not (
-            isinstance(own, Sequence) and len(own) == 2 and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
+            isinstance(own, Sequence)
+            and len(own) == 2
+            and all(map(is_number, own))
+            and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
         ):
             raise InputError.at(f"reducer {name}", field, own, "two numbers from -50 to 50 µm, the smaller one first")
+    if isinstance(neglected, str) or not (
+        isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
+    ):
+        allowed = "a list of names in quotation marks, such as ['disc*.tilt']"
+        raise InputError.at(f"reducer {name}", "neglected", neglected, allowed)
     chosen = load_reducer(name)
     if torque is not None:
         chosen.torque_on_carrier(torque, f"reducer {name}")

@@ -95,8 +95,9 @@ class RankingEffort:
 
     def __post_init__(self) -> None:
         for field_name, fewest in _FEWEST.items():
-            if getattr(self, field_name) < fewest:
-                raise self._refusal(field_name, getattr(self, field_name), f"{fewest} or more")
+            value = getattr(self, field_name)
+            if type(value) is not int or value < fewest:
+                raise self._refusal(field_name, value, f"{fewest} or more, a whole number")
         for field_name in ("level_units", "widened_units"):
             if getattr(self, field_name) % _CHAIN:
                 raise self._refusal(field_name, getattr(self, field_name), f"a multiple of {_CHAIN}")

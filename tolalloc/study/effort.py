@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from tolalloc.allocation.effort import QUICK_ALLOCATION, AllocationEffort
+from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
 
@@ -22,6 +23,11 @@ class Effort(NamedFields):
         Effort of an allocation.
     is_quick
         Whether reports shall say that the run is a quick one.
+
+    Raises
+    ------
+    InputError
+        A field of another kind.
     """
 
     called: ClassVar[str] = "effort"
@@ -29,6 +35,11 @@ class Effort(NamedFields):
     ranking: RankingEffort = field(default_factory=RankingEffort)
     allocation: AllocationEffort = field(default_factory=AllocationEffort)
     is_quick: bool = False
+
+    def __post_init__(self) -> None:
+        for name, kind in (("ranking", RankingEffort), ("allocation", AllocationEffort), ("is_quick", bool)):
+            if not isinstance(getattr(self, name), kind):
+                raise InputError.at("effort", name, getattr(self, name), f"a {kind.__name__}")
 
 
 QUICK = Effort(ranking=QUICK_RANKING, allocation=QUICK_ALLOCATION, is_quick=True)

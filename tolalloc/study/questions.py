@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.named_fields import NamedFields
+from tolalloc.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
@@ -102,10 +102,12 @@ class Difference(Question):
     units: int = 1024
 
     def __post_init__(self) -> None:
-        if not isinstance(self.zones, Mapping) or not all(isinstance(name, str) for name in self.zones):
+        if not isinstance(self.zones, Mapping) or not all(
+            isinstance(name, str) and is_number(zone) for name, zone in self.zones.items()
+        ):
             allowed = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
             raise InputError.at("question difference", "zones", self.zones, allowed)
-        if not (isinstance(self.units, int) and 100 <= self.units <= 10_000_000):
+        if not (type(self.units) is int and 100 <= self.units <= 10_000_000):
             raise InputError.at("question difference", "units", self.units, "a whole number from 100 to 10,000,000")
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002

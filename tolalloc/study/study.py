@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tolalloc.study.runner import Run
 
 
-_NAME = r"[\w-][\w. -]*"
+_NAME = r"[\w-][\w. -]{0,99}"
 
 
 def _full() -> Effort:
@@ -57,6 +57,10 @@ def _is_yield(joint: object) -> bool:
 
 def _is_share(value: object) -> bool:
     return is_number(value) and 0 <= cast("float", value) < 0.5
+
+
+def _are_named(limits: object) -> bool:
+    return isinstance(limits, Mapping) and all(isinstance(output, str) for output in limits)
 
 
 def _are_questions(given: object) -> bool:
@@ -116,16 +120,17 @@ class Study(NamedFields):
     effort: Effort = field(default_factory=_full)
 
     def __post_init__(self) -> None:
-        place = f"study {self.name}"
+        is_name = isinstance(self.name, str) and re.fullmatch(_NAME, self.name)
+        place = f"study {self.name}" if is_name else "study"
         if isinstance(self.questions, Question):
             object.__setattr__(self, "questions", (self.questions,))
         if isinstance(self.effort, str):
             object.__setattr__(self, "effort", _effort(self.effort, self.effort, place))
         for name, good, allowed in (
-            ("name", re.fullmatch(_NAME, str(self.name)), "letters, digits, '_', '-', '.', blanks"),
+            ("name", is_name, "100 letters, digits, '_', '-', '.' and blanks, or less"),
             ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
             ("drawing", self.drawing is None or hasattr(self.drawing, "errors"), "ta.drawing(...)"),
-            ("limits", isinstance(self.limits, Mapping), "a dictionary of outputs and their ta.Limit(...)"),
+            ("limits", _are_named(self.limits), "a dictionary of outputs and their ta.Limit(...)"),
             ("joint", self.joint is None or _is_yield(self.joint), "ta.AtYield(...) or None"),
             ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
             ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
