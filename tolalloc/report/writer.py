@@ -12,10 +12,11 @@ from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from tolalloc.compiled import thread_count
+from tolalloc.files import no_formula
 from tolalloc.report.document import Document
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, HeatMap
@@ -55,7 +56,7 @@ def inline_png(figure: Figure | HeatMap) -> str:
     """Return a figure as an image that stands in the page itself."""
     buffer = BytesIO()
     drawn(figure).savefig(buffer, dpi=80, format="png")
-    return f'<img alt="{figure.title}" src="data:image/png;base64,{b64encode(buffer.getvalue()).decode()}">'
+    return f'<img alt="{escape(figure.title)}" src="data:image/png;base64,{b64encode(buffer.getvalue()).decode()}">'
 
 
 def versions() -> dict[str, str]:
@@ -74,7 +75,7 @@ def write_document(document: Document, folder: Path) -> None:
     _write_page(document, folder / "report.html")
     (folder / "tables").mkdir()
     for name, frame in document.tables.items():
-        frame.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
+        write_csv(frame, folder / "tables" / f"{name}.csv")
     assumptions = pd.DataFrame({"assumption": document.assumptions})
     write_sheets({**document.tables, "assumptions": assumptions}, folder / "results.xlsx")
     for name, figure in document.figures.items():
@@ -82,6 +83,11 @@ def write_document(document: Document, folder: Path) -> None:
     write_json(document.summary, folder / "summary.json")
     known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
     write_json({**known, "threads": thread_count(), "versions": versions()}, folder / "manifest.json")
+
+
+def write_csv(frame: pd.DataFrame, path: Path) -> None:
+    """Write a table in which no text becomes a formula of a spreadsheet."""
+    frame.rename(columns=no_formula).map(no_formula).to_csv(path, index=False, encoding="utf-8")
 
 
 def _write_page(document: Document, path: Path) -> None:

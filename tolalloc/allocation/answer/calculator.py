@@ -15,6 +15,7 @@ from openpyxl.utils import get_column_letter
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
+from tolalloc.report.excel import Formula
 from tolalloc.report.wording import unit_of
 from tolalloc.units import MICROMETRE
 
@@ -55,13 +56,13 @@ def _zones(answer: AllocationAnswer) -> pd.DataFrame:
             "group": space.groups,
             "zone to change [µm]": space.first_zones * chosen.design[:groups] / MICROMETRE,
             "zone in the tolerance table [µm]": space.first_zones / MICROMETRE,
-            "scale [-]": [f"=B{row}/C{row}" for row in rows],
+            "scale [-]": [Formula(f"=B{row}/C{row}") for row in rows],
             "smallest [µm]": space.first_zones * [process.minimum for process in made] / MICROMETRE,
             "largest [µm]": space.first_zones * [process.maximum for process in made] / MICROMETRE,
-            "inside": [f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")' for row in rows],
+            "inside": [Formula(f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")') for row in rows],
             "process": chosen.processes,
             "cost [cost units]": [
-                f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}"
+                Formula(f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}")
                 for process, row in zip(made, rows, strict=True)
             ],
         }
@@ -90,11 +91,11 @@ def _requirements(answer: AllocationAnswer) -> pd.DataFrame:
                 "what": side.stack.name,
                 "limit": side.limit,
                 "verified on fresh units": side.value,
-                "predicted for the zones": f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))",
-                "kept by the model": f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")',
+                "predicted for the zones": Formula(f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))"),
+                "kept by the model": Formula(f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")'),
             }
         )
-    total = f"=SUM(zones!I{first}:I{last})+{number(space.locked_cost)}"
+    total = Formula(f"=SUM(zones!I{first}:I{last})+{number(space.locked_cost)}")
     return pd.DataFrame([*watched, {"what": "cost [cost units]", "predicted for the zones": total}])
 
 

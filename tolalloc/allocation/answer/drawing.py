@@ -15,6 +15,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.wording import unit_of
+from tolalloc.report.writer import write_csv
 from tolalloc.units import MICROMETRE
 
 
@@ -114,7 +115,7 @@ def full_drawing_table(answer: AllocationAnswer) -> pd.DataFrame:
 
 def write_drawing(answer: AllocationAnswer, folder: Path) -> None:
     """Write ``allocation.csv``, which ``tolalloc`` reads back, and ``drawing.xlsx``, which goes on calculating."""
-    table_frame(sources_to_go_on_from(answer), folder).to_csv(folder / "allocation.csv", index=False)
+    write_csv(table_frame(sources_to_go_on_from(answer), folder), folder / "allocation.csv")
     sheets = {"drawing": full_drawing_table(answer), **calculator_sheets(answer)}
     write_sheets(sheets, folder / "drawing.xlsx")
     style_calculator(folder / "drawing.xlsx")
