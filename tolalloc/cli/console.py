@@ -50,7 +50,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=title)
+    table = Table(title=escape(title))
     for number, name in enumerate(frame.columns):
         table.add_column(escape(str(name)), justify="left" if number == 0 else "right", no_wrap=number == 0)
     for row in frame.itertuples(index=False):
@@ -93,7 +93,7 @@ class UnitProgress:
 
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description:<24}"),
+            TextColumn("{task.description:<24}", markup=False),
             BarColumn(bar_width=24),
             TextColumn(f"{{task.fields[counted]:>8.0f}} {counted}"),
             TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from typing import Annotated
 
@@ -20,7 +22,7 @@ from tolalloc.cli.run import allocate, check, rank, run
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
 from tolalloc.cli.whatif import whatif
-from tolalloc.exceptions import TolallocError
+from tolalloc.exceptions import InputError, TolallocError, in_short
 
 app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
@@ -62,11 +64,29 @@ for command in (
 
 def main() -> None:
     """Run the command line; an error that a user can mend becomes one sentence and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # where output is not UTF-8, a µ becomes a question mark
     try:
-        app()
+        _require_threads(os.environ.get("NUMBA_NUM_THREADS", "1"))
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
     except TolallocError as error:
         note(f"Error: {error}")
         raise SystemExit(2) from None
+    except OSError as error:  # a full disk, a name that is too long
+        note(f"Error: {in_short(str(error.filename or 'output'))}: cannot be read or written ({error.strerror}).")
+        if isinstance(sys.stdout, io.TextIOWrapper):  # what is left of the output has nowhere to go
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(2) from None
+
+
+def _require_threads(stated: str) -> None:
+    """Refuse a number of threads on which numba stops with a traceback."""
+    if not (stated.isascii() and stated.isdecimal() and 1 <= len(stated) <= 4 and int(stated) > 0):
+        raise InputError.at("environment", "NUMBA_NUM_THREADS", stated, "a whole number from 1 to 9999, or nothing")
 
 
 def run_script() -> None:

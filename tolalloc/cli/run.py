@@ -142,7 +142,7 @@ def _show(answer: Answer) -> None:
 
 
 def check(script: Script, as_json: AsJson = False) -> None:
-    """Check a study's names, units and bounds without running it."""
+    """Check a study's names, units and bounds; no question is asked, but the script, a program, is run."""
     from tolalloc.study.prepared import Prepared
 
     study = load_study(script)
@@ -155,6 +155,7 @@ def check(script: Script, as_json: AsJson = False) -> None:
     if as_json:
         print_json(summary)
     else:
+        note(f"A study is a Python program: {script} was run to read it.", dim=True)
         typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
 
 

@@ -1,0 +1,109 @@
+"""Fields of a study of the wrong kind, and terminals, disks and environments that are not as usual: one sentence."""
+
+from __future__ import annotations
+
+import errno
+import io
+import sys
+from unittest import mock
+
+import pandas as pd
+import pytest
+from openpyxl import load_workbook
+
+import tolalloc as ta
+from tests.studies.command import refused, tolalloc
+from tests.studies.scripts import study_script
+from tolalloc.allocation.answer.calculator import Formula
+from tolalloc.cli.console import UnitProgress, print_table
+from tolalloc.cli.main import main
+from tolalloc.drawings.drawing import Drawing
+from tolalloc.report.excel import write_sheets
+from tolalloc.report.writer import write_csv
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"reducer": {"neglected": "disc*"}}, "neglected is 'disc*'; allowed is a list of names"),
+        ({"reducer": {"neglected": (1,)}}, "neglected is (1,)"),
+        ({"reducer": {"flank_clearance": ("1", "2")}}, "flank_clearance is ('1', '2')"),
+        ({"limits": "{5: ta.Limit(upper=60.0)}"}, "limits is {5:"),
+        ({"name": 5}, "study: name is 5"),
+        ({"name": "x" * 101}, "study: name is 'x"),
+        ({"seed": 1.5}, "seed is 1.5"),
+        ({"written": "effort=ta.Effort(is_quick='no')"}, "effort: is_quick is 'no'"),
+        ({"written": "effort=ta.Effort(ranking=5)"}, "effort: ranking is 5"),
+        ({"written": "questions=[ta.Difference(zones={'pin.diameter': '3'})]"}, "question difference: zones is"),
+        ({"written": "questions=[ta.Allocation(unit_price=0)]"}, "unit_price is 0"),
+    ],
+)
+def test_fields_of_the_wrong_kind_are_refused(fields, words, tmp_path):
+    refused(tolalloc("check", study_script(tmp_path, **fields)), words)
+
+
+@pytest.fixture
+def calculation(tmp_path):
+    script = tmp_path / "s.py"
+    script.write_text("import tolalloc as ta\nstudy = ta.Study(questions=[ta.Calculation(print)], name='µ')\n")
+    return script
+
+
+def test_check_says_that_a_study_is_a_program_that_it_runs(calculation):
+    result = tolalloc("check", calculation)
+    assert result.returncode == 0
+    assert f"A study is a Python program: {calculation} was run to read it." in result.stderr
+
+
+def test_names_are_shown_as_they_are_and_never_as_markup(capsys):
+    print_table(pd.DataFrame({"[/a]": ["[/b]" * 8]}), "[red]s[bold].csv")
+    shown = capsys.readouterr().out
+    assert all(text in shown for text in ("[/a]", "[/b]", "[red]s[bold].csv"))
+    with UnitProgress() as progress:
+        progress.begin("[/c]")
+    assert "[/c]" in capsys.readouterr().err
+
+
+def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
+    stdout = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    with (
+        mock.patch.object(sys, "stdout", stdout),
+        mock.patch.object(sys, "argv", ["tolalloc", "check", str(calculation), "--json"]),
+        pytest.raises(SystemExit) as stop,
+    ):
+        main()
+    assert not stop.value.code
+    assert b'"study": "?"' in stdout.buffer.getvalue()
+
+
+def test_a_full_disk_is_one_sentence(calculation):
+    full = OSError(errno.ENOSPC, "No space left on device", "out.csv")
+    with mock.patch("tolalloc.cli.run.note", side_effect=full):
+        refused(tolalloc("check", calculation), "out.csv: cannot be read or written (No space left on device).")
+
+
+@pytest.mark.parametrize("threads", ["0", "x", "-1", "1_0"])
+def test_a_number_of_threads_that_numba_cannot_use_is_refused(threads):
+    refused(tolalloc("--version", NUMBA_NUM_THREADS=threads), f"NUMBA_NUM_THREADS is {threads!r}; allowed is a whole")
+
+
+TEXTS = ("=1+1", "+cmd", "-cmd", "@sum", "plain", "-1.5")
+
+
+def test_text_never_becomes_a_formula_of_a_workbook(tmp_path):
+    frame = pd.DataFrame({"=header": [*TEXTS, "\x01x"], "ours": [Formula("=1+1")] * 7})
+    write_sheets({"s": frame}, tmp_path / "w.xlsx")
+    sheet = load_workbook(tmp_path / "w.xlsx")["s"]
+    assert [cell.data_type for cell in sheet["A"]] == ["s"] * 8
+    assert [cell.value for cell in sheet["A"]] == ["=header", *TEXTS, "\ufffdx"]
+    assert {cell.data_type for cell in sheet["B"][1:]} == {"f"}
+
+
+def test_text_never_becomes_a_formula_of_a_csv_and_is_read_back(tmp_path):
+    write_csv(pd.DataFrame({"a": TEXTS, "b": -1.5}), tmp_path / "t.csv")
+    lines = (tmp_path / "t.csv").read_text().splitlines()
+    assert lines == ["a,b", "'=1+1,-1.5", "'+cmd,-1.5", "'-cmd,-1.5", "'@sum,-1.5", "plain,-1.5", "-1.5,-1.5"]
+    zone = {"plus": 1, "minus": -1, "unit": "µm", "min": 1, "max": 5, "cost": 1}
+    drawing = Drawing.of_rows([{"id": "=1+1", "note": "@x", **zone}])
+    assert ",@x" not in drawing.to_csv(tmp_path / "d.csv").read_text()
+    assert ta.drawing(tmp_path / "d.csv").sources == drawing.sources
