@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 _LONGEST_VALUE = 200
@@ -74,3 +75,39 @@ class RunFolderError(TolallocError):
 
 class SolveError(TolallocError):
     """Too many samples of a batch failed for its numbers to be trusted."""
+
+
+_MOST_FAULTS = 20
+"""Most faults of one file that are said; the others are counted [-]."""
+
+
+class Faults:
+    """What is wrong with one file, found row by row and said together."""
+
+    def __init__(self) -> None:
+        self._found: list[TolallocError] = []
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Keep what is wrong in one row, so that the next can be looked at."""
+        try:
+            yield
+        except (InputError, UnknownNameError) as error:
+            self._found.append(error)
+
+    def require_none(self) -> None:
+        """Raise everything that was found as one exception, one sentence to a line, if there is anything.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            The faults; of the second kind only if all of them are names.
+        """
+        if not self._found:
+            return
+        kinds = {type(error) for error in self._found}
+        sentences = list(dict.fromkeys(line for error in self._found for line in str(error).split("\n")))
+        more = len(sentences) - _MOST_FAULTS
+        if more > 0:
+            sentences[_MOST_FAULTS:] = [f"And {more} more {'fault' if more == 1 else 'faults'}."]
+        raise (kinds.pop() if len(kinds) == 1 else InputError)("\n".join(sentences)) from None

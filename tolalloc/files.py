@@ -15,7 +15,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import pydantic
 
-from tolalloc.exceptions import InputError, UnknownNameError, quoted
+from tolalloc.exceptions import Faults, InputError, TolallocError, UnknownNameError, quoted
 from tolalloc.file_content import is_file, read_text
 
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
@@ -86,7 +86,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) -> Model:
-    """Return the record, or the first thing wrong with it as one sentence.
+    """Return the record, or everything that is wrong with it, a sentence each.
 
     Raises
     ------
@@ -107,21 +107,37 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
                 problem["loc"][-1:] == (_NUMBER,) and isinstance(problem["input"], Mapping),
             ),
         )
-        problem = problems[0]
+    found: dict[tuple[int | str, ...], TolallocError] = {}
+    for problem in problems:
         place_in_file = _place_in_file(problem["loc"], data, problem["type"] == "missing")
-        field = ".".join(str(part) for part in place_in_file)
-        if problem["type"] in _UNKNOWN:
-            known = _known_fields(model, place_in_file)
-            raise UnknownNameError.among(place, "field", field, known) from None
-        if problem["type"] == "missing":
-            raise InputError(f"{place}: {field} is missing.") from None
-        message = problem["msg"].removeprefix("Value error, ")
-        if message[1:2].islower():
-            message = message[0].lower() + message[1:]
-        if isinstance(problem["input"], Mapping):  # a check of several fields together names their values itself
-            whole = f"{field}: " if field else ""
-            raise InputError(f"{place}: {whole}{message}.") from None
-        raise InputError(f"{place}: {field} is {quoted(problem['input'])}; {message}.") from None
+        found.setdefault(tuple(place_in_file), _said(model, problem, place_in_file, place))
+    faults, offered = Faults(), set[str]()
+    for at, said in found.items():
+        if isinstance(said, UnknownNameError):
+            offered |= {word.strip(",.") for word in str(said).split()}
+        elif str(said).endswith(" is missing.") and ".".join(map(str, at)) in offered:
+            continue  # misspelt, which is said
+        if not any(other[: len(at)] == at for other in found if len(other) > len(at)):  # what is inside says more
+            with faults.kept():
+                raise said
+    faults.require_none()
+    raise AssertionError("a record that is refused has a fault")
+
+
+def _said(model: type[Model], problem: Any, place_in_file: list[int | str], place: Path | str) -> TolallocError:
+    """Return what is wrong in one place of a record."""
+    field = ".".join(str(part) for part in place_in_file)
+    if problem["type"] in _UNKNOWN:
+        return UnknownNameError.among(place, "field", field, _known_fields(model, place_in_file))
+    if problem["type"] == "missing":
+        return InputError(f"{place}: {field} is missing.")
+    message = problem["msg"].removeprefix("Value error, ")
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    if isinstance(problem["input"], Mapping):  # a check of several fields together names their values itself
+        whole = f"{field}: " if field else ""
+        return InputError(f"{place}: {whole}{message}.")
+    return InputError(f"{place}: {field} is {quoted(problem['input'])}; {message}.")
 
 
 def _place_in_file(location: tuple[int | str, ...], data: Any, missing: bool) -> list[int | str]:

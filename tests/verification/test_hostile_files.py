@@ -135,7 +135,7 @@ def test_a_workbook_that_unpacks_to_much_more_is_refused_unread(filling, tmp_pat
 def test_tables_of_too_many_columns_cells_or_bytes_are_refused(tmp_path):
     assert "4001 columns" in refusal(load_tolerance_table, written(tmp_path, "t.csv", "a," * 4000 + "a\n"))
     assert "allowed are 32 MB" in refusal(load_units, written(tmp_path, "t.csv", b"x" * (32 * 2**20 + 1)))
-    with pytest.raises(InputError, match="row 7: .* allowed are 4000 columns and 2000000 cells"):
+    with pytest.raises(InputError, match=r"row 7: .* allowed are 4000 columns and 2000000 cells"):
         require_believable(Path("t.csv"), 7, 2, 2_000_001)
 
 
@@ -253,3 +253,43 @@ def test_a_stiffness_is_known_better_than_by_twice_its_value(tmp_path):
     text = 'source = "s"\n[stiffness.carrier_bearing]\nvalue = 1e8\nstandard_uncertainty = 1e12\n'
     path = written(tmp_path, "k.stiffness.toml", text)
     assert "allowed is twice the value" in refusal(load_identified_stiffness, path)
+
+
+def faults(read, path):
+    with pytest.raises(TolallocError) as caught:
+        read(path)
+    return str(caught.value).split("\n")
+
+
+def test_all_faults_of_a_table_are_said_row_by_row(tmp_path):
+    rows = [LINE, "b,x,-0.1,cm,0.02,0.5,y", LINE.replace("a", "c", 1), LINE, "d,0.1,-0.1,mm,0.3,0.5,3"]
+    said = faults(load_tolerance_table, written(tmp_path, "t.csv", "\n".join((HEADER, *rows, ""))))
+    assert [sentence.removeprefix(str(tmp_path / "t.csv")) for sentence in said] == [
+        ", row 3 (b): plus is 'x'; allowed is a number with a decimal point.",
+        ", row 3 (b): cost is 'y'; allowed is a number with a decimal point.",
+        ", row 5 (a): id is 'a' for the second time; each source has one row.",
+        ", row 6 (d): the zone must lie between min and max, above 0 and up to 2000 µm: min 0.3, zone 0.2, max 0.5 mm.",
+    ]
+
+
+def test_twenty_faults_are_said_and_the_others_counted(tmp_path):
+    said = faults(load_tolerance_table, written(tmp_path, "t.csv", f"{HEADER}\n" + "a,x,0,mm,1,2,3\n" * 50))
+    assert said[:2] == [
+        f"{tmp_path / 't.csv'}, row {row} (a): plus is 'x'; allowed is a number with a decimal point." for row in (2, 3)
+    ]
+    assert len(said) == 21
+    assert said[-1] == "And 30 more faults."
+
+
+def test_all_faults_of_other_files_are_said(tmp_path):
+    toml = written(tmp_path, "u.unit.toml", 'name = 1\nsorce = "s"\n[lengths]\na = 1e9\nb = "x"\n')
+    said = faults(load_unit, toml)
+    assert len(said) == 4
+    assert "field 'sorce' is not known; the nearest known is source" in said[0]
+    assert not any("source is missing" in sentence for sentence in said)
+    readings = written(tmp_path, "r.csv", "angle [deg],transmission error [arcsec]\nx,1\n2,2\ny,4\n")
+    assert len(faults(lambda path: load_readings(path, "angle", "transmission error"), readings)) == 2
+    units = written(tmp_path, "u.csv", "unit,disc1.tilt.x [µrad],disc1.tilt.y [µrad]\nu,x,y\nv,1,z\n")
+    assert len(faults(load_units, units)) == 3
+    prices = written(tmp_path, "s.csv", "process,tolerance,unit,cost\ng,0,µm,1\ng,1,cm,1\ng,2,µm,1\n")
+    assert len(faults(load_shop_points, prices)) == 2

@@ -16,7 +16,7 @@ from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.plan import LARGEST_PRECISION, AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.rv.reducer.files import PRESETS
 from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
@@ -184,10 +184,11 @@ def load_plan(name: str | Path) -> AssemblyPlan:
     """
     path = shipped_or_path(name, DATA, ".chain.toml", "chain")
     record = validated(ChainRecord, read_toml(path), path)
-    parts = [
-        validated(PartRecord, data, f"{path}, part {data.get('name', number)}")
-        for number, data in enumerate(record.part, start=1)
-    ]
+    parts, faults = list[PartRecord](), Faults()
+    for number, data in enumerate(record.part, start=1):
+        with faults.kept():
+            parts.append(validated(PartRecord, data, f"{path}, part {data.get('name', number)}"))
+    faults.require_none()
     chain = _chain(record.datum, parts, path)
     return AssemblyPlan(
         name=record.name,
@@ -292,16 +293,18 @@ def load_errors(path: Path, plan: AssemblyPlan) -> Float[np.ndarray, "part 3"]:
     UnknownNameError
         A part that the chain does not have.
     """
-    table = read_text_table(path)
+    table, faults = read_text_table(path), Faults()
     columns = _columns(table)
     names, found = plan.chain.names, dict[str, list[float]]()
     for row, cells in zip(table.rows, table.cells, strict=True):
         name, place = cells[columns[0]], f"{path}, row {row}"
-        if name not in names:
-            raise UnknownNameError.among(place, "part", name, names)
-        if name in found:
-            raise InputError.at(place, "part", name, "each part once, and this one stands further up too")
-        found[name] = [_arcseconds(cells[at], table.headers[at], f"{place} (part {name})") for at in columns[1:]]
+        with faults.kept():
+            if name not in names:
+                raise UnknownNameError.among(place, "part", name, names)
+            if name in found:
+                raise InputError.at(place, "part", name, "each part once, and this one stands further up too")
+            found[name] = [_arcseconds(cells[at], table.headers[at], f"{place} (part {name})") for at in columns[1:]]
+    faults.require_none()
     for name in names:
         if name not in found:
             raise InputError(f"{path}: part {name} is missing; allowed is one row for each of {', '.join(names)}.")

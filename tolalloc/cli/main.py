@@ -74,7 +74,8 @@ def main() -> None:
         finally:
             sys.stdout.flush()
     except TolallocError as error:
-        note(f"Error: {error}")
+        for sentence in str(error).split("\n"):
+            note(f"Error: {sentence}")
         raise SystemExit(2) from None
     except OSError as error:  # a full disk, a name that is too long
         note(f"Error: {in_short(str(error.filename or 'output'))}: cannot be read or written ({error.strerror}).")

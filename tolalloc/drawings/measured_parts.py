@@ -15,7 +15,7 @@ from jaxtyping import Float
 from tolalloc.drawings.distributions import RAYLEIGH, Distribution
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.drawings.zones import Feature
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import Faults, InputError
 from tolalloc.units import MICROMETRE
 
 FEWEST_PARTS = 20
@@ -179,18 +179,16 @@ def _column(table: TextTable, at: int) -> list[float]:
     unit = split_header(header)[1]
     if unit not in _FACTORS:
         raise InputError.at(table.path, f"the unit of column {header!r}", unit, "µm, um or mm in square brackets")
-    values = []
+    values, faults = [], Faults()
     for row, cells in zip(table.rows, table.cells, strict=True):
         try:
             value = plain_number(cells[at]) * _FACTORS[unit]
         except ValueError:
             value = float("nan")
         if not (isfinite(value) and abs(value) <= LARGEST_DEVIATION):
-            raise InputError.at(
-                f"{table.path}, row {row}",
-                header,
-                cells[at],
-                f"a number from {-LARGEST_DEVIATION:g} to {LARGEST_DEVIATION:g} µm",
-            )
+            with faults.kept():
+                allowed = f"a number from {-LARGEST_DEVIATION:g} to {LARGEST_DEVIATION:g} µm"
+                raise InputError.at(f"{table.path}, row {row}", header, cells[at], allowed)
         values.append(value)
+    faults.require_none()
     return values

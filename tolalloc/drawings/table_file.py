@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeVar, get_args, get_origin
 
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.file_content import read_text
 from tolalloc.files import Record, validated
 
@@ -208,11 +208,13 @@ def read_rows(
     headers = tuple(name for name, _ in stated)
     require_columns(path, headers, kind)
     require_units(path, stated, units)
-    rows = []
+    rows, faults = [], Faults()
     for number, texts in zip(table.rows, table.cells, strict=True):
         cells = dict(zip(headers, texts, strict=True))
         place = f"{path}, row {number} ({cells[named_by] or f'no {named_by}'})"
-        rows.append((place, validated(kind, typed_cells(kind, cells, place), place)))
+        with faults.kept():
+            rows.append((place, validated(kind, typed_cells(kind, cells, place), place)))
+    faults.require_none()
     return tuple(rows)
 
 
@@ -265,11 +267,14 @@ def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> di
         The field and value that are not allowed.
     """
     stated = {name: cell.strip() if isinstance(cell, str) else cell for name, cell in row.items()}
-    return {
-        name: _typed(kind.model_fields[name].annotation, name, cell, place) if isinstance(cell, str) else cell
-        for name, cell in stated.items()
-        if cell not in ("", None)
-    }
+    typed, faults = dict[str, object](), Faults()
+    for name, cell in stated.items():
+        if cell not in ("", None):
+            with faults.kept():
+                hint = kind.model_fields[name].annotation
+                typed[name] = _typed(hint, name, cell, place) if isinstance(cell, str) else cell
+    faults.require_none()
+    return typed
 
 
 def plain_number(text: str) -> float:

@@ -22,7 +22,7 @@ from tolalloc.drawings.table_file import (
     typed_cells,
     usual_signs,
 )
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import Faults, InputError
 from tolalloc.files import no_formula, shipped_or_path, validated
 from tolalloc.units import MICROMETRE
 
@@ -84,17 +84,20 @@ def sources_of_rows(
     """
     processes = load_process_capabilities(capabilities)
     sources: dict[str, Source] = {}
+    faults = Faults()
     for number, row in rows:
         identity = str(row.get("id", "")).strip()
         where = f"{place}, row {number} ({identity or 'no id'})"
-        cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
-        source = validated(ToleranceRow, cells, where).source(folder)
-        if identity in sources:
-            raise InputError(f"{where}: id is {identity!r} for the second time; each source has one row.")
-        if source.sorted and source.zone_mapping.inside < SMALLEST_KEPT:
-            left = f"no, as it would leave less than {SMALLEST_KEPT:.0%} of all parts"
-            raise InputError.at(where, "sorted", "yes", left)
-        sources[identity] = source
+        with faults.kept():
+            cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
+            source = validated(ToleranceRow, cells, where).source(folder)
+            if identity in sources:
+                raise InputError(f"{where}: id is {identity!r} for the second time; each source has one row.")
+            if source.sorted and source.zone_mapping.inside < SMALLEST_KEPT:
+                left = f"no, as it would leave less than {SMALLEST_KEPT:.0%} of all parts"
+                raise InputError.at(where, "sorted", "yes", left)
+            sources[identity] = source
+    faults.require_none()
     return tuple(sources.values())
 
 

@@ -26,7 +26,7 @@ from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import COST_UNITS, DATA, read_rows
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.file_content import is_file
 from tolalloc.files import Record, shipped_or_path
 from tolalloc.units import MICROMETRE, MILLIMETRE
@@ -228,12 +228,15 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     """
     path = shipped_or_path(name, DATA, ".process_costs.csv", "process cost table")
     rows = read_rows(path, ProcessCostRow, "sources", UNITS)
+    faults = Faults()
     for place, row in rows:
-        if not any(fnmatchcase(source.name, row.sources) for source in sources):
-            raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
-        if row.points and not is_file(path.parent / row.points):
-            folder = path.absolute().parent
-            raise InputError(f"{place}: points {row.points}: no such file; allowed is a CSV file in {folder}.")
+        with faults.kept():
+            if not any(fnmatchcase(source.name, row.sources) for source in sources):
+                raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
+            if row.points and not is_file(path.parent / row.points):
+                folder = path.absolute().parent
+                raise InputError(f"{place}: points {row.points}: no such file; allowed is a CSV file in {folder}.")
+    faults.require_none()
     shops = {row.points: load_shop_points(path.parent / row.points) for _, row in rows if row.points}
     found = {}
     for source in sources:

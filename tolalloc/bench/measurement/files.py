@@ -23,7 +23,7 @@ from tolalloc.bench.measurement.readings import (
 )
 from tolalloc.bench.measurement.resampling import Cleaned
 from tolalloc.drawings.table_file import read_text_table
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.files import Record, read_toml, validated
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.reducer.unit_table import load_units, unit_names
@@ -160,17 +160,25 @@ def load_measurements(path: str | Path) -> Measurements:
         raise InputError(f"{path}: there are no measured data; give [peak_to_peak], [[curves]] or [[loops]].")
     units = _units(record, path)
     positions = {unit.name: number for number, unit in enumerate(units)}
+    faults, peak_to_peak = Faults(), None
+    curves, loops = list[MeasuredCurve](), list[MeasuredLoop]()
+    if record.peak_to_peak is not None:
+        with faults.kept():
+            peak_to_peak = _peak_to_peak(record.peak_to_peak, path, positions)
+    for number, data in enumerate(record.curves, 1):
+        with faults.kept():
+            curves.append(_curve(data, path, f"{path}, curve {number}", positions))
+    for number, data in enumerate(record.loops, 1):
+        with faults.kept():
+            loops.append(_loop(data, path, f"{path}, loop {number}", positions))
+    faults.require_none()
     return Measurements(
         name=record.name,
         source=record.source,
         units=units,
-        peak_to_peak=None if record.peak_to_peak is None else _peak_to_peak(record.peak_to_peak, path, positions),
-        curves=tuple(
-            _curve(data, path, f"{path}, curve {number}", positions) for number, data in enumerate(record.curves, 1)
-        ),
-        loops=tuple(
-            _loop(data, path, f"{path}, loop {number}", positions) for number, data in enumerate(record.loops, 1)
-        ),
+        peak_to_peak=peak_to_peak,
+        curves=tuple(curves),
+        loops=tuple(loops),
         assumptions=record.assumptions,
     )
 

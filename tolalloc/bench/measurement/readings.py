@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import Faults, InputError
 from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
 MISSING = ("", "nan", "na", "n/a", "-", "inf", "+inf", "-inf")
@@ -80,22 +80,25 @@ def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarr
         raise InputError.at(table.path, f"the unit of column {headers[0]!r}", unit, f"{units} in square brackets")
     position, factor = table.headers.index(headers[0]), known[unit]
     values = np.full(len(table.rows), np.nan)
+    faults = Faults()
     for number, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
-        if cells[position].lower() in MISSING:
-            continue
-        try:
-            value = plain_number(cells[position])
-        except ValueError:
-            value = np.inf
-        if not isfinite(value):
-            raise InputError.at(
-                f"{table.path}, row {row}",
-                headers[0],
-                cells[position],
-                "a number with a decimal point, or nothing where the instrument gave none",
-            )
-        values[number] = value * factor
+        if cells[position].lower() not in MISSING:
+            with faults.kept():
+                values[number] = factor * _reading(cells[position], f"{table.path}, row {row}", headers[0])
+    faults.require_none()
     return headers[0], factor, values
+
+
+def _reading(cell: str, place: str, header: str) -> float:
+    """Return the number in a cell."""
+    try:
+        value = plain_number(cell)
+    except ValueError:
+        value = np.inf
+    if not isfinite(value):
+        allowed = "a number with a decimal point, or nothing where the instrument gave none"
+        raise InputError.at(place, header, cell, allowed)
+    return value
 
 
 def _same_name(header: str, name: str) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import Faults, InputError
 from tolalloc.files import no_formula, write_new
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.units import MICROMETRE, MICRORADIAN
@@ -82,24 +82,27 @@ def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[Built
     columns = {place: _column(table.path, header) for place, header in enumerate(table.headers) if header != "unit"}
     if len({column for column, *_ in columns.values()}) < len(columns) or table.headers.count("unit") > 1:
         raise InputError(f"{table.path}: a column stands there twice; each column of the model has one.")
-    units = []
+    units, faults = [], Faults()
     for row, name, cells in zip(table.rows, names, table.cells, strict=True):
         deviations = {}
         for place, (column, factor, largest) in columns.items():
-            try:
-                value = plain_number(cells[place])
-            except ValueError:
-                value = float("nan")
-            if not (isfinite(value) and abs(value) <= largest):
-                raise InputError.at(
-                    f"{table.path}, row {row} (unit {name})",
-                    table.headers[place],
-                    cells[place],
-                    f"a number from {-largest:g} to {largest:g}",
-                )
-            deviations[column] = value * factor
+            with faults.kept():
+                where = f"{table.path}, row {row} (unit {name})"
+                deviations[column] = factor * _deviation(cells[place], where, table.headers[place], largest)
         units.append(BuiltUnit(name=name, source=table.path.name, deviations=deviations, neglected=neglected))
+    faults.require_none()
     return tuple(units)
+
+
+def _deviation(cell: str, place: str, header: str, largest: float) -> float:
+    """Return the number in a cell."""
+    try:
+        value = plain_number(cell)
+    except ValueError:
+        value = float("nan")
+    if not (isfinite(value) and abs(value) <= largest):
+        raise InputError.at(place, header, cell, f"a number from {-largest:g} to {largest:g}")
+    return value
 
 
 def write_table(
