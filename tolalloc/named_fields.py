@@ -45,5 +45,11 @@ class NamedFields:
 
 
 def is_number(value: object) -> bool:
-    """Return whether a value is a number of any kind, NumPy's too; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+    """Return whether a value is a number of any kind that a float can be, NumPy's too; True and False are none."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        float(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        return False
+    return True

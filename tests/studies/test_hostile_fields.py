@@ -32,6 +32,7 @@ from tolalloc.report.writer import write_csv
         ({"name": 5}, "study: name is 5"),
         ({"name": "x" * 101}, "study: name is 'x"),
         ({"seed": 1.5}, "seed is 1.5"),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=10**400)}"}, "limit: upper is 1000"),
         ({"written": "effort=ta.Effort(is_quick='no')"}, "effort: is_quick is 'no'"),
         ({"written": "effort=ta.Effort(ranking=5)"}, "effort: ranking is 5"),
         ({"written": "questions=[ta.Difference(zones={'pin.diameter': '3'})]"}, "question difference: zones is"),

@@ -1,0 +1,286 @@
+"""Mutated inputs of every kind: each is read or refused by name, quickly, in little memory, and no file changes."""
+
+from __future__ import annotations
+
+import random
+import resource
+import warnings
+import zipfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from openpyxl import Workbook
+
+import tolalloc as ta
+from studies.published.measurement_folder import write_measurements
+from studies.published.simulated_bench import random_units, simulated_bench
+from tests.studies.bench_files import CURVES_AND_LOOPS
+from tolalloc.allocation.cost.points import load_shop_points
+from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.assembly.files import DATA as CHAINS
+from tolalloc.assembly.files import load_plan
+from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.drawings.correlation import load_correlations
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.process_capability import load_process_capabilities
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.table_file import DATA
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
+from tolalloc.exceptions import TolallocError
+from tolalloc.rv.reducer.files import PRESETS, load_identified_stiffness, load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.rv.reducer.unit_table import load_units
+
+GIBIBYTE = 2**20
+"""As `resource` counts it on Linux [kB]."""
+
+VALUES = (
+    *("", "0", "-1", "1e999", "-1e999", "nan", "inf", "1e-320", "5e-324", "1_0", "١", "0x10", "1,5", "1.234", "--1"),
+    *("true", "yes", "#REF!", "=1+1", "@x", "'=x", "[red]", "[/red]", "µm", "mm", "m", "Ø", "a" * 300, "x " * 200_000),
+    *("9" * 5000, "1e308", "\x00", "\x1b[31m", "\ufeff", "\u202e", '"', "'", ";", "\t", "\n", "\r", "#", "[", "]", "{"),
+    *(
+        "[[a]]",
+        "a.b.c = 1",
+        "1:1e308 2:1",
+        "random:1/40",
+        "1:0:1 2:0:1",
+        "normal",
+        "size",
+        "locked",
+    ),
+)
+"""What is put in the place of a value."""
+
+
+def mutated(text: str, chance: random.Random) -> bytes:
+    """Return a text with some of its values, lines or bytes changed."""
+    for _ in range(chance.randint(1, 3)):
+        lines = text.split("\n")
+        at = chance.randrange(len(lines))
+        change = chance.randrange(6)
+        if change == 0:
+            del lines[at]
+        elif change == 1:
+            lines.insert(at, chance.choice(lines))
+        elif change == 2:
+            lines[at] = lines[at][: chance.randint(0, len(lines[at]))]
+        else:
+            marks = [place for place, mark in enumerate(lines[at]) if mark in ',=[]" ']
+            first = chance.choice(marks) + 1 if marks else 0
+            last = min((place for place in marks if place > first), default=len(lines[at]))
+            lines[at] = lines[at][:first] + chance.choice(VALUES) + lines[at][last:]
+        text = "\n".join(lines)
+    content = bytearray(text.encode())
+    if chance.random() < 0.2 and content:
+        for _ in range(chance.randint(1, 9)):
+            content[chance.randrange(len(content))] = chance.randrange(256)
+    return bytes(content[: chance.randint(0, len(content))] if chance.random() < 0.1 else content)
+
+
+def mutated_workbook(rows: list[list[object]], chance: random.Random) -> bytes:
+    """Return a workbook with cells, parts or bytes changed."""
+    book = Workbook()
+    sheet = book.active
+    for row in rows:
+        sheet.append(row)
+    for _ in range(chance.randint(1, 3)):
+        value = chance.choice([value for value in VALUES if value.isprintable() and len(value) < 30_000])
+        far = chance.random() < 0.05
+        sheet.cell(10 ** chance.randint(2, 6) if far else chance.randint(1, 8), chance.randint(1, 12)).value = value
+    if chance.random() < 0.1:
+        sheet.merge_cells("B2:B3")
+    out = BytesIO()
+    book.save(out)
+    if chance.random() < 0.5:
+        changed, which = BytesIO(), chance.choice(zipfile.ZipFile(out).namelist())
+        with zipfile.ZipFile(out) as old, zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as new:
+            for part in old.namelist():
+                text = old.read(part)
+                new.writestr(part, mutated(text.decode().replace(">", ">\n"), chance) if part == which else text)
+        out = changed
+    content = bytearray(out.getvalue())
+    if chance.random() < 0.3:
+        for _ in range(chance.randint(1, 9)):
+            content[chance.randrange(len(content))] = chance.randrange(256)
+    return bytes(content)
+
+
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory) -> dict[str, tuple[Path, Callable[[Path], Any]]]:
+    """Return every kind of input: a good file beside what it names, and what reads it."""
+    folder = tmp_path_factory.mktemp("good")
+    given, seeds = load_reducer("rv20e_liu2020"), SeedTree(7)
+    sources = load_tolerance_table("rv20e_baseline")
+    bench = replace(CURVES_AND_LOOPS, curve_angles=CURVES_AND_LOOPS.curve_angles[::3])
+    units = random_units(ErrorModel(sources), 2, seeds.child("units"))
+    write_measurements(simulated_bench(given, units, bench).measured(seeds.child("noise")), folder)
+    chain = next(CHAINS.glob("*.chain.toml"))
+
+    def written(name: str, content: str) -> Path:
+        (folder / name).write_text(content, encoding="utf-8")
+        return folder / name
+
+    def copied(path: Path) -> Path:
+        return written(path.name, path.read_text(encoding="utf-8"))
+
+    table = written("t.tolerances.csv", table_text((*sources[:6], *sources[-6:])))
+    prices = "".join(f"{process},{at},µm,{9 - at},n\n" for process in ("ground", "milled") for at in range(1, 6))
+    names = [source.name for source in sources]
+    pairs = f"sources,correlation\n{names[0]} {names[1]},0.5\n{names[2]} {names[3]},-0.2\n"
+    curve = next(path for path in sorted(folder.glob("*.csv")) if "curve" in path.name)
+    return {
+        "tolerance table": (table, load_tolerance_table),
+        "process library": (copied(DATA / "generic.processes.csv"), load_process_capabilities),
+        "process costs": (copied(DATA / "rv20e.process_costs.csv"), lambda path: load_process_costs(path, sources)),
+        "prices": (written("s.csv", f"process,tolerance,unit,cost,note\n{prices}"), load_shop_points),
+        "correlations": (
+            written("c.csv", pairs),
+            lambda path: load_correlations(path, sources),
+        ),
+        "reducer": (copied(PRESETS / "rv20e_liu2020.reducer.toml"), load_reducer),
+        "stiffness": (copied(PRESETS / "rv20e_table6.stiffness.toml"), load_identified_stiffness),
+        "unit": (copied(PRESETS / "table4.unit.toml"), load_unit),
+        "units": (folder / "units.csv", load_units),
+        "measurement": (folder / "measurement.toml", load_measurements),
+        "curve": (curve, lambda path: load_measurements(folder / "measurement.toml")),
+        "chain": (copied(chain), load_plan),
+    }
+
+
+def outcome(read: Callable[..., object], *given: object, **named: object) -> str:
+    """Return whether an input was read or refused; anything else is raised."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # of numbers that overflow
+            read(*given, **named)
+    except TolallocError as error:
+        said = str(error).split("\n")
+        assert len(said) <= 21 and all(0 < len(sentence) <= 2000 for sentence in said), error
+        return "refused"
+    return "read"
+
+
+def fuzzed(kinds, names, seed: int, count: int) -> Counter[str]:
+    """Mutate files in their place, read them, and put them back; nothing else in the folder changes."""
+    chance, outcomes = random.Random(seed), Counter[str]()
+    for name in names:
+        path, read = kinds[name]
+        good = path.read_bytes()
+        beside = {other: other.read_bytes() for other in path.parent.iterdir() if other != path}
+        assert outcome(read, path) == "read", name
+        for _ in range(count):
+            content = mutated(good.decode(), chance)
+            path.write_bytes(content)
+            try:
+                outcomes[outcome(read, path)] += 1
+            except BaseException as error:
+                error.add_note(f"{name}: {content[:3000]!r}")
+                raise
+            finally:
+                after = path.read_bytes()
+                path.write_bytes(good)
+            assert after == content
+        assert {other: other.read_bytes() for other in path.parent.iterdir() if other != path} == beside
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < GIBIBYTE
+    return outcomes
+
+
+def fuzzed_workbooks(kinds, seed: int, count: int) -> Counter[str]:
+    """Read mutated workbooks with a tolerance table."""
+    chance, outcomes = random.Random(seed), Counter[str]()
+    table = kinds["tolerance table"][0]
+    rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()[:5]]
+    path = table.with_suffix(".xlsx")
+    for _ in range(count):
+        content = mutated_workbook(rows, chance)
+        path.write_bytes(content)
+        outcomes[outcome(load_tolerance_table, path)] += 1
+        assert path.read_bytes() == content
+    path.unlink()
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < GIBIBYTE
+    return outcomes
+
+
+FIELDS = (
+    None,
+    True,
+    0,
+    -1,
+    1.5,
+    10**400,
+    1e308,
+    float("nan"),
+    "",
+    "60",
+    b"x",
+    (),
+    (1,),
+    {},
+    {"a": 1},
+    print,
+    int,
+    "x" * 300,
+)
+"""Values of any kind."""
+
+
+MADE = (
+    (ta.Study, ("name", "seed", "limits", "questions", "effort", "largest_failed_share", "model", "drawing")),
+    (ta.Limit, ("upper", "lower", "show")),
+    (ta.Allocation, ("grades", "fixed_first", "front", "what_if", "unit_price", "quality_loss")),
+    (ta.Difference, ("zones", "units")),
+    (ta.Effort, ("ranking", "allocation", "is_quick")),
+    (partial(ta.reducer, "rv20e"), ("flank_clearance", "radial_clearance", "neglected")),
+)
+"""What a user builds, and the names of its fields."""
+
+
+def fuzzed_fields(seed: int, count: int) -> Counter[str]:
+    """Build studies and what they are made of from values of any kind; no answer is asked.
+
+    Left out is what the tests' own check of types refuses before it is read.
+    """
+    chance, outcomes = random.Random(seed), Counter[str]()
+    for _ in range(count):
+        kind, names = chance.choice(MADE)
+        given = {name: chance.choice(FIELDS) for name in chance.sample(names, chance.randint(1, min(2, len(names))))}
+        try:
+            outcomes[outcome(kind, **given)] += 1
+        except Exception as error:
+            error.add_note(f"{kind}: {sorted(given)}, {[type(value) for value in given.values()]}")
+            raise
+    return outcomes
+
+
+TABLES = ("tolerance table", "process library", "process costs", "prices", "correlations")
+RECORDS = ("reducer", "stiffness", "unit", "chain")
+BENCH = ("units", "measurement", "curve")
+
+
+@pytest.mark.parametrize("names", [TABLES, RECORDS, BENCH], ids=["tables", "records", "bench"])
+def test_mutated_files_are_read_or_refused(names, kinds):
+    outcomes = fuzzed(kinds, names, seed=1, count=7)
+    assert outcomes["refused"] > outcomes["read"] > 0
+
+
+def test_mutated_workbooks_are_read_or_refused(kinds):
+    assert fuzzed_workbooks(kinds, seed=1, count=10)["refused"] > 0
+
+
+def test_fields_of_any_kind_make_a_study_or_are_refused():
+    assert fuzzed_fields(seed=1, count=200)["refused"] > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
+def test_thousands_of_mutated_inputs_are_read_or_refused(seed, kinds):
+    outcomes = fuzzed(kinds, (*TABLES, *RECORDS, *BENCH), seed, count=80)
+    outcomes += fuzzed_workbooks(kinds, seed, count=80)
+    outcomes += fuzzed_fields(seed, count=1000)
+    assert outcomes.total() == 2040
