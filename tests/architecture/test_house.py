@@ -25,7 +25,7 @@ DOORS = {
     "plotly": ("report/",),
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
-    "openpyxl": ("report/", "allocation/answer/", "drawings/table_file.py"),
+    "openpyxl": ("report/", "allocation/answer/", "drawings/workbook.py"),
     "numba": ("compiled.py", "rv/equivalent/solvers/lanes.py"),
     "llvmlite": ("rv/equivalent/solvers/lanes.py",),
     "ezdxf": ("rv/teeth/",),

@@ -53,7 +53,7 @@ def calculation(tmp_path):
 def test_check_says_that_a_study_is_a_program_that_it_runs(calculation):
     result = tolalloc("check", calculation)
     assert result.returncode == 0
-    assert f"A study is a Python program: {calculation} was run to read it." in result.stderr
+    assert f"A study is a Python program: {calculation} was run to read it." in result.stdout
 
 
 def test_names_are_shown_as_they_are_and_never_as_markup(capsys):
@@ -79,7 +79,7 @@ def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
 
 def test_a_full_disk_is_one_sentence(calculation):
     full = OSError(errno.ENOSPC, "No space left on device", "out.csv")
-    with mock.patch("tolalloc.cli.run.note", side_effect=full):
+    with mock.patch("typer.echo", side_effect=full):
         refused(tolalloc("check", calculation), "out.csv: cannot be read or written (No space left on device).")
 
 

@@ -155,7 +155,7 @@ def check(script: Script, as_json: AsJson = False) -> None:
     if as_json:
         print_json(summary)
     else:
-        note(f"A study is a Python program: {script} was run to read it.", dim=True)
+        lines.append(f"A study is a Python program: {script} was run to read it.")
         typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
 
 
