@@ -361,12 +361,12 @@ def test_zones_that_cannot_be_had_are_refused(tmp_path, columns, options, words)
 
 
 def refused_here(options: dict[str, object], *words: str) -> None:
-    """Nothing is made, and the reason is one sentence with these words."""
+    """Nothing is made, and the reason is one sentence for every fault, with these words."""
     defaults = {"limit": None, "yield_target": None, "grades": False, "seed": None, "checkpoint": None}
     with pytest.raises(TolallocError) as caught:
         allocate(**{**defaults, **options})
     said = str(caught.value)
-    assert "\n" not in said and said.endswith(".")
+    assert all(sentence.endswith(".") for sentence in said.split("\n"))
     for word in words:
         assert word in said
     assert not (Path(str(options["script"])).parent / "report").exists()
@@ -391,7 +391,7 @@ SHOP = "process,tolerance,unit,cost\n"
         (HEAD.replace("process,model", "model,process") + ROW, None, ["model is 'ground'", "reciprocal"]),
         (HEAD + "housing.pitch,ground,reciprocal,0,,9,5,x\n", None, ["min must not be above max", "9, 5"]),
         (HEAD + "housing.pitch,ground,reciprocal,0,,150,190,x\n", None, ["no process can hold", "housing.pitch"]),
-        (HEAD + "housing.pitch,ground,reciprocal,0,-3,,,x\n", None, ["factor is -3.0", "greater than 0"]),
+        (HEAD + "housing.pitch,ground,reciprocal,0,-3,,,x\n", None, ["factor is -3.0", "greater than or equal to"]),
         (POINTED, None, ["row 2", "points shop.csv", "CSV file in"]),
         (POINTED, SHOP + "ground,10,µm,2\nground,20,µm,3\n", ["shop.csv", "costs that fall"]),
         (POINTED, SHOP + "ground,10,inch,3\nground,20,µm,2\n", ["unit is 'inch'", "mm"]),
