@@ -57,6 +57,7 @@ def in_little_memory():
     yield
     assert memory("VmHWM") - before < GIBIBYTE
 
+
 VALUES = (
     *("", "0", "-1", "1e999", "-1e999", "nan", "inf", "1e-320", "5e-324", "1_0", "١", "0x10", "1,5", "1.234", "--1"),
     *("true", "yes", "#REF!", "=1+1", "@x", "'=x", "[red]", "[/red]", "µm", "mm", "m", "Ø", "a" * 300, "x " * 200_000),

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
+_FRAME, _BETWEEN = 4, 3
+"""What the frame takes around the first column, and around every other one [characters]."""
+
 
 def note(sentence: str, *, dim: bool = False) -> None:
     """Tell something beside the answer, on standard error."""
@@ -45,17 +48,41 @@ def print_json(answer: dict[str, Any]) -> None:
 
 
 def print_table(frame: pd.DataFrame, title: str) -> None:
-    """Print a table for a person."""
+    """Print a table for a person; words are wrapped where the screen is narrow, numbers never.
+
+    Columns that do not stand beside the others follow in a table of their own, with the first column again.
+    """
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=escape(title))
-    for number, name in enumerate(frame.columns):
-        table.add_column(escape(str(name)), justify="left" if number == 0 else "right", no_wrap=number == 0)
-    for row in frame.itertuples(index=False):
-        table.add_row(*(escape(_cell(value)) for value in row))
-    Console().print(table)
+    console, names = Console(), [str(name) for name in frame.columns]
+    rows = [[_cell(value) for value in row] for row in frame.itertuples(index=False)]
+    cells = [[row[column] for row in rows] for column in range(len(names))]
+    words = [word for text in (names[0], *cells[0]) for word in text.split()]
+    first = max(map(len, words), default=1)
+    widths = [max(map(len, (*name.split(), *own)), default=1) for name, own in zip(names, cells, strict=True)]
+    for number, columns in enumerate(_side_by_side(widths[1:], console.width - first - _FRAME)):
+        table = Table(title=escape(title if number == 0 else f"{title}, continued"))
+        table.add_column(escape(names[0]), min_width=first)
+        for column in columns:
+            table.add_column(escape(names[column]), justify="right", min_width=widths[column])
+        for row in rows:
+            table.add_row(escape(row[0]), *(escape(row[column]) for column in columns))
+        console.print(table)
+
+
+def _side_by_side(widths: list[int], room: int) -> list[list[int]]:
+    """Return the columns behind the first one, numbered from 1, in groups that stand side by side."""
+    groups: list[list[int]] = [[]]
+    left = room
+    for column, width in enumerate(widths, start=1):
+        if groups[-1] and width + _BETWEEN > left:
+            groups.append([])
+            left = room
+        groups[-1].append(column)
+        left -= width + _BETWEEN
+    return groups
 
 
 def _cell(value: object) -> str:

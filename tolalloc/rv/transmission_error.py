@@ -212,7 +212,7 @@ class TransmissionErrorAnswer(Answer):
             ("no-load friction torque of the pins [N·m]", _short(found["no_load_friction_torque_nm"])),
             *loops,
             *(
-                (f"{name}, this unit, every bearing under its own load [{unit}]", _short(own[field]))
+                (f"{name}, every bearing under its own load [{unit}]", _short(own[field]))
                 for name, field, unit in (
                     ("lost motion at ±3 % of rated torque", "lost_motion_arcmin", "arcmin"),
                     ("torsional stiffness", "torsional_stiffness_nm_per_arcmin", "N·m/arcmin"),
