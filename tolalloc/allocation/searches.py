@@ -169,7 +169,10 @@ class DrawingQuestion:
         if not graded.chosen.met or (free.chosen.met and free.chosen.cost <= graded.chosen.cost):
             return free
         verifier = self.verifier("beside grades", self.space)
-        return allocate(verifier, free.proportional_tried, self.effort.search, graded.chosen)
+        found = allocate(verifier, free.proportional_tried, self.effort.search, graded.chosen)
+        if found.chosen.met and found.chosen.cost <= graded.chosen.cost:
+            return found
+        return found.with_chosen(graded.chosen, (graded.chosen,))
 
     def confirmed(self, found: Candidates) -> Candidates:
         """Return what the searches found with the drawing that fresh units confirm."""

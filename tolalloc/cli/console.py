@@ -61,7 +61,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     cells = [[row[column] for row in rows] for column in range(len(names))]
     words = [word for text in (names[0], *cells[0]) for word in text.split()]
     first = max(map(len, words), default=1)
-    widths = [max(map(len, (*name.split(), *own)), default=1) for name, own in zip(names, cells, strict=True)]
+    widths = [max(map(len, (" ", *name.split(), *own))) for name, own in zip(names, cells, strict=True)]
     for number, columns in enumerate(_side_by_side(widths[1:], console.width - first - _FRAME)):
         table = Table(title=escape(title if number == 0 else f"{title}, continued"))
         table.add_column(escape(names[0]), min_width=first)

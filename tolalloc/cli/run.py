@@ -29,6 +29,8 @@ Kept = Annotated[
     Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
 ]
 
+_ROWS = 16  # of an answer's first table that are printed
+
 
 def run(
     script: Script,
@@ -137,7 +139,8 @@ def _show(answer: Answer) -> None:
     if answer.tables:
         frame = answer.to_frame()
         columns = [column for column in answer.shown if column in frame.columns] or list(frame.columns[:6])
-        tables = [(frame[columns].head(16), f"{answer.header.name}: {answer.kind}")]
+        part = f", first {_ROWS} of {len(frame)} rows" if len(frame) > _ROWS else ""
+        tables = [(frame[columns].head(_ROWS), f"{answer.header.name}: {answer.kind}{part}")]
     tell(answer, False, *tables)
 
 
