@@ -30,7 +30,6 @@ READINGS = 1440
 NOISE = Noise()
 SEEDS = SeedTree(1).child("diagnosis")
 DRAWN, ERRORS = ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline").errors
-DRAWN, ERRORS = ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline").errors
 
 
 @dataclass(frozen=True, kw_only=True)
