@@ -12,8 +12,8 @@ from tolalloc.allocation.guarantee import Level, Sampled, reached
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.capability.monte_carlo import MonteCarlo, proportion, require_few_failures
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion, require_few_failures
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Evaluation, Model
 
@@ -104,11 +104,9 @@ class Judge:
 
     def _drawn(self, design: VerifiedDesign, seeds: SeedTree, units: int) -> MonteCarlo:
         """Return fresh units with all outputs that are limited, the leading one first."""
-        space, errors = design.space, design.space.errors
-        zones, chunks = space.zones(design.design), seeds.uniform_chunks(units, len(errors.columns))
-        x = np.concatenate([errors.deviations(errors.standard_values(chunk), zones) for chunk in chunks])
-        response = self.model.at(design.settings).reading(tuple(design.outputs))
-        return MonteCarlo(x=x, evaluation=response(x))
+        space, response = design.space, self.model.at(design.settings).reading(tuple(design.outputs))
+        every = 1.0  # may fail here, as the failed ones of all looks are judged together
+        return monte_carlo(Experiment(response, space.errors, space.zones(design.design), seeds, every), units)
 
 
 def _joined(samples: list[MonteCarlo]) -> MonteCarlo:
