@@ -15,7 +15,7 @@ from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes
 from tolalloc.rv.equivalent.solvers.refinement import make_lent, search_peaks
-from tolalloc.rv.equivalent.solvers.searches import make_peaks, make_searches
+from tolalloc.rv.equivalent.solvers.searches import gain, make_peaks, make_searches
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile, tile_size
 
 
@@ -52,9 +52,8 @@ def _others(turn, search, best, highest, found):
                     sign * turn.rotation[s, i + 1],
                     sign * turn.rotation[s, i + 2],
                 )
-                gain = max(centre - left, centre - right)
                 peak = centre >= left and centre >= right and i != known[s, one]
-                if peak and centre + search.safety * gain > best[s, one]:
+                if peak and centre + search.safety * gain(left, centre, right) > best[s, one]:
                     sample[count], side[count], coarse[count] = s, one, i
                     count += 1
     return make_peaks(sample[:count], side[:count], coarse[:count])

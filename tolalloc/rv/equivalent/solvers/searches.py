@@ -93,20 +93,23 @@ def begin(lane, peak, search, turn, peaks, own):
 
 
 @jit_in_place
-def look_closer(lane, search, best, peaks, own):
-    """Halve the step, or end the search where it is fine enough or cannot reach the sample's best any more.
+def gain(left, centre, right):
+    """Return how much a peak near ``centre`` may rise above it: the steeper flank carried on for one step."""
+    return max(centre - left, centre - right)
 
-    A peak may rise above its centre by as much as the steeper flank, carried on for one step.
-    """
+
+@jit_in_place
+def look_closer(lane, search, best, peaks, own):
+    """Halve the step, or end the search where it is fine enough or cannot reach the sample's best any more."""
     peak, centre = own.peak[lane], own.height[lane, 1]
-    gain = max(centre - own.height[lane, 0], centre - own.height[lane, 2])
-    hopeful = centre + search.safety * gain > best[peaks.sample[peak], peaks.side[peak]]
+    more = gain(own.height[lane, 0], centre, own.height[lane, 2])
+    hopeful = centre + search.safety * more > best[peaks.sample[peak], peaks.side[peak]]
     if own.level[lane] < search.levels and hopeful:
         own.level[lane] += 1
         own.step[lane] *= 0.5
         own.half[lane] = 0
         return
-    peaks.height[peak], peaks.position[peak], peaks.left_over[peak] = centre, own.at[lane], gain
+    peaks.height[peak], peaks.position[peak], peaks.left_over[peak] = centre, own.at[lane], more
     own.peak[lane] = -1
 
 
