@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.rv.cycloid.clearance import Gap, gap_of
@@ -101,36 +103,73 @@ def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.
     return np.asarray(force / scale * (np.log(scale / force) + log_length))
 
 
-def _balanced(
-    discs: PressedDiscs, gap: Gap, pin_angle: Float[np.ndarray, " pin"]
-) -> tuple[float, Float[np.ndarray, " pin"]]:
-    """Return the deflection at which the torques of one phase balance [m], and the forces of all pins there [N]."""
-    from scipy.optimize import brentq
+@dataclass(frozen=True)
+class _Balance:
+    """Pins of all phases, pressed by a deflection of the discs."""
 
-    stage, stiffness = discs.reducer.cycloid_stage, discs.reducer.stiffness
-    lever = np.asarray(stage.disc_pitch_radius * normals(stage.shortening, pin_angle).lever)
-    (contact, log_length), closing = contact_stiffness(stage, stiffness, pin_angle), discs.clearance.rotation
+    discs: PressedDiscs
+    pin_angle: Float[np.ndarray, "phase pin"]  # Angle φ of the pins of all discs [rad]
 
-    def forces(deflection: float) -> Float[np.ndarray, " pin"]:
-        rotation = closing + deflection / stage.disc_pitch_radius
-        compression, force = -gap(pin_angle, rotation), np.empty(pin_angle.size)
-        pin_forces(LAWS[stiffness.pin_contact_law], contact, log_length, compression, force)
-        return force
+    @cached_property
+    def _gap(self) -> Gap:
+        return gap_of(self.discs.profile, self.discs.clearance.exact)
 
-    def surplus(deflection: float) -> float:
-        return float(lever @ forces(deflection)) - discs.torque
+    @cached_property
+    def _lever(self) -> Float[np.ndarray, "phase pin"]:
+        stage = self.discs.reducer.cycloid_stage
+        return np.asarray(stage.disc_pitch_radius * normals(stage.shortening, self.pin_angle).lever)
 
-    deepest, deflection = stage.pin_radius, MICROMETRE
-    while surplus(deflection) < 0:
-        if deflection >= deepest:
-            largest = surplus(deepest) + discs.torque
-            raise InputError(
-                f"{discs.reducer.name}: torque {discs.torque:.6g} N·m on the discs is beyond any "
-                f"contact: pins would be pressed in by more than their radius; allowed is below {largest:.3g} N·m."
-            )
-        deflection = min(2 * deflection, deepest)
-    found = float(brentq(surplus, 0.0, deflection, xtol=1e-18, rtol=1e-13))
-    return found, forces(found)
+    @cached_property
+    def _contact(self) -> tuple[Float[np.ndarray, "phase pin"], Float[np.ndarray, "phase pin"]]:
+        reducer = self.discs.reducer
+        return contact_stiffness(reducer.cycloid_stage, reducer.stiffness, self.pin_angle)
+
+    def forces(
+        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
+    ) -> Float[np.ndarray, "some pin"]:
+        """Return the forces of all pins at some phases, each under its own deflection [N]."""
+        reducer, (contact, log_length) = self.discs.reducer, self._contact
+        rotation = self.discs.clearance.rotation + deflection / reducer.cycloid_stage.disc_pitch_radius
+        angles = self.pin_angle[phase]
+        compression = -self._gap(angles, np.repeat(rotation[:, np.newaxis], angles.shape[1], axis=1))
+        law, force = LAWS[reducer.stiffness.pin_contact_law], np.empty(compression.size)
+        pin_forces(law, contact[phase].ravel(), log_length[phase].ravel(), compression.ravel(), force)
+        return force.reshape(compression.shape)
+
+    def torque(
+        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
+    ) -> Float[np.ndarray, " some"]:
+        """Return the torques of the pins on the discs [N·m]."""
+        return np.asarray((self._lever[phase] * self.forces(deflection, phase)).sum(axis=1))
+
+    def deflection(self) -> Float[np.ndarray, " phase"]:
+        """Return the deflections at which the torques balance [m].
+
+        Raises
+        ------
+        InputError
+            A pin would be pressed in by more than its radius.
+        """
+        from scipy.optimize import elementwise
+
+        wanted, deepest = self.discs.torque, self.discs.reducer.cycloid_stage.pin_radius
+        phase = np.arange(len(self.pin_angle))
+        high, short = np.full(phase.size, MICROMETRE), phase
+        while (short := short[self.torque(high[short], short) < wanted]).size:
+            if high[short].max() >= deepest:
+                raise InputError(
+                    f"{self.discs.reducer.name}: torque {wanted:.6g} N·m on the discs is beyond any contact: pins "
+                    f"would be pressed in by more than their radius; allowed is below "
+                    f"{self.torque(high[short], short).min():.3g} N·m."
+                )
+            high[short] = np.minimum(2 * high[short], deepest)
+        found = elementwise.find_root(
+            lambda depth, at: self.torque(depth, at) - wanted,
+            (np.zeros(phase.size), high),
+            args=(phase,),
+            tolerances={"xrtol": 1e-13},
+        )
+        return np.asarray(found.x)
 
 
 def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
@@ -143,8 +182,8 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
     InputError
         The torque would press a pin in by more than its radius.
     """
-    angles, gap = discs.pin_angles(phase), gap_of(discs.profile, discs.clearance.exact)
-    found = [_balanced(discs, gap, own) for own in angles.reshape(phase.size, -1)]
-    deflection, force = np.array([depth for depth, _ in found]), np.stack([force for _, force in found])
-    law = discs.reducer.stiffness.pin_contact_law
+    angles = discs.pin_angles(phase)
+    balance = _Balance(discs, angles.reshape(phase.size, -1))
+    deflection, law = balance.deflection(), discs.reducer.stiffness.pin_contact_law
+    force = balance.forces(deflection, np.arange(phase.size))
     return loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
