@@ -109,6 +109,7 @@ def test_the_truth_is_found(run):
         assert before > after
 
 
+@pytest.mark.slow
 def test_choices_are_judged_by_units_left_out(run):
     choices = {item["fitted"]: item["left out [noise]"] for item in run.answer["choices"]}
     assert list(choices) == ["nothing (the reducer as given)", "K_pd"]

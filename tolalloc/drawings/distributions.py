@@ -103,7 +103,7 @@ class Marginal(Hashable, Protocol):
 
 @dataclass(frozen=True)
 class Family:
-    """A distribution with a closed form."""
+    """A distribution of scipy, whose import takes longer than everything else that reads a table."""
 
     name: str  # As in scipy.stats
     # Its shape, start and width as scipy.stats takes them; without them it is the standard one [-]
@@ -112,7 +112,6 @@ class Family:
 
     @property
     def _scipy(self) -> Any:
-        """The distribution of scipy, whose import takes longer than everything else that reads a table."""
         from scipy import stats
 
         return getattr(stats, self.name)
@@ -131,10 +130,41 @@ class Family:
         return np.asarray(self._scipy.cdf(value, *self.arguments))
 
 
-NORMAL = Family("norm", end=3.0)
-"""Deviation in units of its σ."""
-RAYLEIGH = Family("rayleigh", end=sqrt(-2.0 * log(1.0 - INSIDE_AT_CP_1)))
-"""Length of a vector with two normal components, in units of their σ."""
+@dataclass(frozen=True)
+class Normal:
+    """The standard normal distribution."""
+
+    reach: float = 3.0  # Value at the limit of the zone at Cp = 1 [σ]
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities in (0, 1) [σ]."""
+        return np.asarray(ndtri(probability))
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        return np.asarray(ndtr(value))
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Length of a vector with two standard normal components."""
+
+    reach: float = sqrt(-2.0 * log(1.0 - INSIDE_AT_CP_1))  # Value at the limit of the zone at Cp = 1 [σ]
+
+    def quantile(self, probability: Numbers) -> Numbers:
+        """Return the values that are not exceeded with these probabilities in (0, 1) [σ]."""
+        from scipy import special
+
+        return np.asarray(np.sqrt(-2.0 * special.log1p(np.negative(probability))))
+
+    def probability(self, value: Numbers) -> Numbers:
+        """Return the probabilities of not exceeding these values [-]."""
+        from scipy import special
+
+        return np.asarray(np.where(np.greater(value, 0.0), -special.expm1(-0.5 * np.square(value)), 0.0))
+
+
+NORMAL, RAYLEIGH = Normal(), Rayleigh()
 
 
 @dataclass(frozen=True)
