@@ -24,7 +24,7 @@ from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.model import ReducerModel
 
-UNITS, QUICK = 200, 8
+UNITS, QUICK = 200, 2
 READINGS = 1440
 """Readings of one output turn [-]."""
 NOISE = Noise()

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.command import ROOT, refused, tolalloc
+from tests.studies.command import refused, tolalloc
 from tolalloc.rv.reducer.files import PRESETS
 
 
@@ -132,31 +130,6 @@ def test_a_large_modification_is_said_wherever_gaps_are_linear(tmp_path):
     exact = json.loads(tolalloc("contact", "--reducer", path, "--json").stdout)
     assert exact["profile"]["distances"] == "exact"
     assert "exact distances were taken" in exact["warnings"][0]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "study",
-    [
-        "xi2015_contact",
-        "song2019_modification",
-        "li2018_modification",
-        "published_benchmarks",
-        "zhang2025_assembly",
-        "xi2015_virtual_prototype",
-        "rv20e_speeds",
-    ],
-)
-def test_studies_that_make_one_report(study, tmp_path):
-    script, folder = ROOT / "studies" / f"{study}.py", tmp_path / "run"
-    command = [sys.executable, str(script), "--quick", "--out", str(folder)]
-    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert result.returncode == 0, result.stderr
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("<h2>") >= 3
-    assert "nan" not in (folder / "summary.json").read_text(encoding="utf-8").lower()
-    again = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    refused(again, "not empty")
 
 
 @pytest.mark.slow

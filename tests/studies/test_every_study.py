@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from tests.studies.command import ROOT, process
+from tests.studies.command import ROOT, process, refused
 
 STUDIES = sorted((ROOT / "studies").glob("*.py"))
 
@@ -15,11 +18,41 @@ def _no_number(constant):
     raise AssertionError(f"{constant} is no number")
 
 
+def _liu2020_identification(result: subprocess.CompletedProcess[str], folder: Path) -> None:
+    """Printed pairs, three seeds of every method, ten repetitions."""
+    said = " ".join(result.stdout.split())
+    assert "A constant explains the printed residual better than any stiffness" in said
+    assert "K_b is not identified by these data" in said
+    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["calculation"]
+    assert answer["within three standard errors [-]"] >= 9
+    methods = {item["method"]: item for item in answer["peak-to-peaks"]["methods"]}
+    best = {name: min(item["objectives [-]"]) for name, item in methods.items()}
+    assert max(best.values()) <= (1 + 1e-4) ** 2 * min(best.values())
+    swarm, exact = (methods[name]["evaluations [-]"] for name in ("improved particle swarm", "Gauss–Newton"))
+    assert max(exact) <= min(swarm) / 20
+
+
+def _xi2015_contact(_: subprocess.CompletedProcess[str], folder: Path) -> None:
+    """A second run into the same folder is refused."""
+    again = process("run", ROOT / "studies" / "xi2015_contact.py", "--quick", "--out", folder)
+    refused(again, "not empty")
+
+
+SAYS: dict[str, Callable[[subprocess.CompletedProcess[str], Path], None]] = {
+    "liu2020_identification": _liu2020_identification,
+    "xi2015_contact": _xi2015_contact,
+}
+"""What the answer of a study says, where that is more than a complete report."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("script", STUDIES, ids=lambda path: path.stem)
 def test_a_study_runs_and_writes_its_report(script, tmp_path):
     folder = tmp_path / "run"
     result = process("run", script, "--quick", "--out", folder)
     assert result.returncode == 0, result.stderr
-    assert (folder / "report.html").stat().st_size > 0
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("<h2") >= 2
     json.loads((folder / "summary.json").read_text(encoding="utf-8"), parse_constant=_no_number)
+    if script.stem in SAYS:
+        SAYS[script.stem](result, folder)

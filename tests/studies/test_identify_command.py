@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from math import log, sqrt
 from pathlib import Path
@@ -25,7 +23,7 @@ from tests.studies.bench_files import (
     lines,
     value,
 )
-from tests.studies.command import ROOT, refused, tolalloc
+from tests.studies.command import refused, tolalloc
 from tolalloc.rv.reducer.files import load_identified_stiffness
 
 
@@ -282,22 +280,3 @@ def test_a_torque_that_loops_alone_cannot_show_is_said_without_infinities(curves
     assert "Traceback" not in result.stderr
     assert "inf%" not in result.stdout
     assert "torque" in result.stdout + result.stderr
-
-
-@pytest.mark.slow
-def test_the_study_of_liu2020(tmp_path):
-    """In quick mode, about a minute: printed pairs, three seeds of every method, ten repetitions."""
-    folder = tmp_path / "run"
-    command = [sys.executable, str(ROOT / "studies" / "liu2020_identification.py"), "--quick", "--out", str(folder)]
-    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert result.returncode == 0, result.stderr
-    assert "A constant explains the printed residual better than any stiffness" in " ".join(result.stdout.split())
-    assert "K_b is not identified by these data" in result.stdout
-    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    assert answer["within three standard errors [-]"] >= 9
-    methods = {item["method"]: item for item in answer["peak-to-peaks"]["methods"]}
-    best = {name: min(item["objectives [-]"]) for name, item in methods.items()}
-    assert max(best.values()) <= (1 + 1e-4) ** 2 * min(best.values())
-    swarm, exact = (methods[name]["evaluations [-]"] for name in ("improved particle swarm", "Gauss–Newton"))
-    assert max(exact) <= min(swarm) / 20
-    assert "NaN" not in (folder / "summary.json").read_text(encoding="utf-8")

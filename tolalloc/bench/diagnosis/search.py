@@ -55,7 +55,9 @@ class Explanation:
     # What the readings tell of them nearby: sum of squared derivatives [-]
     information: Float[np.ndarray, "column column"]
     objective: float  # Half the sum of squares of residuals and numbers [-]
-    plausible: float  # Probability of residuals at least as large, were the model true [-]
+    # Probability of residuals at least as large, were the model true; and were the noise twice as large as stated [-]
+    plausible: float
+    plausible_at_twice: float
 
     def neighbourhood(self, weight: float) -> Neighbourhood:
         """Return what would be known if the model were linear and the readings had this weight [-]."""
@@ -63,13 +65,19 @@ class Explanation:
 
 
 def explain(problem: CurveProblem, seeds: SeedTree, effort: DiagnosisEffort) -> Explanation:
-    """Return the best explanation of some attempts, ended early by one that is plausible."""
+    """Return the best explanation of some attempts.
+
+    They end early with one that is plausible, or with the second of two that would not be plausible even at twice the
+    noise: such a curve is no near miss, and three more attempts would only repeat that.
+    """
     everywhere = Neighbourhood(centre=np.zeros(problem.size), precision=np.eye(problem.size))
     rough = _rough_weight(problem, everywhere, seeds.child("spread").generator(), effort)
     found: list[Explanation] = []
     for number in range(effort.attempts):
         found.append(_attempt(problem, everywhere, rough, seeds.child(str(number)), effort))
-        if found[-1].plausible >= _LEAST:
+        plausible = max(one.plausible for one in found) >= _LEAST
+        hopeless = len(found) > 1 and max(one.plausible_at_twice for one in found) < _LEAST
+        if plausible or hopeless:
             break
     return min(found, key=lambda one: one.objective)
 
@@ -121,11 +129,13 @@ def _search(
     _, slope = problem.linearised(best[first : first + 1])
     information = slope[0].T @ slope[0]
     fitted = float(np.trace(np.linalg.solve(information + np.eye(problem.size), information)))
+    freedom = max(problem.readings.freedom - fitted, 1.0)
     return Explanation(
         numbers=best[first],
         information=information,
         objective=float(objective[first]),
-        plausible=float(chi2.sf(2.0 * misfit[first], max(problem.readings.freedom - fitted, 1.0))),
+        plausible=float(chi2.sf(2.0 * misfit[first], freedom)),
+        plausible_at_twice=float(chi2.sf(2.0 * misfit[first] / 4.0, freedom)),
     )
 
 
