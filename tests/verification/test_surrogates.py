@@ -15,7 +15,7 @@ from tolalloc.models import Evaluation, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
-from tolalloc.surrogate.choice import choose, shortfalls
+from tolalloc.surrogate.choice import ENOUGH_Q2, choose, shortfalls
 from tolalloc.surrogate.regression import (
     RegressionCandidate,
     quadratic_regression,
@@ -173,13 +173,29 @@ def test_a_memory_of_answers_is_worth_nothing_on_noise():
 
 def test_the_best_of_those_that_pass_is_fitted_to_all_answers():
     x, slow = samples(200), Exact()
-    rough, best = Fixed(Exact(noise=0.1), "rough"), Fixed(Exact(), "best")
-    choice = choose(slow, (rough, best, regression()), x, SeedTree(0))
+    rough, best = Fixed(Exact(noise=0.25), "rough"), Fixed(Exact(), "best")
+    choice = choose(slow, (rough, best), x, SeedTree(0))
+    assert 0.95 <= choice.scores[0].q2 < ENOUGH_Q2
     assert choice.scores[choice.best].name == "best"
     assert choice.chosen is best.response
     assert best.shown[-1].shape[0] == 200
     assert "best: Q² = 1.000 on 200 answers" in choice.reason
     assert "its 99.73 % quantile off by 0.0%" in choice.reason
+
+
+def test_once_little_is_left_to_gain_no_other_candidate_is_tried():
+    good, other = Fixed(Exact(noise=0.02), "good"), Fixed(Exact(), "other")
+    choice = choose(Exact(), (good, other, regression()), samples(200), SeedTree(0))
+    assert [score.name for score in choice.scores] == ["good"] and choice.scores[0].q2 >= ENOUGH_Q2
+    assert choice.untried == ("other", "regression") and not other.shown
+    assert choice.reason.endswith("Not tried, as no more can be gained: other, regression.")
+
+
+def test_a_candidate_that_may_not_be_used_does_not_end_the_search():
+    failing, other = Fixed(Exact(fail=(0,)), "failing"), Fixed(Exact(), "other")
+    choice = choose(Exact(), (failing, other), samples(200), SeedTree(0))
+    assert choice.scores[0].q2 >= ENOUGH_Q2 and shortfalls(choice.scores[0])
+    assert choice.chosen is other.response
 
 
 def test_below_the_gate_nothing_stands_in():
@@ -241,8 +257,8 @@ def test_folds_and_candidates_must_exist():
 
 
 def test_the_table_has_a_row_per_candidate_and_a_unit_per_number():
-    choice = choose(Exact(), (regression(), Fixed(Exact())), samples(60), SeedTree(1))
-    assert choice.table["candidate"] == ["regression", "fixed"]
+    choice = choose(Exact(), (Fixed(Exact(noise=1.0)), regression()), samples(60), SeedTree(1))
+    assert choice.table["candidate"] == ["fixed", "regression"]
     assert choice.table["rms error [arcsec]"] == [score.rms_error for score in choice.scores]
     for header, column in choice.table.items():
         assert len(column) == 2

@@ -16,6 +16,8 @@ from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_va
 
 LARGEST_QUANTILE_ERROR = 0.02
 """Largest error of the quantile over the quantile with which a surrogate is used [-]."""
+ENOUGH_Q2 = 0.99
+"""Q² of a surrogate that may be used above which no other is tried: what is left to gain is not worth its fit [-]."""
 LARGEST_FAILED_SHARE = 0.01
 """Largest share of failed predictions with which a surrogate is used [-]."""
 
@@ -42,7 +44,8 @@ class Choice:
     """Candidates, what they are worth, and the one that was chosen."""
 
     output: str  # What is predicted, with its unit of measurement
-    scores: tuple[Score, ...]  # One per candidate
+    scores: tuple[Score, ...]  # One per candidate that was tried
+    untried: tuple[str, ...]  # Names of the candidates that were not, as one before them left too little to gain
     failed: int  # Answers to learn from that failed and were left out [-]
     best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
     chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
@@ -53,9 +56,10 @@ class Choice:
         score = self.scores[self.best]
         if self.chosen is None:
             return f"No surrogate is used; the best, {score.name}, does not pass: {'; '.join(shortfalls(score))}."
+        untried = f" Not tried, as no more can be gained: {', '.join(self.untried)}." if self.untried else ""
         return (
             f"The surrogate is {score.name}: Q² = {score.q2:.3f} on {score.held_out} answers that it had not seen, its "
-            f"{score.quantile_name} off by {abs(score.quantile_share):.1%}."
+            f"{score.quantile_name} off by {abs(score.quantile_share):.1%}.{untried}"
         )
 
     @property
@@ -85,14 +89,14 @@ def choose(
     quantile: float = 0.9973,
     largest_failed_share: float = 0.01,
 ) -> Choice:
-    """Return the candidate with the highest Q² among those that pass the gate, fitted to all answers.
+    """Return the candidate with the highest Q² among those tried that pass the gate, fitted to all answers.
 
     Parameters
     ----------
     response
         What is stood in for; its first output counts.
     candidates
-        What may stand in.
+        What may stand in, in the order of trying; one that passes with `ENOUGH_Q2` ends it.
     x
         Columns of random samples to learn from and to be judged on, in five folds [m, angles rad].
     seeds
@@ -117,12 +121,17 @@ def choose(
     if not candidates:
         raise InputError.at("surrogate", "candidates", tuple(candidates), "one or more")
     answers = answers_of(response, x, seeds, largest_failed_share=largest_failed_share)
-    scores = tuple(cross_validate(candidate, answers, quantile) for candidate in candidates)
+    scores = list[Score]()
+    for candidate in candidates:
+        scores.append(cross_validate(candidate, answers, quantile))
+        if scores[-1].q2 >= ENOUGH_Q2 and not shortfalls(scores[-1]):
+            break
     passed = [at for at, score in enumerate(scores) if not shortfalls(score)]
     best = max(passed or range(len(scores)), key=lambda at: scores[at].q2)
     return Choice(
         output=response.outputs[0],
-        scores=scores,
+        scores=tuple(scores),
+        untried=tuple(candidate.name for candidate in candidates[len(scores) :]),
         failed=answers.failed,
         best=best,
         chosen=candidates[best].fit(answers.x, answers.y) if passed else None,
