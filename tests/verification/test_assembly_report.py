@@ -178,13 +178,11 @@ def text(results: AssemblyAnswer, heading: str) -> str:
     return " ".join(sections[heading])
 
 
-@pytest.mark.slow
 def test_where_another_unit_of_precision_buys_little_is_said(expected):
     found = expected.sweep.diminished()
     assert f"From a precision of {found:g} on, another unit takes less than 1%" in said(expected)
 
 
-@pytest.mark.slow
 def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
     sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, 0.25))
     assert "another unit still takes off 25.0%" in said(replace(expected, sweep=sweep))

@@ -59,11 +59,11 @@ def run_figures(results: SimulationAnswer) -> tuple[Figure, ...]:
     )
 
 
-def error_figure(found: dict[str, SimulationAnswer], passes: float = np.inf) -> Figure:
+def error_figure(found: dict[str, SimulationAnswer], passes: int | None = None) -> Figure:
     """Return the transmission error over the last pin passes of the steady part, of several engines and at rest."""
     first = next(iter(found.values()))
     stage = first.reducer.cycloid_stage
-    shown = passes * 360.0 / (stage.disc_teeth * stage.pin_count)
+    shown = (np.inf if passes is None else passes) * 360.0 / (stage.disc_teeth * stage.pin_count)
     lines = []
     for label, results in found.items():
         angle, moving, _ = results.arcseconds
