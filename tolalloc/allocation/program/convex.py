@@ -24,15 +24,17 @@ from tolalloc.allocation.program.problem import (
 )
 from tolalloc.exceptions import SolveError
 
-_ATTEMPTS: tuple[dict[str, float | bool], ...] = (
-    {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-10, "equilibrate_enable": True},
-    {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "equilibrate_enable": True},
-    {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "equilibrate_enable": False},
-    {"tol_gap_abs": 1e-8, "tol_gap_rel": 1e-8, "tol_feas": 1e-8, "equilibrate_enable": True},
+_ATTEMPTS = (
+    # Gap, violation, both where it may stop if it must [-]; whether rows are scaled
+    (1e-12, 1e-10, 1e-8, True),
+    (1e-9, 1e-9, 1e-8, True),
+    (1e-9, 1e-9, 1e-8, False),
+    (1e-8, 1e-8, 1e-8, True),
+    (1e-8, 1e-8, 1e-6, True),
 )
-"""What the solver aims at first, on the scaled program, and then where rounding keeps it from that [-]."""
-_REDUCED = {"reduced_tol_gap_abs": 1e-8, "reduced_tol_gap_rel": 1e-8, "reduced_tol_feas": 1e-8}
-"""What it may stop with [-]."""
+"""What the solver aims at first, on the scaled program, and then where rounding keeps it from that."""
+_NEGLIGIBLE = 1e-6
+"""Part of a stack's largest root-sum-square term below which a term is left out: only its square counts [-]."""
 _ENOUGH = 1e-10
 """Gap below which the certificate is not polished further [-]."""
 
@@ -140,9 +142,10 @@ class ConvexProgram:
         for parameter, value in zip(self._bounds, (low / units, high / units, *around), strict=True):
             parameter.value = value
         for parameters, stack, scale in zip(self._stacks, stacks, scales, strict=True):
+            terms = stack.root_sum_square * high
             values = (
                 stack.worst_case * units / scale,
-                stack.root_sum_square * units / scale,
+                np.where(terms < _NEGLIGIBLE * terms.max(initial=0.0), 0.0, stack.root_sum_square) * units / scale,
                 np.where(still, 0.0, stack.slopes) / scale,
                 (stack.budget - stack.slopes @ held) / scale,
             )
@@ -190,12 +193,21 @@ class ConvexProgram:
         import cvxpy as cp
 
         said = ""
-        for settings in _ATTEMPTS:
+        for gap, violation, reduced, equilibrate in _ATTEMPTS:
+            settings = {
+                "tol_gap_abs": gap,
+                "tol_gap_rel": gap,
+                "tol_feas": violation,
+                "reduced_tol_gap_abs": reduced,
+                "reduced_tol_gap_rel": reduced,
+                "reduced_tol_feas": reduced,
+                "equilibrate_enable": equilibrate,
+            }
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
                     # Warm, the solver would keep state of earlier solves, and an answer would depend on them.
-                    self._problem.solve(solver=cp.CLARABEL, warm_start=False, **settings, **_REDUCED)
+                    self._problem.solve(solver=cp.CLARABEL, warm_start=False, **settings)
             except cp.SolverError as error:
                 said = str(error).split(".")[0]
                 continue
