@@ -220,11 +220,16 @@ class Model(ABC):
 
     @property
     def exact(self) -> tuple[str, ...]:
-        """Names of the outputs whose derivatives are known exactly."""
+        """Names of the outputs whose exact derivatives cost hardly more than they do."""
+        return ()
+
+    @property
+    def differentiable(self) -> tuple[str, ...]:
+        """Names of the outputs whose exact derivatives cost much more than they do, and are asked of few samples."""
         return ()
 
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return an output of `exact` of every sample with its derivatives."""
+        """Return an output of `exact` or `differentiable` of every sample with its derivatives."""
         raise ValueError(f"{self.name} knows no exact derivatives of {output} at {x.shape[0]} samples")
 
     def observed(self, observe: Observer) -> Model:  # noqa: ARG002

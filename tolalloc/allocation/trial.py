@@ -82,10 +82,21 @@ class FreshUnits:
 
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
         """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m]."""
-        found = self.exact[output]
+        return self._by_zone(self.exact[output])
+
+    def _by_zone(self, found: SettingDerivatives) -> Float[np.ndarray, "good source"]:
         good, names = found.evaluation.good, self.space.errors.source_of_column
         starts = [names.index(source.name) for source in self.space.errors.active]
-        return np.asarray(np.add.reduceat(found.by_column[good] * self.standard[good], starts, axis=1))
+        moved = found.by_column[good] * self.standard[: good.size][good]
+        return np.asarray(np.add.reduceat(moved, starts, axis=1))
+
+    def _slopes(self, found: SettingDerivatives) -> Float[np.ndarray, "first variable"]:
+        """Return the derivatives of the first units by every variable, NaN where a unit has none."""
+        good = found.evaluation.good
+        slopes = np.full((good.size, self.design.size), np.nan)
+        by_scale = self.space.by_scale(self._by_zone(found))
+        slopes[good] = np.concatenate([by_scale, found.by_setting[good]], axis=1)
+        return slopes
 
     def derived(self, output: str) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return an output of some units and its derivative by every variable [unit of the output]."""
@@ -99,14 +110,10 @@ class FreshUnits:
         These are all units where the model knows the derivatives exactly.
         """
         if output not in self.exact:
-            values, slopes = self._differences
+            values, slopes = self._others_of_first
             at = self._others.index(output)
             return values[:, at], slopes[:, at]
-        found = self.exact[output]
-        slopes = np.full((len(self.standard), self.design.size), np.nan)
-        by_scale = self.space.by_scale(self.by_zone(output))
-        slopes[found.evaluation.good] = np.concatenate([by_scale, found.by_setting[found.evaluation.good]], axis=1)
-        return self.values(output), slopes
+        return self.values(output), self._slopes(self.exact[output])
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output].
@@ -151,24 +158,36 @@ class FreshUnits:
         return np.array(slopes)
 
     @cached_property
-    def _differences(
+    def _others_of_first(
         self,
     ) -> tuple[Float[np.ndarray, "first output"], Float[np.ndarray, "first output variable"]]:
-        """Other outputs of the first units, and their derivatives by central differences with the same units."""
-        standard, groups = self.standard[: self.slope_units], len(self.space.groups)
-        steps = np.append(_SCALE_STEP * self.design[:groups], self.space.setting_steps)
-        slopes = np.empty((len(standard), len(self._others), steps.size))
-        for at, step in enumerate(np.diag(steps)):
-            ends = [self._others_of(self.design + side * step, standard) for side in (1, -1)]
-            slopes[..., at] = (ends[0] - ends[1]) / (2 * steps[at])
-        return np.where(self.others.good[:, np.newaxis], self.others.values, np.nan)[: len(standard)], slopes
+        """Other outputs of the first units, and their derivatives."""
+        standard, model = self.standard[: self.slope_units], self._at(self.design)
+        slopes = {
+            output: self._slopes(model.derivatives(output, self.x[: len(standard)]))
+            for output in self._others
+            if output in model.differentiable
+        }
+        if rest := tuple(output for output in self._others if output not in slopes):
+            slopes |= dict(zip(rest, self._differences(rest, standard), strict=True))
+        values = np.where(self.others.good[:, np.newaxis], self.others.values, np.nan)[: len(standard)]
+        return values, np.stack([slopes[output] for output in self._others], axis=1)
 
-    def _others_of(
-        self, design: Float[np.ndarray, " variable"], standard: Float[np.ndarray, "unit column"]
-    ) -> Float[np.ndarray, "unit output"]:
-        """Return the other outputs of the units at another design, NaN where one has none."""
-        found = self._at(design).reading(self._others)(self.space.errors.deviations(standard, self.space.zones(design)))
-        return np.where(found.good[:, np.newaxis], found.values, np.nan)
+    def _differences(
+        self, outputs: tuple[str, ...], standard: Float[np.ndarray, "unit column"]
+    ) -> Float[np.ndarray, "output unit variable"]:
+        """Return the derivatives of outputs by central differences with the same units, NaN where one has none."""
+        groups = len(self.space.groups)
+        steps = np.append(_SCALE_STEP * self.design[:groups], self.space.setting_steps)
+        slopes = np.empty((len(outputs), len(standard), steps.size))
+        for at, step in enumerate(np.diag(steps)):
+            ends = []
+            for design in (self.design + step, self.design - step):
+                deviations = self.space.errors.deviations(standard, self.space.zones(design))
+                found = self._at(design).reading(outputs)(deviations)
+                ends.append(np.where(found.good[:, np.newaxis], found.values, np.nan))
+            slopes[..., at] = (ends[0] - ends[1]).T / (2 * steps[at])
+        return slopes
 
     def _differentiable(self, output: str) -> ResponseWithDerivatives:
         """Return the output at the design with derivatives by the columns, exact ones where the model knows them."""

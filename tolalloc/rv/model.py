@@ -24,6 +24,7 @@ from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.response.loop_derivatives import DIFFERENTIABLE, loop_derivatives
 from tolalloc.rv.response.outputs import (
     WITH_FRICTION,
     OutputsResponse,
@@ -160,15 +161,35 @@ class ReducerModel(Model):
         """The peak-to-peak alone."""
         return (PEAK_TO_PEAK,)
 
+    @property
+    def differentiable(self) -> tuple[str, ...]:
+        """What is read off torque against twist."""
+        return DIFFERENTIABLE
+
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return the peak-to-peak of every sample with its derivatives."""
+        """Return the peak-to-peak, or what is read off torque against twist, of every sample with its derivatives."""
+        if output in self.differentiable:
+            return self._loop_derivatives(output, x)
         if output not in self.exact:
-            raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, self.exact)
+            known = (*self.exact, *self.differentiable)
+            raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, known)
         found = self.kernel.with_derivatives(x)
         return SettingDerivatives(
             evaluation=found.evaluation,
             by_column=found.by_column,
             by_setting=found.by_modification @ self._modification_by_clearance * MICROMETRE,
+        )
+
+    def _loop_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        evaluation, slopes = loop_derivatives(self.kernel, output, x)
+        columns = self.kernel.model.columns
+        varied, amounts = (
+            [columns.index(name) for name in names] for names in (self.columns, self.reducer.modification.deviations)
+        )
+        return SettingDerivatives(
+            evaluation=evaluation,
+            by_column=slopes[:, varied],
+            by_setting=slopes[:, amounts] @ self._modification_by_clearance * MICROMETRE,
         )
 
     def observed(self, observe: Observer) -> ReducerModel:

@@ -1,0 +1,62 @@
+"""Exact derivatives of lost motion, backlash and torsional stiffness, against central differences of these outputs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.three_cranks import table_of_three_cranks
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.model import ReducerModel
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.response.loop_derivatives import DIFFERENTIABLE
+
+UNITS = 12
+STEP = 1e-10
+"""Step of a difference by a column [m]."""
+
+
+def bound(reducer: Reducer, errors: ErrorModel) -> tuple[ReducerModel, np.ndarray]:
+    equivalent = EquivalentModel(reducer)
+    fixed = {name: 0.0 for name in equivalent.columns if name not in errors.columns}
+    fixed |= reducer.modification.deviations
+    kernel = KernelResponse(model=equivalent, torque=-1.0, columns=errors.columns, fixed=fixed)
+    return ReducerModel(kernel=kernel), deviations(errors)
+
+
+def two_cranks() -> tuple[ReducerModel, np.ndarray]:
+    return bound(load_reducer("rv20e"), ErrorModel(load_tolerance_table("rv20e_baseline")))
+
+
+def three_cranks() -> tuple[ReducerModel, np.ndarray]:
+    """Another number of cranks, constant stiffness of the pins."""
+    errors = ErrorModel(tuple(table_of_three_cranks("rv20e_baseline").values()))
+    return bound(replace(load_reducer("rv20e_liu2020"), crank_count=3), errors)
+
+
+def deviations(errors: ErrorModel) -> np.ndarray:
+    uniform = np.random.default_rng(20261123).uniform(size=(UNITS, len(errors.columns)))
+    return errors.deviations(errors.standard_values(uniform), errors.zones)
+
+
+@pytest.mark.parametrize("output", DIFFERENTIABLE)
+@pytest.mark.parametrize("case", [two_cranks, three_cranks])
+def test_they_are_the_differences_of_the_output(case, output):
+    """Pins that just take over within a step make a few units differ: the median is compared."""
+    model, x = case()
+    found, direction = model.derivatives(output, x), np.random.default_rng(1).normal(size=x.shape) * STEP
+    np.testing.assert_allclose(found.evaluation.values, model.reading((output,))(x).values, rtol=1e-9)
+    ahead, behind = (model.reading((output,))(x + side * direction).values[:, 0] for side in (1, -1))
+    exact = (found.by_column * direction).sum(axis=1)
+    assert np.median(np.abs((ahead - behind) / 2 - exact)) < 1e-4 * np.abs(exact).mean()
+    settings = np.array([setting.value for setting in model.settings])
+    for at, step in enumerate(np.diag([1e-3, 1e-3])):
+        ahead, behind = (model.at(settings + side * step).reading((output,))(x).values[:, 0] for side in (1, -1))
+        slope = found.by_setting[:, at]
+        assert np.median(np.abs((ahead - behind) / 2e-3 - slope)) < 1e-4 * np.abs(slope).mean()
