@@ -1,4 +1,4 @@
-"""Exact derivatives of what is read off the loop of torque against twist: lost motion, backlash, torsional stiffness."""
+"""Exact derivatives of what is read off torque against twist: lost motion, backlash, torsional stiffness."""
 
 from __future__ import annotations
 
