@@ -183,9 +183,9 @@ class Answer(ABC):
         from tolalloc.report.writer import write_document
 
         path = Path(folder)
-        with claimed(path):
-            write_document(self.document, path)
-            self.add_files(path)
+        with claimed(path) as beside:
+            self.add_files(beside)
+            write_document(self.document, beside)
         return path
 
     def __repr__(self) -> str:

@@ -6,6 +6,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import move, rmtree
+from tempfile import mkdtemp
 
 from tolalloc.exceptions import RunFolderError
 
@@ -33,8 +35,10 @@ def require_usable(folder: Path | None) -> None:
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[None]:
-    """Make the folder before anything long runs; if the work inside fails, take it away again.
+def claimed(folder: Path) -> Iterator[Path]:
+    """Give a folder beside the wanted one to fill, which takes its place once the work inside has succeeded.
+
+    The wanted folder is made before anything long runs; if the work fails, nothing of either is left.
 
     Raises
     ------
@@ -45,13 +49,31 @@ def claimed(folder: Path) -> Iterator[None]:
     new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        beside = Path(mkdtemp(prefix=f".{folder.name}-", suffix=".unfinished", dir=folder.absolute().parent))
     except OSError as error:
         raise RunFolderError(
             f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
         ) from None
     try:
-        yield
+        yield beside
+        beside.chmod(0o777 & ~_umask())  # a temporary folder is its owner's alone
+        require_usable(folder)
+        if new:
+            folder.rmdir()
+            beside.rename(folder)
+        else:  # it may be a disk of its own, or where someone stands
+            for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
+                move(path, folder / path.name)
+            beside.rmdir()
     except BaseException:
-        if new and not any(folder.iterdir()):
+        rmtree(beside, ignore_errors=True)
+        if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         raise
+
+
+def _umask() -> int:
+    """Return what this process takes away from the rights of new files, which can be read only by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -66,9 +66,9 @@ def versions() -> dict[str, str]:
 
 
 def write_document(document: Document, folder: Path) -> None:
-    """Write ``report.html``, ``results.xlsx``, ``summary.json``, ``manifest.json``, tables as CSV and figures as PNG.
+    """Write ``report.html``, ``results.xlsx``, ``summary.json``, tables, figures and, last, ``manifest.json``.
 
-    The folder is new or empty.
+    The folder has no such files yet.
     """
     figures = folder / "figures"
     figures.mkdir(parents=True)
