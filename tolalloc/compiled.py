@@ -29,6 +29,13 @@ def is_kept(module: str) -> bool:
     return any(_KEPT.glob(f"*/{module}.*.nbi"))
 
 
+def processor() -> tuple[str, ...]:
+    """Return what tells the processor from others: its kind, name and features, as numba tells what it has kept."""
+    from numba.core.registry import cpu_target
+
+    return tuple(map(str, cpu_target.target_context.codegen().magic_tuple()))
+
+
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
     others = nb.config.CACHE_DIR
     nb.config.CACHE_DIR = str(_KEPT)  # read while decorating only

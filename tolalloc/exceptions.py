@@ -4,7 +4,8 @@ TolallocError                 one sentence for a person; the command line prints
 ├── InputError                a file, a field or an argument holds a value that is not allowed
 ├── UnknownNameError          a name that nothing here carries; the nearest known names are offered
 ├── RunFolderError            the run folder cannot be used without losing what is in it
-└── SolveError                too many samples of a batch failed to be trusted
+├── SolveError                too many samples of a batch failed to be trusted
+└── StoppedError              a person stopped the work; exit code 130
 """
 
 from __future__ import annotations
@@ -71,6 +72,10 @@ class UnknownNameError(TolallocError):
 
 class RunFolderError(TolallocError):
     """The run folder cannot be used without losing what is in it."""
+
+
+class StoppedError(TolallocError):
+    """A person stopped the work."""
 
 
 class SolveError(TolallocError):

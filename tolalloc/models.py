@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from tolalloc.chunks import Mapper
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields, is_number
 
@@ -234,6 +235,10 @@ class Model(ABC):
 
     def observed(self, observe: Observer) -> Model:  # noqa: ARG002
         """Return the model that tells someone the statuses of each chunk; a model may not care."""
+        return self
+
+    def mapped(self, mapper: Mapper) -> Model:  # noqa: ARG002
+        """Return the model whose chunks of samples a mapper solves, as `tolalloc.chunks.map_chunks` takes it."""
         return self
 
     @property

@@ -208,10 +208,11 @@ def test_every_header_of_the_tables_has_a_unit(allocated):
 def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path):
     script = script_with(tmp_path)
     answers, kept = [], tmp_path / "kept.npz"
-    whole = run_with_threads(1, script, "--json", "--out", tmp_path / "whole", "--checkpoint", tmp_path / "other.npz")
+    other = tmp_path / "other.npz"
+    whole = run_with_threads(1, script, "--json", "--fresh", "--out", tmp_path / "whole", "--checkpoint", other)
     assert whole.returncode == 0, whole.stderr
     with subprocess.Popen(
-        command("allocate", script, "--json", "--out", tmp_path / "cut", "--checkpoint", kept),
+        command("allocate", script, "--json", "--fresh", "--out", tmp_path / "cut", "--checkpoint", kept),
         env={**os.environ, "NUMBA_NUM_THREADS": "2"},
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
@@ -221,8 +222,8 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
             time.sleep(0.005)
         process.kill()
     assert kept.exists()
-    again = run_with_threads(2, script, "--json", "--out", tmp_path / "again", "--checkpoint", kept)
-    plain = run_with_threads(2, script, "--json", "--out", tmp_path / "plain")
+    again = run_with_threads(2, script, "--json", "--fresh", "--out", tmp_path / "again", "--checkpoint", kept)
+    plain = run_with_threads(2, script, "--json", "--fresh", "--out", tmp_path / "plain")
     for result in (whole, again, plain):
         assert result.returncode == 0, result.stderr
         answers.append(json.loads(result.stdout)["allocation"])

@@ -22,7 +22,7 @@ from tolalloc.cli.run import allocate, check, rank, run
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
 from tolalloc.cli.whatif import whatif
-from tolalloc.exceptions import InputError, TolallocError, in_short
+from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 
 app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
@@ -73,6 +73,9 @@ def main() -> None:
             app()
         finally:
             sys.stdout.flush()
+    except StoppedError as stop:
+        note(str(stop))
+        raise SystemExit(130) from None  # as a shell counts Ctrl-C
     except TolallocError as error:
         for sentence in str(error).split("\n"):
             note(f"Error: {sentence}")

@@ -10,7 +10,7 @@ import typer
 
 from tolalloc.cli.console import AsJson, UnitProgress, announce_compilation, note, print_json, tell
 from tolalloc.cli.study_script import load_study
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, StoppedError
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ Script = Annotated[Path, typer.Argument(help="Python script that defines study =
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
 Kept = Annotated[
     Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
 ]
@@ -39,18 +40,26 @@ def run(
     seed: Seed = None,
     checkpoint: Kept = None,
     out: Out = None,
+    fresh: Fresh = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
     study = _asked(script, quick, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(study, kinds, out or Path("runs") / study.name, checkpoint, as_json)
+    _run(study, kinds, out or Path("runs") / study.name, checkpoint, fresh=fresh, as_json=as_json)
 
 
-def rank(script: Script, quick: Quick = False, seed: Seed = None, out: Out = None, as_json: AsJson = False) -> None:
+def rank(
+    script: Script,
+    quick: Quick = False,
+    seed: Seed = None,
+    out: Out = None,
+    fresh: Fresh = False,
+    as_json: AsJson = False,
+) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seed)
-    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, as_json)
+    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, fresh=fresh, as_json=as_json)
 
 
 def allocate(
@@ -68,6 +77,7 @@ def allocate(
     seed: Seed = None,
     checkpoint: Kept = None,
     out: Out = None,
+    fresh: Fresh = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
@@ -78,7 +88,8 @@ def allocate(
         own = named(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
-    _run(study, ("allocation",), out or Path("runs") / f"{study.name}-allocate", checkpoint, as_json)
+    folder = out or Path("runs") / f"{study.name}-allocate"
+    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, as_json=as_json)
 
 
 def _asked(script: Path, quick: bool, seed: int | None) -> Study:
@@ -114,17 +125,26 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
     return replace(study, limits={**study.limits, leading: changed})
 
 
-def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, as_json: bool) -> None:
+def _run(
+    study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, *, fresh: bool, as_json: bool
+) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.function_model import FunctionModel
     from tolalloc.study.questions import named
+    from tolalloc.study.runner import kept_beside
     from tolalloc.study.runner import run as run_study
 
     questions = named(kinds, tuple(study.questions), f"study {study.name}")
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
-    with UnitProgress() as progress:
-        found = run_study(study, folder, questions, progress, checkpoint)
+    try:
+        with UnitProgress() as progress:
+            found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh)
+    except KeyboardInterrupt:
+        raise StoppedError(
+            "Stopped: no report was written. The units solved so far are kept in "
+            f"{kept_beside(folder).folder}; the same command goes on from there."
+        ) from None
     note(f"Report: {folder / 'report.html'}")
     if as_json:
         print_json({"folder": str(folder), **found.document.summary})

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
@@ -195,6 +196,10 @@ class ReducerModel(Model):
     def observed(self, observe: Observer) -> ReducerModel:
         """Return the model whose kernel tells someone the statuses of each chunk."""
         return replace(self, kernel=replace(self.kernel, observe=observe))
+
+    def mapped(self, mapper: Mapper) -> ReducerModel:
+        """Return the model whose kernel has its chunks solved by a mapper."""
+        return replace(self, kernel=replace(self.kernel, mapper=mapper))
 
     @property
     def outcomes(self) -> Mapping[int, str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from tolalloc.chunks import Mapper
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Model
@@ -31,9 +32,12 @@ class Prepared:
     ----------
     study
         What was asked for.
+    mapper
+        What solves the model's chunks of samples.
     """
 
     study: Study
+    mapper: Mapper = map
 
     @property
     def place(self) -> str:
@@ -52,7 +56,7 @@ class Prepared:
         """The model at the sources of the drawing."""
         if self.study.model is None:
             raise InputError(f"{self.place}: model is missing; give ta.reducer(...) or ta.model(...).")
-        return self.study.model.bound(self.errors, self.place)
+        return self.study.model.bound(self.errors, self.place).mapped(self.mapper)
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:

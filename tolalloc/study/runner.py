@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tolalloc.kept_units import KeptUnits
 from tolalloc.progress import Progress, RunRecord, Silent
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Document, joined
@@ -64,10 +65,13 @@ def run(
     questions: tuple[Question, ...] = (),
     progress: Progress | None = None,
     checkpoint: Path | None = None,
+    *,
+    fresh: bool = False,
 ) -> Run:
     """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
 
-    Progress and checkpoint are as of `Study.ask`.
+    Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `kept_beside`, and a
+    run that was stopped takes them from there, unless it is to begin afresh.
 
     Raises
     ------
@@ -75,8 +79,8 @@ def run(
         One sentence on what is wrong.
     """
     asked = questions or tuple(study.questions)
-    prepared = Prepared(study=study)
-    with claimed(folder):
+    prepared = Prepared(study=study, mapper=map if fresh else kept_beside(folder).pruned())
+    with claimed(folder) as beside:
         answers = {
             question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
             for question in asked
@@ -84,10 +88,15 @@ def run(
         from tolalloc.report.writer import write_document
 
         document = _document(prepared, answers)
-        write_document(document, folder)
         for answer in answers.values():
-            answer.add_files(folder)
+            answer.add_files(beside)
+        write_document(document, beside)
     return Run(answers=answers, folder=folder, document=document)
+
+
+def kept_beside(folder: Path) -> KeptUnits:
+    """Return where the units of runs into neighbouring folders are kept."""
+    return KeptUnits(folder=folder.absolute().parent / ".tolalloc-units")
 
 
 def _document(prepared: Prepared, answers: dict[str, Answer]) -> Document:

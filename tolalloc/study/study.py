@@ -224,6 +224,8 @@ class Study(NamedFields):
         folder: str | Path | None = None,
         effort: Literal["quick", "full"] | Effort = "full",
         progress: Progress | None = None,
+        *,
+        fresh: bool = False,
     ) -> Run:
         """Ask every question, write one folder with one report, and return the answers.
 
@@ -233,6 +235,8 @@ class Study(NamedFields):
             New or empty folder; ``runs/NAME`` unless given.
         effort, progress
             As of `ask`.
+        fresh
+            Whether units that an earlier or a stopped run has kept beside the folder are solved again.
 
         Raises
         ------
@@ -241,4 +245,4 @@ class Study(NamedFields):
         """
         from tolalloc.study.runner import run
 
-        return run(self.with_effort(effort), Path(folder or Path("runs") / self.name), progress=progress)
+        return run(self.with_effort(effort), Path(folder or Path("runs") / self.name), progress=progress, fresh=fresh)
