@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.studies.command import ROOT
 from tolalloc import kept_units
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -154,6 +157,37 @@ def test_a_full_disk_leaves_no_half_file(model, x, solved, tmp_path, monkeypatch
         model.mapped(KeptUnits(folder=tmp_path)).kernel(x)
     assert not list(tmp_path.iterdir())
     assert solved.chunks == 1
+
+
+WRITTEN = """
+import numpy as np
+import tolalloc as ta
+from tolalloc.kept_units import _digest
+from tolalloc.rv import LOST_MOTION
+
+drawing = ta.drawing("rv20e_baseline")
+model = ta.reducer("rv20e", neglected=("*",)).bound(drawing.errors, "digest")
+alone, chunk = model.kernel.alone, np.zeros((2, 3))
+for solve in (alone._extremes, alone._derivatives, model.reading((LOST_MOTION,)).alone.read):
+    print(_digest(solve, chunk))
+"""
+
+
+def test_every_process_looks_for_the_same_files():
+    """Sets of names come in another order in each process."""
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", WRITTEN],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert said[0] == said[1]
+    assert len(set(said[0].split())) == 3
 
 
 def test_what_a_user_wrote_is_never_kept(tmp_path, monkeypatch):

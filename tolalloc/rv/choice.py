@@ -78,7 +78,7 @@ def bind(
         model=model,
         torque=carried,
         columns=errors.columns,
-        fixed=fixed,
+        fixed=dict(sorted(fixed.items())),  # in one order in every process, as kept units ask for
     )
     if unit:
         unit.errors(model.columns, reducer.modification.deviations)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float, UInt8
 
@@ -29,19 +31,16 @@ def loop_derivatives(
     They take two to four times as long as the output alone: the adjoint of the equilibrium at every angle and torque.
     """
     values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
-
-    def derived(part: Float[np.ndarray, "chunk column"]) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
-        return _derived(kernel.model, output, kernel.errors(part))
-
-    for rows, ((value, slope), worst) in map_chunks(derived, x):
+    for rows, ((value, slope), worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):
         values[rows, 0], slopes[rows], status[rows] = value, slope, worst
         kernel.observe(worst)
     return Evaluation(values=values, status=status.astype(np.uint8)), slopes
 
 
 def _derived(
-    model: EquivalentModel, output: str, errors: Float[np.ndarray, "chunk column"]
+    kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]
 ) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
+    model, errors = kernel.model, kernel.errors(x)
     if output != TORSIONAL_STIFFNESS:
         share = hysteresis.LOST_MOTION if output == LOST_MOTION else hysteresis.BACKLASH
         (width, slope), status = _width(model, errors, share)

@@ -184,13 +184,17 @@ class OutputsResponse:
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its readings does."""
         values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
-        alone = replace(self, kernel=self.kernel.alone)
-        for rows, (answer, worst) in map_chunks(alone.read, x, self.kernel.mapper):
+        for rows, (answer, worst) in map_chunks(self.alone.read, x, self.kernel.mapper):
             values[rows], status[rows] = answer, worst
             self.kernel.observe(worst)
         if self.chosen:
             values = values[:, [self._read.index(name) for name in self.chosen]]
         return Evaluation(values=values, status=status)
+
+    @property
+    def alone(self) -> OutputsResponse:
+        """The response without what must stay in this process."""
+        return replace(self, kernel=self.kernel.alone)
 
     def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
         """Return the outputs of one chunk and the worst status of every sample."""
