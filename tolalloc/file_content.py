@@ -11,6 +11,9 @@ from tolalloc.exceptions import InputError
 LARGEST_FILE = 32 * 2**20
 """Largest file that is read [B]; a million readings of two columns take about 20 MB."""
 
+MOST_COLUMNS, MOST_CELLS = 4000, 2_000_000
+"""Largest table that is read, a million readings of two columns; workbooks have a limit of their own [-]."""
+
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 """Characters that no page, workbook or terminal shows."""
 
@@ -74,3 +77,18 @@ def read_text(path: Path, what: str) -> str:
         sign = f"the control character {found[0]!r}"
         raise InputError(f"{path}: cannot be read as {what} (UTF-8), row {row} holds {sign}; allowed is text.")
     return text
+
+
+def require_believable(path: Path, row: int, columns: int, cells: int) -> None:
+    """Raise if a table is larger than is believed, so that none takes the memory of a machine.
+
+    Raises
+    ------
+    InputError
+        The row in which the columns or the cells so far are too many.
+    """
+    if columns > MOST_COLUMNS or cells > MOST_CELLS:
+        raise InputError(
+            f"{path}, row {row}: the table is too large, with {columns} columns and {cells} cells so far; allowed are "
+            f"{MOST_COLUMNS} columns and {MOST_CELLS} cells."
+        )

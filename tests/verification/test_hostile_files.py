@@ -16,9 +16,10 @@ from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.bench.measurement.readings import load_readings
 from tolalloc.drawings.process_capability import load_process_capabilities
-from tolalloc.drawings.table_file import DATA, require_believable
+from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.file_content import require_believable
 from tolalloc.files import shipped_or_path
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit

@@ -13,14 +13,11 @@ from types import MappingProxyType
 from typing import Literal, TypeVar, get_args, get_origin
 
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.file_content import read_text
+from tolalloc.file_content import read_text, require_believable
 from tolalloc.files import Record, validated
 
 DATA = Path(__file__).parent / "data"
 """Shipped tables."""
-
-MOST_COLUMNS, MOST_CELLS = 4000, 2_000_000
-"""Largest table that is read, a million readings of two columns; workbooks have a limit of their own [-]."""
 
 COST_UNITS = "cost units"
 _CURRENCY = re.compile(r"^([A-Z]{3}|[€$£¥])")
@@ -60,21 +57,6 @@ def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
         raise InputError(f"{path}: the table is empty; a header and rows are needed.")
     width = len(rows[0][1])
     return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
-
-
-def require_believable(path: Path, row: int, columns: int, cells: int) -> None:
-    """Raise if a table is larger than is believed, so that none takes the memory of a machine.
-
-    Raises
-    ------
-    InputError
-        The row in which the columns or the cells so far are too many.
-    """
-    if columns > MOST_COLUMNS or cells > MOST_CELLS:
-        raise InputError(
-            f"{path}, row {row}: the table is too large, with {columns} columns and {cells} cells so far; allowed are "
-            f"{MOST_COLUMNS} columns and {MOST_CELLS} cells."
-        )
 
 
 def _records(path: Path) -> list[NumberedRow]:

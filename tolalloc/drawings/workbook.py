@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-from tolalloc.drawings.table_file import require_believable
 from tolalloc.exceptions import InputError
-from tolalloc.file_content import read_bytes
+from tolalloc.file_content import read_bytes, require_believable
 
 _LARGEST_CONTENT = 16 * 2**20
 """Largest content of a workbook when unpacked, all parts together [B]."""
