@@ -13,6 +13,7 @@ import pytest
 
 from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
+from tolalloc import kept_units
 from tolalloc.cli.console import UnitProgress
 from tolalloc.report import writer
 
@@ -38,16 +39,20 @@ def stopped_after(monkeypatch, units: int) -> None:
     monkeypatch.setattr(UnitProgress, "advance", advanced)
 
 
-def test_ctrl_c_is_a_sentence_that_says_what_is_kept(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("worth", "words"), [(0.0, "the same command goes on from there."), (np.inf, "Nothing was kept.")]
+)
+def test_ctrl_c_is_a_sentence_that_says_what_is_kept(tmp_path, monkeypatch, worth, words):
     script, runs = script_with(tmp_path, asked="fixed_first=False, front=False, what_if=False"), tmp_path / "runs"
+    monkeypatch.setattr(kept_units, "_WORTH", worth)
     stopped_after(monkeypatch, 100)
     result = tolalloc("allocate", script, "--out", runs / "one")
     assert result.returncode == 130
     assert "Traceback" not in result.stderr
     said = " ".join(result.stderr.split())
     assert "Stopped: no report was written." in said
-    assert "the same command goes on from there" in said
-    assert left(runs) <= {KEPT}
+    assert said.endswith(words)
+    assert left(runs) == ({KEPT} if worth == 0.0 else set())
 
 
 @pytest.mark.parametrize("existing", [False, True])

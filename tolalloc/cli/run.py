@@ -141,9 +141,10 @@ def _run(
         with UnitProgress() as progress:
             found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh)
     except KeyboardInterrupt:
+        kept = kept_beside(folder).folder
+        what = f"Solved units are kept in {kept}; the same command goes on from there."
         raise StoppedError(
-            "Stopped: no report was written. The units solved so far are kept in "
-            f"{kept_beside(folder).folder}; the same command goes on from there."
+            f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None
     note(f"Report: {folder / 'report.html'}")
     if as_json:
