@@ -28,6 +28,8 @@ class Section:
         Sheet name → table, units in the headers.
     part
         Title of the report that it comes from; empty where there is one report alone.
+    unfolded
+        Whether its tables stand open however large they are, as a drawing does.
     """
 
     heading: str
@@ -35,6 +37,7 @@ class Section:
     figures: tuple[Figure | HeatMap, ...] = ()
     tables: tuple[tuple[str, pd.DataFrame], ...] = ()
     part: str = ""
+    unfolded: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+BINS = 60
+"""Bins of a histogram [-]."""
 _SHOWN = 0.005
 """A value below is no number in its cell, so that the eye finds those that matter [of the largest]."""
 
@@ -22,7 +24,8 @@ class Series:
     kind
         How it is drawn; ``bars`` are horizontal with one category per entry of x.
     x, y
-        Data; for ``bars`` the categories and the lengths, for ``histogram`` the values alone.
+        Data; for ``bars`` the categories and the lengths, for ``histogram`` the values alone, drawn as shares of their
+        number [%], so that samples of different size can be set against each other.
     low, high
         Ends of the intervals around y of ``bars``, edges of the band around a ``line``.
     """
@@ -72,6 +75,13 @@ class Figure:
     def rows(self) -> int:
         """Number of categories of horizontal bars."""
         return max((len(item.x) for item in self.series if item.kind == "bars"), default=0)
+
+    @property
+    def bins(self) -> tuple[float, float]:
+        """Start and width of the bins that all histograms of the figure share [unit of x]."""
+        values = [float(value) for item in self.series if item.kind == "histogram" for value in item.x]
+        low, high = min(values, default=0.0), max(values, default=1.0)
+        return low, (high - low) / BINS or 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from typing import Any
 import plotly.graph_objects as go
 from matplotlib.figure import Figure as Canvas
 
-from tolalloc.report.figure import Figure, HeatMap, Series
+from tolalloc.report.figure import BINS, Figure, HeatMap, Series
 
 COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
 
@@ -47,7 +47,9 @@ def _draw(axes: Any, figure: Figure, number: int) -> None:
         offset = 0.28 * (number - (len(figure.series) - 1) / 2)
         axes.bar([float(x) + offset for x in item.x], item.y, 0.28, label=item.label, color=colour)
     elif item.kind == "histogram":
-        axes.hist(item.x, bins=60, label=item.label, color=colour, alpha=0.55)
+        start, width = figure.bins
+        edges, share = [start + width * edge for edge in range(BINS + 2)], 100.0 / max(len(item.x), 1)
+        axes.hist(item.x, edges, weights=[share] * len(item.x), label=item.label, color=colour, alpha=0.55)
     else:
         _draw_bars(axes, figure, number)
 
@@ -107,8 +109,9 @@ def _interval(item: Series) -> dict[str, Any] | None:
     }
 
 
-def _add(canvas: go.Figure, item: Series, colour: str) -> None:
+def _add(canvas: go.Figure, figure: Figure, number: int) -> None:
     """Add one set of data by plotly."""
+    item, colour = figure.series[number], COLOURS[number % len(COLOURS)]
     if item.kind == "line":
         canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
         if item.low:
@@ -120,7 +123,11 @@ def _add(canvas: go.Figure, item: Series, colour: str) -> None:
     elif item.kind == "stems":
         canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
     elif item.kind == "histogram":
-        canvas.add_histogram(x=item.x, name=item.label, marker_color=colour, opacity=0.6, nbinsx=80)
+        start, width = figure.bins
+        bins = {"start": start, "end": start + width * (BINS + 1), "size": width}
+        canvas.add_histogram(
+            x=item.x, name=item.label, marker_color=colour, opacity=0.6, xbins=bins, histnorm="percent"
+        )
     else:
         canvas.add_bar(
             y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=_interval(item)
@@ -136,8 +143,8 @@ def as_html(figure: object) -> str:
 @as_html.register
 def _(figure: Figure) -> str:
     canvas = go.Figure()
-    for number, item in enumerate(figure.series):
-        _add(canvas, item, COLOURS[number % len(COLOURS)])
+    for number in range(len(figure.series)):
+        _add(canvas, figure, number)
     # On a logarithmic axis plotly places a line by its value and a text by the logarithm of it.
     for value, name in figure.vertical:
         canvas.add_vline(x=value, line_dash="dash", line_color="#b00020")

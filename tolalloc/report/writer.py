@@ -98,7 +98,10 @@ def _write_page(document: Document, path: Path) -> None:
             "heading": section.heading,
             "paragraphs": section.paragraphs,
             "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
-            "tables": [(name, len(frame), _is_large(frame), html_table(frame)) for name, frame in section.tables],
+            "tables": [
+                (name, len(frame), _is_large(frame) and not section.unfolded, html_table(frame))
+                for name, frame in section.tables
+            ],
         }
         for section in document.sections
     ]

@@ -88,7 +88,7 @@ def sample_figure(answer: RankingAnswer) -> Figure:
         name=answer.spoken.replace("-", "_").replace(" ", "_"),
         title=f"{answer.spoken[0].upper()}{answer.spoken[1:]} of random units at the zones of the tolerance table",
         x_label=answer.leading,
-        y_label="units [-]",
+        y_label="share of the units [%]",
         series=(Series(label="random units", kind="histogram", x=list(answer.sample.values)),),
         vertical=tuple(lines),
     )

@@ -43,7 +43,7 @@ def units_figure(
         name=short(output).replace("-", "_").replace(" ", "_"),
         title=f"Random units before and after; yield after {share:.2%}",
         x_label=output,
-        y_label="units [-]",
+        y_label="share of the units [%]",
         series=(
             Series(label="tolerance table as it is", kind="histogram", x=list(before)),
             Series(label="as drawn", kind="histogram", x=list(after)),

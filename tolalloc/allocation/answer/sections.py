@@ -21,6 +21,7 @@ def sections(answer: AllocationAnswer) -> tuple[Section, ...]:
             heading="What to write on the drawing",
             figures=(zones_figure(answer.drawing_table, "zone [µm]"),),
             tables=(("drawing", answer.drawing_table),),
+            unfolded=True,
             paragraphs=(
                 "allocation.csv beside this report has the layout of the tolerance table and is read back by tolalloc; "
                 "drawing.xlsx goes on calculating: change a zone there and see cost and limits.",

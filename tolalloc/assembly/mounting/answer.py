@@ -147,7 +147,7 @@ class MountingAnswer(Answer):
             name="chance",
             title="Mean peak-to-peak when nobody chooses, and as mounted",
             x_label="mean peak-to-peak over the units [arcsec]",
-            y_label="mountings [-]",
+            y_label="share of the mountings [%]",
             series=(Series(label="random mountings", kind="histogram", x=list(self.chance.means)),),
             vertical=((float(self.found.after.mean()), "as mounted"),),
         )
