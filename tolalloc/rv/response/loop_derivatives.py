@@ -19,7 +19,7 @@ from tolalloc.units import ARCMINUTE
 DIFFERENTIABLE = (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)
 """Outputs that `loop_derivatives` takes."""
 
-Width = tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "sample column"]]
+Width = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"]]
 """Twist between both directions of a torque, mean over the turn, and its derivatives [rad, rad/m]."""
 
 
@@ -53,7 +53,7 @@ def _derived(
 
 
 def _width(
-    model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], share: float
+    model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"], share: float
 ) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
     """Return the width of the loop at a share of the rated torque."""
     torque = share * model.reducer.load.rated_torque
