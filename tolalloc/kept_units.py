@@ -18,6 +18,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
@@ -76,10 +77,14 @@ class KeptUnits:
 
     def pruned(self) -> KeptUnits:
         """Take the oldest files away until the rest is small enough, and return the same."""
-        files = sorted(self.folder.glob(f"*{_ENDING}"), key=lambda path: path.stat().st_mtime, reverse=True)
+        files = list[tuple[float, int, Path]]()
+        for path in self.folder.glob(f"*{_ENDING}"):
+            with suppress(FileNotFoundError):  # another run may take it away at this moment
+                about = path.stat()
+                files.append((about.st_mtime, about.st_size, path))
         size = 0
-        for path in files:
-            size += path.stat().st_size
+        for _, own, path in sorted(files, reverse=True):
+            size += own
             if size > self.largest:
                 path.unlink(missing_ok=True)
         return self
