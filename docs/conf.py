@@ -1,0 +1,50 @@
+"""How Sphinx makes the handbook of these pages: ``sphinx-build -W docs docs/_build``, read without a network."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+
+project = "tolalloc"
+author = "tolalloc maintainers"
+release = version = installed("tolalloc")
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "tutorials"]
+html_theme = "furo"
+html_title = f"tolalloc {release}"
+html_show_copyright = False
+html_show_sourcelink = False
+myst_heading_anchors = 3
+autodoc_member_order = "bysource"
+napoleon_use_rtype = False
+sphinx_gallery_conf = {
+    "examples_dirs": ["tutorials"],
+    "gallery_dirs": ["_made/tutorials"],
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "show_memory": False,
+    "abort_on_example_error": True,
+}
+
+
+def _write_commands(_: Any) -> None:
+    """Write the page of commands, from the program itself."""
+    typer = [sys.executable, "-m", "typer", "tolalloc.cli.main", "utils", "docs", "--name", "tolalloc"]
+    page = HERE / "_made" / "commands.md"
+    page.parent.mkdir(exist_ok=True)
+    subprocess.run([*typer, "--title", "Commands", "--output", str(page)], check=True, stdout=subprocess.DEVNULL)
+
+
+def setup(app: Any) -> None:
+    """Make the pages that no hand writes before Sphinx reads them."""
+    app.connect("builder-inited", _write_commands)
