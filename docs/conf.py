@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from importlib.metadata import version as installed
@@ -33,18 +34,20 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "show_memory": False,
+    "write_computation_times": False,
     "abort_on_example_error": True,
 }
 
 
 def _write_commands(_: Any) -> None:
-    """Write the page of commands, from the program itself."""
+    """Write the page of commands, from the program itself, into a folder that holds nothing of an earlier build."""
     typer = [sys.executable, "-m", "typer", "tolalloc.cli.main", "utils", "docs", "--name", "tolalloc"]
     page = HERE / "_made" / "commands.md"
-    page.parent.mkdir(exist_ok=True)
+    shutil.rmtree(page.parent, ignore_errors=True)
+    page.parent.mkdir()
     subprocess.run([*typer, "--title", "Commands", "--output", str(page)], check=True, stdout=subprocess.DEVNULL)
 
 
 def setup(app: Any) -> None:
     """Make the pages that no hand writes before Sphinx reads them."""
-    app.connect("builder-inited", _write_commands)
+    app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
