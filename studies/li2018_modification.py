@@ -9,7 +9,7 @@ import pandas as pd
 from published.modification_comparison import compared, comparison_document
 
 import tolalloc as ta
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.modification.problem import reference
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
@@ -46,7 +46,7 @@ def build(quick: bool) -> Document:
     """Return the report."""
     reducer = load_reducer("rv40e_xi2015")
     study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE)
-    with UnitProgress("searches") as progress:
+    with shown_progress("searches") as progress:
         found = compared(study, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
     section = Section(
         heading="Closed form",

@@ -22,7 +22,7 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.study import IdentificationStudy, identify
 from tolalloc.bench.measurement.files import Measurements
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -178,7 +178,7 @@ def build(quick: bool) -> Document:
     given, seeds = load_reducer("rv20e_liu2020"), SeedTree(2020)
     true = replace(given, stiffness=replace(given.stiffness, **TRUTH))
     errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
-    with UnitProgress() as progress:
+    with shown_progress() as progress:
         first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
         second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
     document, curves = first.document, second.document

@@ -12,7 +12,7 @@ import pandas as pd
 from published.modification_comparison import algorithms_table, compared, comparison_document, convergence_figure
 
 import tolalloc as ta
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.mesh import flank_angle
@@ -116,7 +116,7 @@ def printed_points() -> pd.DataFrame:
 def build(quick: bool) -> Document:
     """Return the report."""
     own = reducer()
-    with UnitProgress("searches") as progress:
+    with shown_progress("searches") as progress:
         positive, negative = (
             compared(
                 ModificationStudy(method="song2019", radial_clearance=0.0, shift_sign=sign),

@@ -11,7 +11,7 @@ from math import inf
 import pandas as pd
 
 import tolalloc as ta
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.exceptions import InputError
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.multibody.prototype import with_rigid_bearings
@@ -51,7 +51,7 @@ def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
     asked = SimulationStudy(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
-    with UnitProgress("ms") as progress:
+    with shown_progress("ms") as progress:
         return simulate(replace(prepare_simulation(asked), reducer=reducer), progress)
 
 

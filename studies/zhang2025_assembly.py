@@ -21,7 +21,7 @@ from published.zhang2025_sections import (
 import tolalloc as ta
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.study import AssemblyStudy, assemble
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.report.document import Document
 from tolalloc.units import ARCSECOND
 
@@ -42,7 +42,7 @@ def build(quick: bool) -> Document:
         errors=parts_drawn(),
         assemblies=10_000 if quick else 100_000,
     )
-    with UnitProgress("assemblies") as progress:
+    with shown_progress("assemblies") as progress:
         answer = assemble(study, progress)
     document, plan = answer.document, answer.plan
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)

@@ -23,7 +23,7 @@ from kernel_speed import figures, progress, run_benchmark
 from numpy_cores import timed
 
 from tolalloc.blas import one_blas_thread
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import shown_progress
 from tolalloc.compiled import use_threads
 from tolalloc.rv.dynamics.properties import Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
@@ -54,7 +54,7 @@ def prepared(engine: str, step: float) -> PreparedSimulation:
 
 def run(engine: str, step: float) -> SimulationAnswer:
     """Return what an engine says at a time step."""
-    with UnitProgress("ms") as shown:
+    with shown_progress("ms") as shown:
         return simulate(prepared(engine, step), shown)
 
 
@@ -90,7 +90,7 @@ def answer(units: int, rounds: int) -> dict[str, Any]:
         for number in range(rounds):
             one, _ = timed(partial(simulate_model, own.model, own.errors, *given))
             many, _ = timed(partial(simulate_model, own.model, batch, *given))
-            with UnitProgress("ms") as shown:
+            with shown_progress("ms") as shown:
                 prototype = simulate(other, shown).seconds
             for name, value in zip(seconds, (one, many / units, prototype), strict=True):
                 seconds[name].append(value)

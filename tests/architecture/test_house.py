@@ -22,7 +22,6 @@ DOORS = {
     "pymoo": ("allocation/",),
     "cvxpy": ("allocation/",),
     "sklearn": ("surrogate/", "rv/stand_ins.py"),
-    "plotly": ("report/",),
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
     "openpyxl": ("report/", "allocation/answer/", "drawings/workbook.py"),
@@ -33,7 +32,7 @@ DOORS = {
     "typer": ("cli/",),
     "rich": ("cli/",),
 }
-LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
+LATE = ("cvxpy", "sklearn", "pymoo", "pandas")
 """Libraries that are loaded when they are used and not with the package."""
 LATER = ("matplotlib", "numba", "scipy.stats", "scipy.special")
 """Libraries that no help needs either."""

@@ -111,10 +111,12 @@ def test_run_folder_is_complete(run_folder):
 @pytest.mark.slow
 def test_report_works_offline(run_folder):
     page = (run_folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("plotly.js v") == 1
+    assert page.count("class Chart") == 1
+    assert page.count('class="figure"') == page.count("<figure>") > 0
     for outside in ('src="http', "src='http", 'href="http', "cdn."):
-        assert outside not in page.split("</script>", 1)[1]
-    assert "nan" not in page.split("</script>", 1)[1].lower().split("plotly.newplot", 1)[0]
+        assert outside not in page
+    assert ">nan<" not in page.lower()
+    assert len(page) < 1_000_000
 
 
 @pytest.mark.slow

@@ -1,10 +1,11 @@
-"""Tables on a narrow terminal: no number is cut."""
+"""What a terminal and a log show: no number is cut, and progress is seen in both."""
 
 from __future__ import annotations
 
 import pandas as pd
 import pytest
 
+from tolalloc.cli import progress as lines
 from tolalloc.cli.console import print_table
 
 
@@ -27,3 +28,29 @@ def test_no_number_is_cut_however_narrow_the_screen(capsys, monkeypatch, width):
             assert f"{number:.4g}" in said
     assert "…" not in said
     assert all(word in said for word in label.split())
+
+
+def test_a_log_has_a_line_every_few_seconds_and_one_for_each_stage(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(lines.time, "perf_counter", lambda: now[0])
+    with lines.shown_progress() as progress:  # what is captured is no terminal
+        for stage in ("random units", "front"):
+            progress.begin(stage)
+            for _ in range(12):
+                now[0] += 1.0
+                progress.advance(100)
+    assert capsys.readouterr().err.splitlines() == [
+        "random units: so far, 500 units in 5.0 s, 100 units/s",
+        "random units: so far, 1000 units in 10.0 s, 100 units/s",
+        "random units: done, 1200 units in 12.0 s, 100 units/s",
+        "front: so far, 500 units in 5.0 s, 100 units/s",
+        "front: so far, 1000 units in 10.0 s, 100 units/s",
+        "front: done, 1200 units in 12.0 s, 100 units/s",
+    ]
+
+
+def test_a_stage_that_was_stopped_is_not_called_done(capsys):
+    with pytest.raises(KeyboardInterrupt), lines.shown_progress() as progress:
+        progress.begin("front")
+        raise KeyboardInterrupt
+    assert capsys.readouterr().err.startswith("front: stopped, ")

@@ -15,8 +15,9 @@ import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.allocation.answer.calculator import Formula
-from tolalloc.cli.console import UnitProgress, print_table
+from tolalloc.cli.console import print_table
 from tolalloc.cli.main import main
+from tolalloc.cli.progress import Bars, Lines
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.writer import write_csv
@@ -60,9 +61,10 @@ def test_names_are_shown_as_they_are_and_never_as_markup(capsys):
     print_table(pd.DataFrame({"[/a]": ["[/b]" * 8]}), "[red]s[bold].csv")
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("[/a]", "[/b]", "[red]s[bold].csv"))
-    with UnitProgress() as progress:
-        progress.begin("[/c]")
-    assert "[/c]" in capsys.readouterr().err
+    for shown in (Bars("units"), Lines("units")):
+        with shown as progress:
+            progress.begin("[/c]")
+        assert "[/c]" in capsys.readouterr().err
 
 
 def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):

@@ -14,7 +14,7 @@ import pytest
 from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
 from tolalloc import kept_units
-from tolalloc.cli.console import UnitProgress
+from tolalloc.cli.progress import Lines
 from tolalloc.report import writer
 
 COMPARED = ("summary.json", "allocation.csv", "tables/drawing.csv", "tables/front.csv")
@@ -28,15 +28,15 @@ def left(folder: Path) -> set[str]:
 
 def stopped_after(monkeypatch, units: int) -> None:
     """Press Ctrl-C once so many units are done."""
-    done, advance = [0], UnitProgress.advance
+    done, advance = [0], Lines.advance
 
-    def advanced(progress: UnitProgress, count: int) -> None:
+    def advanced(progress: Lines, count: int) -> None:
         done[0] += count
         if done[0] >= units:
             raise KeyboardInterrupt
         advance(progress, count)
 
-    monkeypatch.setattr(UnitProgress, "advance", advanced)
+    monkeypatch.setattr(Lines, "advance", advanced)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from tolalloc.drawings.drawing import Drawing
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
-LATE = ("cvxpy", "sklearn", "pymoo", "plotly", "pandas")
+LATE = ("cvxpy", "sklearn", "pymoo", "pandas")
 DOCUMENTED = (
     "tolalloc",
     *(f"tolalloc.study.{path.stem}" for path in sorted((ROOT / "tolalloc" / "study").glob("*.py"))),

@@ -20,7 +20,7 @@ from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, Tra
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.assembly.trajectory import random_numbers
-from tolalloc.report.plots import as_html
+from tolalloc.report.charts import chart
 from tolalloc.rv.equivalent.line_load import ContactPattern
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import ARCSECOND
@@ -561,7 +561,7 @@ def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured,
                 if pd.api.types.is_numeric_dtype(frame[column]):
                     assert column.endswith("]"), (name, column)
         for figure in section.figures:
-            assert as_html(figure)
+            assert chart(figure)["title"]
     json.dumps(document.summary, allow_nan=False)
 
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from tolalloc.report.charts import chart
 from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.plots import as_html, drawn
+from tolalloc.report.figure import Figure, HeatMap, Series
+from tolalloc.report.plots import drawn
+from tolalloc.report.printing import print_page
 from tolalloc.report.writer import write_document
 
 
@@ -27,9 +32,9 @@ def test_histograms_of_samples_of_any_size_are_shares_in_the_same_bins():
     for bars in (before, after):
         assert sum(bar.get_height() for bar in bars) == pytest.approx(100.0)
     assert [bar.get_x() for bar in before] == [bar.get_x() for bar in after]
-    page = as_html(figure)
-    assert page.count('"histnorm":"percent"') == 2
-    assert page.count('"start":10.0') == 2
+    for own, bars in zip(chart(figure)["series"], (before, after), strict=True):
+        assert own["y"] == pytest.approx([bar.get_height() for bar in bars], rel=1e-5)
+        assert own["x"] == pytest.approx([bar.get_x() for bar in bars], rel=1e-5)
 
 
 @pytest.mark.parametrize("unfolded", [True, False])
@@ -50,3 +55,57 @@ def test_a_long_table_is_folded_unless_it_is_the_drawing(tmp_path, unfolded):
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert ("<details><summary>drawing, 40 rows" in page) is not unfolded
     assert "source 39" in page
+
+
+def _report(folder, rows=60):
+    """Write a report with a wide and a long table and a chart of each kind."""
+    many = pd.DataFrame({f"quantity {column} [µm]": np.arange(rows) + column / 7 for column in range(14)})
+    many.insert(0, "source", [f"crank{row}.journal.eccentricity" for row in range(rows)])
+    bars = Series(label="share", kind="bars", x=["a.b", "c.d"], y=[0.6, 0.2], low=[0.5, 0.1], high=[0.8, 0.4])
+    line = Series(
+        label="unit </script> 1", kind="line", x=list(np.linspace(0, 360, 200)), y=[float("nan"), *range(199)]
+    )
+    heat = HeatMap(name="h", title="Heat", columns=["78"], rows=["a"], x_label="order", label="share", values=[[0.5]])
+    section = Section(
+        heading="What to write on the drawing",
+        figures=(
+            Figure(name="b", title="Bars", x_label="share [-]", series=(bars,)),
+            Figure(name="l", title="Line", x_label="angle [°]", series=(line,)),
+            heat,
+        ),
+        tables=(("drawing", many),),
+        unfolded=True,
+    )
+    document = Document(
+        title="A drawing", subtitle="", answer=("Met.",), warnings=(), sections=(section,), assumptions=(), summary={}
+    )
+    write_document(document, folder)
+    return folder / "report.html"
+
+
+def test_a_rounded_number_says_itself_whole_and_no_text_ends_a_script(tmp_path):
+    page = _report(tmp_path / "report", rows=3).read_text(encoding="utf-8")
+    assert '<td class="number" title="0.142857142857">0.14286</td>' in page
+    assert '<td class="number">2</td>' in page  # whole as it stands
+    assert page.count("</script>") == page.count("<script") == 4
+    assert "\\u003c/script>" in page
+    assert len(page) < 100_000
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    shutil.which("chromium") is None, reason="no browser is installed that prints: apt install chromium"
+)
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_a_printed_report_cuts_no_table_and_draws_its_charts(tmp_path, paper):
+    page = _report(tmp_path / "report")
+    text = page.read_text(encoding="utf-8").replace("@page {", f"@page {{ size: {paper};")
+    page.write_text(text, encoding="utf-8")
+    pdf = print_page(page)
+    said = subprocess.run(["pdftotext", "-layout", pdf, "-"], check=True, capture_output=True, text=True).stdout
+    said = "".join(said.split())
+    for row in (0, 59):
+        assert f"{row + 13 / 7:.5g}" in said  # the last column, which a page cut off
+    assert "drawingnumber" in said
+    for drawn_text in ("a.b", "share[-]", "angle[°]"):
+        assert drawn_text in said

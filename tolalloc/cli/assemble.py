@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
+from tolalloc.cli.progress import shown_progress
 
 
 def assemble(
@@ -32,7 +33,7 @@ def assemble(
     require_usable(out)
     if study.plan.reducer:
         announce_compilation()
-    with UnitProgress("assemblies") as progress:
+    with shown_progress("assemblies") as progress:
         answer = assembled(study, progress)
     write_report(answer, out)
     listed, steps = answer.tables["steps"], []

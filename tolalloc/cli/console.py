@@ -1,23 +1,20 @@
-"""Talking to a person: progress on standard error, answers on standard output, errors in one sentence.
+"""Talking to a person: answers on standard output, errors in one sentence on standard error.
 
-Sentences are printed plainly; rich draws tables and progress, and is imported there.
+Sentences are printed plainly; rich draws tables, and is imported there.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-import time
 from math import isnan
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     import pandas as pd
-    from rich.progress import TaskID
 
     from tolalloc.report.answer import Answer
 
@@ -109,51 +106,3 @@ def write_report(answer: Answer, out: Path | None) -> None:
     """Write the report on an answer into a folder, if one was asked for."""
     if out:
         note(f"Report: {answer.save(out) / 'report.html'}")
-
-
-class UnitProgress:
-    """A line per stage with the number of solved units, or of other things, and their rate."""
-
-    def __init__(self, counted: str = "units") -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-        self._bar = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description:<24}", markup=False),
-            BarColumn(bar_width=24),
-            TextColumn(f"{{task.fields[counted]:>8.0f}} {counted}"),
-            TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),
-            TimeElapsedColumn(),
-            console=Console(stderr=True),
-        )
-        self._task: TaskID | None = None
-        self._began, self._units = 0.0, 0
-
-    def __enter__(self) -> UnitProgress:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._end()
-        self._bar.stop()
-
-    def begin(self, stage: str) -> None:
-        """Begin a stage; the one before is finished."""
-        self._end()
-        self._task = self._bar.add_task(stage, total=None, rate=0.0, counted=0)
-        self._began, self._units = time.perf_counter(), 0
-
-    def advance(self, units: int) -> None:
-        """So many more units are solved."""
-        if self._task is None:
-            return
-        self._units += units
-        rate = self._units / max(time.perf_counter() - self._began, 1e-9)
-        self._bar.update(self._task, counted=self._units, rate=rate)
-
-    def _end(self) -> None:
-        if self._task is not None:
-            self._bar.update(self._task, total=1, completed=1)

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
+from tolalloc.cli.progress import shown_progress
 
 
 def diagnose(
@@ -53,7 +54,7 @@ def diagnose(
     )
     require_usable(out)
     announce_compilation()
-    with UnitProgress("curves") as progress:
+    with shown_progress("curves") as progress:
         answer = diagnose_unit(asked, progress)
     write_report(answer, out)
     tell(answer, as_json, (answer.sources.head(10), f"{curve.stem}: what the gauges would show"))

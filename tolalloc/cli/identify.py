@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, note, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
 from tolalloc.cli.options import ReducerOption, named_reducer
+from tolalloc.cli.progress import shown_progress
 from tolalloc.drawings.table_file import plain_number
 from tolalloc.exceptions import InputError
 
@@ -123,7 +124,7 @@ def _from_units(
         raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
     announce_compilation()
-    with UnitProgress() as progress:
+    with shown_progress() as progress:
         answer = identified(study, measurements, design, progress)
     tables = [(estimates_table(answer), f"{design.name}: {measurements.name}")]
     if answer.choices:

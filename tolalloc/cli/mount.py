@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
 from tolalloc.cli.options import ReducerOption, TestTorqueOption, named_reducer
+from tolalloc.cli.progress import shown_progress
 
 
 def mount(
@@ -29,7 +30,7 @@ def mount(
     study = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
     require_usable(out)
     announce_compilation()
-    with UnitProgress() as progress:
+    with shown_progress() as progress:
         answer = mounted(study, progress)
     write_report(answer, out)
     fittings, units = answer.tables["fittings"], answer.tables["units"]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolalloc.cli.console import AsJson, UnitProgress, announce_compilation, note, print_json, tell
+from tolalloc.cli.console import AsJson, announce_compilation, note, print_json, tell
+from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
 from tolalloc.units import MICROMETRE
@@ -26,6 +27,7 @@ Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide interv
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
+Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report to report.pdf too, by an installed browser.")]
 Kept = Annotated[
     Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
 ]
@@ -41,12 +43,13 @@ def run(
     checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
+    pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
     study = _asked(script, quick, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(study, kinds, out or Path("runs") / study.name, checkpoint, fresh=fresh, as_json=as_json)
+    _run(study, kinds, out or Path("runs") / study.name, checkpoint, fresh=fresh, pdf=pdf, as_json=as_json)
 
 
 def rank(
@@ -55,11 +58,12 @@ def rank(
     seed: Seed = None,
     out: Out = None,
     fresh: Fresh = False,
+    pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seed)
-    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, fresh=fresh, as_json=as_json)
+    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, fresh=fresh, pdf=pdf, as_json=as_json)
 
 
 def allocate(
@@ -78,6 +82,7 @@ def allocate(
     checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
+    pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
@@ -89,7 +94,7 @@ def allocate(
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     folder = out or Path("runs") / f"{study.name}-allocate"
-    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, as_json=as_json)
+    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, pdf=pdf, as_json=as_json)
 
 
 def _asked(script: Path, quick: bool, seed: int | None) -> Study:
@@ -126,19 +131,29 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
 
 
 def _run(
-    study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, *, fresh: bool, as_json: bool
+    study: Study,
+    kinds: tuple[str, ...],
+    folder: Path,
+    checkpoint: Path | None,
+    *,
+    fresh: bool,
+    pdf: bool,
+    as_json: bool,
 ) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.function_model import FunctionModel
+    from tolalloc.report.printing import browser, print_page
     from tolalloc.study.questions import named
     from tolalloc.study.runner import kept_beside
     from tolalloc.study.runner import run as run_study
 
     questions = named(kinds, tuple(study.questions), f"study {study.name}")
+    if pdf:
+        browser()  # before the work rather than after it
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
     try:
-        with UnitProgress() as progress:
+        with shown_progress() as progress:
             found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh)
     except KeyboardInterrupt:
         kept = kept_beside(folder).folder
@@ -147,6 +162,8 @@ def _run(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None
     note(f"Report: {folder / 'report.html'}")
+    if pdf:
+        note(f"Printed: {print_page(folder / 'report.html')}")
     if as_json:
         print_json({"folder": str(folder), **found.document.summary})
         return

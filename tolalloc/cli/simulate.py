@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
+from tolalloc.cli.progress import shown_progress
 
 
 def simulate(
@@ -63,7 +64,7 @@ def simulate(
     prepared = prepare_simulation(asked)
     require_usable(out)
     announce_compilation()
-    with UnitProgress("ms") as progress:
+    with shown_progress("ms") as progress:
         answer = simulated(prepared, progress)
     write_report(answer, out)
     tell(answer, as_json, (answer.steady_table, f"{answer.header.model}: steady part"))

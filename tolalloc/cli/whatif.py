@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, UnitProgress, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
+from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
@@ -30,7 +31,7 @@ def whatif(
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
     question = Difference(zones=dict(_zone(text) for text in zones), units=units)
-    with UnitProgress() as progress:
+    with shown_progress() as progress:
         answer = study.ask(question, study.effort, progress)
     tell(
         answer, as_json, (answer.to_frame("changes"), "What changes"), (answer.to_frame("changed zones"), "Which zones")

@@ -1,19 +1,14 @@
-"""A figure drawn twice: interactive in the page by plotly, as PNG by matplotlib.
-
-A still picture needs no browser on the user's machine, and the page keeps its zoom and hover.
-"""
+"""A figure as a still picture, drawn by matplotlib: no browser is needed for it."""
 
 from __future__ import annotations
 
 from functools import singledispatch
-from math import log10
 from pathlib import Path
 from typing import Any
 
-import plotly.graph_objects as go
 from matplotlib.figure import Figure as Canvas
 
-from tolalloc.report.figure import BINS, Figure, HeatMap, Series
+from tolalloc.report.figure import BINS, Figure, HeatMap
 
 COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
 
@@ -88,117 +83,6 @@ def _(figure: Figure) -> Canvas:
     axes.set_axisbelow(True)
     axes.legend()
     return canvas
-
-
-def _faint(colour: str) -> tuple[int, int, int, float]:
-    """Return red, green, blue and a small opacity of a colour."""
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    return red, green, blue, 0.18
-
-
-def _interval(item: Series) -> dict[str, Any] | None:
-    """Return plotly's error bars around the lengths of bars."""
-    if not item.low:
-        return None
-    return {
-        "type": "data",
-        "symmetric": False,
-        "array": [high - y for y, high in zip(item.y, item.high, strict=True)],
-        "arrayminus": [y - low for y, low in zip(item.y, item.low, strict=True)],
-        "color": "#444444",
-    }
-
-
-def _add(canvas: go.Figure, figure: Figure, number: int) -> None:
-    """Add one set of data by plotly."""
-    item, colour = figure.series[number], COLOURS[number % len(COLOURS)]
-    if item.kind == "line":
-        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="lines", line={"color": colour, "width": 1.4})
-        if item.low:
-            band = {"x": item.x, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-            canvas.add_scatter(y=item.low, **band)
-            canvas.add_scatter(y=item.high, fill="tonexty", fillcolor=f"rgba{_faint(colour)}", **band)
-    elif item.kind == "points":
-        canvas.add_scatter(x=item.x, y=item.y, name=item.label, mode="markers", marker={"color": colour, "size": 10})
-    elif item.kind == "stems":
-        canvas.add_bar(x=item.x, y=item.y, name=item.label, marker_color=colour)
-    elif item.kind == "histogram":
-        start, width = figure.bins
-        bins = {"start": start, "end": start + width * (BINS + 1), "size": width}
-        canvas.add_histogram(
-            x=item.x, name=item.label, marker_color=colour, opacity=0.6, xbins=bins, histnorm="percent"
-        )
-    else:
-        canvas.add_bar(
-            y=item.x, x=item.y, name=item.label, orientation="h", marker_color=colour, error_x=_interval(item)
-        )
-
-
-@singledispatch
-def as_html(figure: object) -> str:
-    """Return a figure as a page fragment; the page itself carries plotly.js once."""
-    raise TypeError(f"{type(figure).__name__} is no figure")
-
-
-@as_html.register
-def _(figure: Figure) -> str:
-    canvas = go.Figure()
-    for number in range(len(figure.series)):
-        _add(canvas, figure, number)
-    # On a logarithmic axis plotly places a line by its value and a text by the logarithm of it.
-    for value, name in figure.vertical:
-        canvas.add_vline(x=value, line_dash="dash", line_color="#b00020")
-        place = log10(value) if figure.logarithmic_x else value
-        canvas.add_annotation(x=place, y=1, yref="paper", text=name, showarrow=False, xanchor="left", yanchor="top")
-    for value, name in figure.horizontal:
-        canvas.add_hline(y=value, line_dash="dash", line_color="#b00020")
-        place = log10(value) if figure.logarithmic else value
-        canvas.add_annotation(x=1, xref="paper", y=place, text=name, showarrow=False, xanchor="right", yanchor="bottom")
-    canvas.update_layout(
-        template="plotly_white",
-        barmode="overlay" if any(item.kind == "histogram" for item in figure.series) else "group",
-        xaxis_title=figure.x_label,
-        yaxis_title=figure.y_label,
-        height=max(420, 24 * figure.rows + 140),
-        # Room for the rows of the legend; the buttons stand beside the picture and not over it.
-        margin={"l": 60, "r": 60, "t": 36 + 20 * (len(figure.series) // 4), "b": 60},
-        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom"},
-        modebar={"orientation": "v"},
-    )
-    if figure.logarithmic:
-        canvas.update_yaxes(type="log", exponentformat="power")
-    if figure.logarithmic_x:
-        canvas.update_xaxes(type="log", exponentformat="power")
-    if figure.equal:
-        canvas.update_yaxes(scaleanchor="x", scaleratio=1)
-    if figure.rows:
-        canvas.update_yaxes(autorange="reversed", automargin=True)
-    return str(canvas.to_html(full_html=False, include_plotlyjs=False))
-
-
-@as_html.register
-def _(figure: HeatMap) -> str:
-    canvas = go.Figure(
-        go.Heatmap(
-            x=[name.replace("\n", "<br>") for name in figure.columns],
-            y=list(figure.rows),
-            z=[list(row) for row in figure.values],
-            text=figure.texts,
-            texttemplate="%{text}",
-            colorscale="Blues",
-            zmin=0.0,
-            colorbar={"title": figure.label},
-            hovertemplate=f"%{{y}}, {figure.x_label} %{{x}}: %{{z:.3f}}<extra></extra>",
-        )
-    )
-    canvas.update_layout(
-        template="plotly_white",
-        xaxis={"title": figure.x_label, "type": "category"},
-        height=max(420, 26 * len(figure.rows) + 140),
-        margin={"l": 60, "r": 30, "t": 30, "b": 60},
-    )
-    canvas.update_yaxes(autorange="reversed", automargin=True)
-    return str(canvas.to_html(full_html=False, include_plotlyjs=False))
 
 
 @drawn.register

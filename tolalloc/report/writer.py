@@ -13,17 +13,20 @@ from typing import Any
 import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup, escape
-from plotly.offline import get_plotlyjs
 
 from tolalloc.compiled import thread_count
 from tolalloc.files import no_formula
+from tolalloc.report.charts import chart
 from tolalloc.report.document import Document
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, HeatMap
-from tolalloc.report.plots import as_html, drawn, save_png
+from tolalloc.report.page import as_json, script, style
+from tolalloc.report.plots import drawn, save_png
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
+_PRINTED = 10
+"""Columns beyond which a table is printed small [-]."""
 _LISTED = 6
 """Sections beyond which a page begins with a list of them [-]."""
 _LIBRARIES = (
@@ -47,9 +50,20 @@ def _is_large(frame: pd.DataFrame) -> bool:
 
 
 def html_table(frame: pd.DataFrame) -> Markup:
-    """Return a frame as an HTML table."""
-    text = frame.map(_number)
-    return Markup(text.to_html(index=False, border=0, classes="data", justify="left"))
+    """Return a frame as an HTML table; a number that is rounded there says itself whole to a pointer."""
+    page = Markup('<table class="data{}"><thead><tr>{}</tr></thead><tbody>{}</tbody></table>')
+    many = " many" if frame.shape[1] > _PRINTED else ""
+    head = Markup("").join(Markup("<th>{}</th>").format(name) for name in frame.columns)
+    rows = (Markup("").join(_html_cell(value) for value in row) for row in frame.itertuples(index=False))
+    return page.format(many, head, Markup("").join(Markup("<tr>{}</tr>").format(row) for row in rows))
+
+
+def _html_cell(value: object) -> Markup:
+    if not isinstance(value, float):
+        return Markup("<td>{}</td>").format(value)
+    text = _number(value)
+    whole = "" if not text or float(text) == value else Markup(' title="{}"').format(f"{value:.12g}")
+    return Markup('<td class="number"{}>{}</td>').format(whole, text)
 
 
 def inline_png(figure: Figure | HeatMap) -> str:
@@ -91,13 +105,13 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
 
 
 def _write_page(document: Document, path: Path) -> None:
-    """Write the page, plotly.js embedded once."""
+    """Write the page, with its style and its script inside."""
     sections = [
         {
             "part": section.part,
             "heading": section.heading,
             "paragraphs": section.paragraphs,
-            "figures": [(figure.title, Markup(as_html(figure))) for figure in section.figures],
+            "figures": [(figure.title, as_json(chart(figure))) for figure in section.figures],
             "tables": [
                 (name, len(frame), _is_large(frame) and not section.unfolded, html_table(frame))
                 for name, frame in section.tables
@@ -109,7 +123,7 @@ def _write_page(document: Document, path: Path) -> None:
     page = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     template = page.get_template("document.html.j2")
     is_long = len(sections) > _LISTED
-    content = template.render(document=document, sections=sections, is_long=is_long, plotly=Markup(get_plotlyjs()))
+    content = template.render(document=document, sections=sections, is_long=is_long, style=style(), script=script())
     path.write_text(content, encoding="utf-8")
 
 
