@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Model, Observer, Setting, SettingDerivatives, unobserved
+from tolalloc.models import Evaluation, Model, Observer, Setting, SettingDerivatives, require_settings, unobserved
 from tolalloc.units import MILLIMETRE
 from tolalloc.user_function import UserFunction, identity
 
@@ -65,6 +65,18 @@ class FunctionModel:
             if not re.fullmatch(r".*\S \[\S.*\]", output):
                 allowed = f"a name with its unit, such as '{output} [mm]', or [-] for a plain number"
                 raise InputError.at(f"model {self.name}", "outputs", output, allowed)
+
+    def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
+        """Return the function with other values of its settings [units of their names].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, or a value outside its bounds.
+        """
+        require_settings(f"model {self.name}", self.settings, settings)
+        changed = (replace(own, value=settings.get(own.name, own.value)) for own in self.settings)
+        return replace(self, settings=tuple(changed))
 
     def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
         """Return the model at the sources of a drawing.

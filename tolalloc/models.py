@@ -7,7 +7,7 @@ rank, judge and allocate.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
@@ -15,13 +15,17 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from tolalloc.chunks import Mapper
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
     from tolalloc.drawings.correlation import CorrelatedSource
     from tolalloc.drawings.error_model import ErrorModel
     from tolalloc.report.document import Section
+    from tolalloc.report.figure import Figure
+
+_ROUNDING = 1e-9
+"""How far a value may stand outside its bounds, as it was computed [unit of the setting]."""
 
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
 """Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
@@ -356,6 +360,13 @@ class Model(ABC):
         """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
         return ()
 
+    def pictured(
+        self,
+        units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]],  # noqa: ARG002
+    ) -> tuple[Figure, ...]:
+        """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
+        return ()
+
 
 @runtime_checkable
 class ModelSource(Protocol):
@@ -375,3 +386,30 @@ class ModelSource(Protocol):
             A source that the model does not have, or an input that nobody gives.
         """
         ...
+
+    def set_to(self, settings: Mapping[str, float]) -> ModelSource:
+        """Return the same at other values of its settings [units of their names].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, or a value outside its bounds.
+        """
+        ...
+
+
+def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, float]) -> None:
+    """Raise unless every wanted value is one of a known setting, within its bounds.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The setting that is not known, or the value that is not allowed.
+    """
+    own = {setting.name: setting for setting in known}
+    for name, value in wanted.items():
+        if name not in own:
+            raise UnknownNameError.among(place, "setting", name, own)
+        if not (is_number(value) and own[name].lower - _ROUNDING <= value <= own[name].upper + _ROUNDING):
+            allowed = f"{own[name].lower:g} to {own[name].upper:g}, the bounds of this setting"
+            raise InputError.at(place, name, value, allowed)

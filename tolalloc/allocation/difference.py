@@ -203,18 +203,15 @@ def difference(
         A pattern that fits no source with a zone, a zone that is not above 0 or that no process holds.
     """
     errors = space.errors
-    wanted = _wanted(errors.active, zones)
-    present = [own.zone for own in errors.active]
-    others = [wanted.get(own.name, own.zone) for own in errors.active]
-    costs = {name: _cheapest(space, name, zone) for name, zone in wanted.items() if name in space.processes}
+    wanted = named_zones(errors.active, zones)
+    changed = repriced(space, wanted)
     outputs = tuple(dict.fromkeys(own.output for own in requirements))
     standard = errors.standard_values(np.concatenate([*seeds.uniform_chunks(units, len(errors.columns))]))
     response, found = model.observed(record.observe).reading(outputs), []
     with record.stage("difference"):
-        for own in (present, others):
-            evaluation = response(errors.deviations(standard, np.array(own)))
+        for own in (errors.active, changed):
+            evaluation = response(errors.deviations(standard, np.array([source.zone for source in own])))
             found.append(np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan))
-    changed = with_zones(errors.active, others, costs)
     pairs = [(old, new) for old, new in zip(errors.active, changed, strict=True) if old.name in wanted]
     return DifferenceAnswer(
         header=replace(header, statuses=record.counts, stages=record.stages),
@@ -228,8 +225,14 @@ def difference(
     )
 
 
-def _wanted(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
-    """Return source → zone [m]; later patterns take over from earlier ones."""
+def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
+    """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        No zone, a pattern that fits no source, a zone that is not above 0.
+    """
     names = [own.name for own in sources]
     found: dict[str, float] = {}
     if not zones:
@@ -242,6 +245,19 @@ def _wanted(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str
             raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
         found |= dict.fromkeys(own, zone * MICROMETRE)
     return found
+
+
+def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:
+    """Return the sources that vary, some at other zones [m] and what these cost by the cheapest process.
+
+    Raises
+    ------
+    InputError
+        A zone that no process holds.
+    """
+    sources = space.errors.active
+    costs = {name: _cheapest(space, name, zone) for name, zone in zones.items() if name in space.processes}
+    return with_zones(sources, [zones.get(own.name, own.zone) for own in sources], costs)
 
 
 def _cheapest(space: DesignSpace, name: str, zone: float) -> float:

@@ -18,6 +18,7 @@ from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
 from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
+from tolalloc.cli.open import open_page
 from tolalloc.cli.run import allocate, check, rank, run
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
@@ -60,6 +61,7 @@ for command in (
     compare,
 ):
     app.command()(command)
+app.command("open")(open_page)
 
 
 def main() -> None:

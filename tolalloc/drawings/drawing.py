@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +92,23 @@ class Drawing:
     def content(self) -> tuple[Any, ...]:
         """What tells it from other drawings wherever its files stand, for the digest of a study; without the costs."""
         return (self.sources, self.correlation)
+
+    def with_table(self, table: str | Path) -> Drawing:
+        """Return the drawing at the zones of another tolerance table, with the same correlations and process costs.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            The file, row, field and value that are not allowed.
+        """
+        return self.with_sources(load_tolerance_table(found_from_here(table)), str(table))
+
+    def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
+        """Return the drawing with some of its sources changed, with the same correlations and process costs."""
+        known = {source.name: source for source in self.sources}
+        sources = tuple((known | {source.name: source for source in changed}).values())
+        errors = replace(self.errors, sources=sources)
+        return replace(self, name=name or self.name, errors=errors)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the tolerance table, units in the headers."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,12 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import neglected_columns
 from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
+from tolalloc.models import require_settings
 from tolalloc.named_fields import is_number
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
@@ -133,6 +134,24 @@ class ReducerChoice:
     def name(self) -> str:
         """The reducer's."""
         return self.reducer.name
+
+    def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
+        """Return the reducer with a tooth modification that leaves other clearances [µm].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, or a clearance outside its bounds.
+        """
+        from tolalloc.rv.model import clearance_settings
+
+        own, stage = self.reducer.modification, self.reducer.cycloid_stage
+        present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+        known = clearance_settings(present, (self.flank_clearance, self.radial_clearance))
+        require_settings(f"reducer {self.name}", known, settings)
+        flank, radial = (settings.get(setting.name, setting.value) * MICROMETRE for setting in known)
+        modification = Modification.from_clearances(flank, radial, stage)
+        return replace(self, reducer=replace(self.reducer, modification=modification))
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
         """Return the model at the sources of a drawing; nothing is solved.

@@ -51,6 +51,12 @@ def illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
     )
 
 
+def pictured(model: ReducerModel, units: Units) -> tuple[Figure, Figure]:
+    """Return the curves and the orders of units."""
+    curves = _curves(model, units)
+    return _curve_figure(curves, model.kernel.torque), _order_figure(curves, model.reducer)
+
+
 def _curves(model: ReducerModel, units: Units) -> dict[str, Equilibria]:
     """Return the curve of every unit."""
     kernel, curves = model.kernel, {}

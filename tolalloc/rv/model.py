@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
 from tolalloc.report.document import Section
+from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES
@@ -117,17 +118,8 @@ class ReducerModel(Model):
     @property
     def settings(self) -> tuple[Setting, ...]:
         """Flank and radial clearance."""
-        bounds = (self.flank, self.radial)
-        return tuple(
-            Setting(
-                name=name,
-                value=value,
-                lower=own[0] / MICROMETRE if own else value,
-                upper=own[1] / MICROMETRE if own else value,
-                step=_STEP,
-            )
-            for name, value, own in zip((FLANK, RADIAL), self._clearances, bounds, strict=True)
-        )
+        bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in (self.flank, self.radial))
+        return clearance_settings(self._clearances, bounds)
 
     @property
     def _clearances(self) -> tuple[float, float]:
@@ -252,6 +244,14 @@ class ReducerModel(Model):
         from tolalloc.rv.illustration import illustrated
 
         return illustrated(self, units)
+
+    def pictured(
+        self, units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
+    ) -> tuple[Figure, ...]:
+        """Return curves and orders of units."""
+        from tolalloc.rv.illustration import pictured
+
+        return pictured(self, units)
 
     @property
     def content(self) -> Any:
@@ -378,3 +378,13 @@ class ReducerModel(Model):
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
         _, far = against_catalogue(self.reducer, self._exact_loop)
         return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)
+
+
+def clearance_settings(
+    present: tuple[float, float], bounds: Iterable[tuple[float, float] | None]
+) -> tuple[Setting, ...]:
+    """Return flank and radial clearance as settings [µm]; without bounds one is locked at its present value."""
+    return tuple(
+        Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
+        for name, value, own in zip((FLANK, RADIAL), present, bounds, strict=True)
+    )

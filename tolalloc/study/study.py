@@ -181,6 +181,32 @@ class Study(NamedFields):
         chosen = _effort(effort, self.effort, f"study {self.name}") if isinstance(effort, str) else effort
         return replace(self, effort=chosen)
 
+    def changed(
+        self, drawing: Drawing | str | Path, settings: Mapping[str, float] | None = None, name: str = ""
+    ) -> Study:
+        """Return the study at another drawing, and at other values of the model's settings.
+
+        Parameters
+        ----------
+        drawing
+            Another drawing, or the path of a tolerance table whose zones the present one takes; its correlations and
+            process costs stay.
+        settings
+            Setting → its value [unit of its name], such as ``{"flank clearance [µm]": 2.0}``.
+        name
+            Name of the new study; that of this one unless given.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A table that cannot be read, a setting that the model does not have, a value outside its bounds.
+        """
+        if self.drawing is None or self.model is None:
+            raise InputError(f"study {self.name}: it has no {'drawing' if self.model else 'model'} that could change.")
+        model = self.model.set_to(settings) if settings else self.model
+        other = self.drawing.with_table(drawing) if isinstance(drawing, str | Path) else drawing
+        return replace(self, model=model, drawing=other, name=name or self.name)
+
     def ask(
         self,
         question: Question | str,

@@ -1,0 +1,67 @@
+"""A design that somebody tries: zones and settings, read from what a page sends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models import require_settings
+from tolalloc.named_fields import is_number
+from tolalloc.study.prepared import Prepared
+from tolalloc.units import MICROMETRE
+
+_LARGEST = 1e6
+"""Zone that is no slip of the hand any more [µm]."""
+
+
+@dataclass(frozen=True)
+class LiveDesign:
+    """Zones that differ from the drawing's, and the values of the model's settings.
+
+    Parameters
+    ----------
+    zones
+        Source and its zone [m], by name.
+    settings
+        Values of all settings, in the model's order [units of their names].
+    """
+
+    zones: tuple[tuple[str, float], ...]
+    settings: tuple[float, ...]
+
+    @classmethod
+    def read(cls, sent: Any, prepared: Prepared) -> LiveDesign:
+        """Return the design of a record ``{"zones": {source: µm}, "settings": {name: value}}``.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            What is no such record, a source or setting that the study does not have, a value that is not allowed.
+        """
+        zones, settings = (_numbers(sent, key) for key in ("zones", "settings"))
+        present = {own.name: own.zone for own in prepared.errors.active}
+        for name, zone in zones.items():
+            if name not in present:
+                raise UnknownNameError.among("page", "source", name, present)
+            if not 0 < zone < _LARGEST:
+                raise InputError.at("page", name, zone, "a zone above 0 and below 1 m, in µm")
+        # A zone that the drawing has is said by the drawing, so that no bit of it depends on the way to the page.
+        told = {name: zone * MICROMETRE for name, zone in zones.items() if zone != shown_zone(present[name])}
+        require_settings("page", prepared.model.settings, settings)
+        values = tuple(float(settings.get(own.name, own.value)) for own in prepared.model.settings)
+        return cls(zones=tuple(sorted(told.items())), settings=values)
+
+
+def shown_zone(zone: float) -> float:
+    """Return a zone as the page shows it [m → µm]."""
+    return float(f"{zone / MICROMETRE:.9g}")
+
+
+def _numbers(sent: Any, key: str) -> Mapping[str, float]:
+    """Return a record of numbers inside a record, empty where there is none."""
+    found = sent.get(key, {}) if isinstance(sent, dict) else None
+    if not isinstance(found, dict) or not all(is_number(value) for value in found.values()):
+        raise InputError.at("page", key, found, "names with their numbers")
+    return found

@@ -1,0 +1,197 @@
+"""What the page asks of a study: price and curve at once, then the yield of more and more of the same random units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.allocation.difference import repriced
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.requirement import Requirement
+from tolalloc.capability.indices import quantile_interval
+from tolalloc.capability.monte_carlo import proportion
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.exceptions import InputError
+from tolalloc.live.design import LiveDesign, shown_zone
+from tolalloc.report.charts import numbers, shares
+from tolalloc.report.figure import BINS
+from tolalloc.report.wording import short, unit_of
+from tolalloc.study.prepared import Prepared
+from tolalloc.units import MICROMETRE
+
+CHUNK = 256
+"""Units that are solved between two looks whether somebody still wants them [-]."""
+MOST = 6144
+"""Most units of one design [-]."""
+_USUAL = 0.9973
+_REMEMBERED = 24
+"""Designs whose solved units are remembered [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """A study that is open.
+
+    Every design is tried on the random units that ``tolalloc whatif`` takes, so that the page and the command say the
+    same.
+    """
+
+    prepared: Prepared
+    _known: dict[LiveDesign, Float[np.ndarray, "unit output"]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    @cached_property
+    def _standard(self) -> Float[np.ndarray, "unit column"]:
+        """Random units per unit of their zones."""
+        errors = self.prepared.errors
+        seeds = SeedTree(self.prepared.study.seed).child("difference")
+        return errors.standard_values(np.concatenate([*seeds.uniform_chunks(MOST, len(errors.columns))]))
+
+    @property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the study limits, the leading output first."""
+        return self.prepared.requirements
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the limited outputs."""
+        return tuple(dict.fromkeys(own.output for own in self.requirements))
+
+    def sources(self, design: LiveDesign) -> tuple[Source, ...]:
+        """Return the sources that vary, at the zones of a design and with their costs.
+
+        Raises
+        ------
+        InputError
+            A zone that no process holds.
+        """
+        return repriced(self.prepared.space, dict(design.zones))
+
+    def deviations(self, design: LiveDesign, units: slice) -> Float[np.ndarray, "unit column"]:
+        """Return the deviations of random units [m, angles rad]."""
+        zones = np.array([own.zone for own in self.sources(design)])
+        return self.prepared.errors.deviations(self._standard[units], zones)
+
+    def priced(self, design: LiveDesign) -> dict[str, Any]:
+        """Return the cost of a design and of each of its sources [cost units]."""
+        sources = self.sources(design)
+        return {
+            "cost": sum(own.cost for own in sources),
+            "before": sum(own.cost for own in self.prepared.errors.active),
+            "costs": {own.name: own.cost for own in sources},
+        }
+
+    def units(self, design: LiveDesign, count: int, wanted: Callable[[], bool]) -> dict[str, Any] | None:
+        """Return what random units of a design say; nothing if they are not wanted any more.
+
+        Raises
+        ------
+        InputError
+            A number of units that is none.
+        """
+        if not (type(count) is int and 1 <= count <= MOST):
+            raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
+        values = self._solved(design, count, wanted)
+        return None if values is None else self.judged(values[:count])
+
+    def _solved(
+        self, design: LiveDesign, count: int, wanted: Callable[[], bool]
+    ) -> Float[np.ndarray, "unit output"] | None:
+        """Return the outputs of the first units, of which those that are known are not solved again."""
+        with self._lock:
+            values = self._known.get(design, np.empty((0, len(self.outputs))))
+        response = self.prepared.model.at(np.array(design.settings)).reading(self.outputs)
+        while len(values) < count:
+            if not wanted():
+                return None
+            evaluation = response(self.deviations(design, slice(len(values), min(len(values) + CHUNK, count))))
+            good = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
+            values = np.concatenate([values, good])
+        with self._lock:
+            self._known.pop(design, None)
+            self._known[design] = values
+            while len(self._known) > _REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+        return values
+
+    def judged(self, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
+        """Return the yield of all limits, and of each output its quantile, its share and its histogram."""
+        kept = np.all([own.limits.kept_by(self._of(own, values)) for own in self.requirements], axis=0)
+        found = proportion(len(values), int(np.count_nonzero(~kept)))
+        return {
+            "units": len(values),
+            "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
+            "yield": [found.estimate, found.low, found.high],
+            "target": self.prepared.target,
+            "outputs": [self._output(own, self._of(own, values), kept) for own in self.requirements],
+        }
+
+    def _of(self, requirement: Requirement, values: Float[np.ndarray, "unit output"]) -> Float[np.ndarray, " unit"]:
+        return values[:, self.outputs.index(requirement.output)]
+
+    def _output(
+        self, requirement: Requirement, values: Float[np.ndarray, " unit"], kept: Bool[np.ndarray, " unit"]
+    ) -> dict[str, Any]:
+        limits, known = requirement.limits, values[np.isfinite(values)]
+        target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
+        share = target if limits.upper is not None else 1 - target
+        inside = proportion(len(values), int(np.count_nonzero(~limits.kept_by(values))))
+        low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+        found = quantile_interval(known, share) if known.size else None
+        order = np.argsort(np.where(np.isfinite(values), values, -np.inf))
+        return {
+            "name": short(requirement.output),
+            "output": requirement.output,
+            "unit": unit_of(requirement.output),
+            "lower": limits.lower,
+            "upper": limits.upper,
+            "share": share,
+            "quantile": float(np.quantile(known, share)) if known.size else None,
+            "interval": numbers([found.low, found.high]) if found else [None, None],
+            "inside": [inside.estimate, inside.low, inside.high],
+            "histogram": shares(known, low, (high - low) / BINS or 1.0),
+            "worst": int(order[-1]) + 1,
+            "median": int(order[len(order) // 2]) + 1,
+            "reject": int(np.flatnonzero(~kept)[0]) + 1 if not kept.all() else None,
+        }
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What the page shows before anything is solved: sources, settings, limits."""
+        study, model = self.prepared.study, self.prepared.model
+        return {
+            "name": study.name,
+            "model": model.name,
+            "seed": study.seed,
+            "most": MOST,
+            "chunk": CHUNK,
+            "conditions": [f"{name} {value}" for name, value in model.conditions.items()],
+            "settings_word": model.settings_word,
+            "sources": [_described(own) for own in self.prepared.errors.active],
+            "settings": [
+                {"name": own.name, "value": own.value, "lower": own.lower, "upper": own.upper} for own in model.settings
+            ],
+            "limits": [own.sentence for own in self.requirements],
+        }
+
+
+def _described(source: Source) -> dict[str, Any]:
+    return {
+        "name": source.name,
+        "part": source.part,
+        "feature": source.feature.value,
+        "meaning": source.feature.zone_meaning,
+        "zone": shown_zone(source.zone),
+        "lower": source.minimum / MICROMETRE,
+        "upper": source.maximum / MICROMETRE,
+        "group": source.group or source.name,
+        "locked": source.locked,
+        "cost": source.cost,
+    }
