@@ -1,0 +1,94 @@
+"""How large every part is drawn: what the reducer states, and by one rule what it leaves open."""
+
+from __future__ import annotations
+
+from math import pi, sin
+from typing import Any
+
+import numpy as np
+
+from tolalloc.rv.cycloid.mesh import normals
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.rolling_bearing import RollingBearing
+from tolalloc.units import MILLIMETRE
+
+_BORE, _JOURNAL = 0.155, 0.103
+"""Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
+_HOUSING, _LAND = 1.17, 0.05
+"""Outer radius of the ring of pins, and least material between drawn features, both over that of the pin circle."""
+_POINTS = 12
+"""Points of a flank, root and tip included [-]."""
+
+
+def outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
+    stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
+    circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
+    root = stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
+    land = _LAND * circle
+    room = min(crank_circle * sin(pi / reducer.crank_count), root - crank_circle, crank_circle) - land
+    journal, bore = _rings(dimensions.crank_disc_bearing, room, circle)
+    shaft, carrier_bore = _rings(dimensions.crank_carrier_bearing, room, circle)
+    lengths = {
+        "pin_circle_radius": circle,
+        "pin_radius": stage.pin_radius,
+        "eccentricity": stage.eccentricity,
+        "crank_circle_radius": crank_circle,
+        "module": first.module,
+        "bore_radius": bore,
+        "journal_radius": journal,
+        "carrier_bore_radius": carrier_bore,
+        "shaft_radius": min(shaft, max(journal - stage.eccentricity, 0.4 * journal)),
+        "disc_hole_radius": max(min(crank_circle - bore - land, 0.3 * circle), 0.2 * land),
+        "carrier_radius": min(crank_circle + carrier_bore + land, root - stage.eccentricity),
+        "housing_radius": _HOUSING * circle + stage.pin_radius,
+    }
+    counts = {
+        "crank_count": reducer.crank_count,
+        "disc_count": reducer.disc_count,
+        "pin_count": stage.pin_count,
+        "disc_teeth": stage.disc_teeth,
+        "sun_teeth": first.sun_teeth,
+        "planet_teeth": first.planet_teeth,
+        "pressure_angle": first.pressure_angle,
+    }
+    stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
+    open_names = [name for name, known in stated.items() if not known]
+    assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
+    return {name: length / MILLIMETRE for name, length in lengths.items()} | counts, (assumed,)
+
+
+def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[float, float]:
+    """Return the radii of the inner and the outer raceway, at most as large as there is room [m]."""
+    inner, outer = _JOURNAL * circle, _BORE * circle
+    if bearing is not None:
+        inner, outer = ((bearing.pitch_diameter + sign * bearing.diameter) / 2 for sign in (-1.0, 1.0))
+    shrunk = min(1.0, room / outer)
+    return inner * shrunk, outer * shrunk
+
+
+def tooth(reducer: Reducer) -> dict[str, list[Any]]:
+    """Return one tooth space of a disc, counter-clockwise from tip to tip about its root at angle 0.
+
+    ``exact`` and ``modified`` are points of the profile without and with the tooth modification [mm], ``normal`` the
+    unit vector into the disc [-], ``angle`` φ of the pin that grinds the point [rad]; the last point is left out, as it
+    is the next space's first.
+    """
+    stage, flank = reducer.cycloid_stage, np.linspace(0.0, pi, _POINTS)
+    exact, modified = ToothProfile(stage=stage), ToothProfile(stage=stage, modification=reducer.modification)
+
+    def around(flank_values: np.ndarray) -> list[list[float]]:
+        # The flank turns clockwise from the root; the other one is its mirror image.
+        return np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1].tolist()
+
+    angle = np.concatenate([flank[::-1], flank[1:]])[:-1]
+    into = normals(stage.shortening, angle)
+    removed = reducer.modification.equidistant - reducer.modification.shift * into.along_radius
+    return {
+        "exact": around(exact.points(flank) / MILLIMETRE),
+        "modified": around(modified.points(flank) / MILLIMETRE),
+        "normal": around(exact.normals(flank)),
+        "angle": angle.tolist(),
+        "removed": (removed / MILLIMETRE).tolist(),
+    }
