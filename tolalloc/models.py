@@ -367,6 +367,16 @@ class Model(ABC):
         """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
         return ()
 
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+        sources: tuple[str, ...],  # noqa: ARG002
+    ) -> dict[str, Any] | None:
+        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one."""
+        return None
+
 
 @runtime_checkable
 class ModelSource(Protocol):

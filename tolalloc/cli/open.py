@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import webbrowser
-from typing import Annotated
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tolalloc.cli.console import announce_compilation, note
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
+from tolalloc.exceptions import InputError
+
+if TYPE_CHECKING:
+    from tolalloc.live.address import Address
+    from tolalloc.live.desk import Desk
+    from tolalloc.live.server import LiveServer
 
 
 def open_page(
@@ -19,8 +26,8 @@ def open_page(
 ) -> None:
     """Open the live page of a study: move a zone, see cost, curve and yield of the real model."""
     from tolalloc.function_model import FunctionModel
+    from tolalloc.live.address import Address
     from tolalloc.live.desk import Desk
-    from tolalloc.live.server import LiveServer
     from tolalloc.live.session import Session
     from tolalloc.study.prepared import Prepared
 
@@ -29,7 +36,9 @@ def open_page(
     _ = session.requirements  # what is wrong with the study is said before a page opens
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
-    server = LiveServer(desk=Desk(session=session, script=script.resolve()), port=port)
+    place = script.resolve()
+    server = _server(Desk(session=session, script=place), Address.of(place), port)
+    Address(port=server.http.server_port, token=server.token).keep(place)
     typer.echo(f"Open {server.address}")
     note("The page is for this machine alone. Ctrl-C ends it.", dim=True)
     if browser:
@@ -41,3 +50,15 @@ def open_page(
     finally:
         server.desk.stop()
         server.http.server_close()
+
+
+def _server(desk: Desk, last: Address, port: int) -> LiveServer:
+    """Return the server at the port that is asked for, at that of last time, or where that is taken at a free one."""
+    from tolalloc.live.server import LiveServer
+
+    if not port and last.port:
+        with suppress(InputError):
+            server = LiveServer(desk=desk, port=last.port, token=last.token)
+            _ = server.http
+            return server
+    return LiveServer(desk=desk, port=port, token=last.token)

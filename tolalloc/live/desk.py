@@ -36,6 +36,7 @@ class Desk:
             "study": lambda _: self.session.described,
             "design": self._design,
             "units": self._units,
+            "scene": self._scene,
             "sweep": self._sweep,
             "save": self._save,
             "ask": self._ask,
@@ -72,6 +73,9 @@ class Desk:
     def _units(self, sent: dict[str, Any]) -> dict[str, Any]:
         wanted = self._newest(sent)
         return self.session.units(self._read(sent), sent.get("units", 256), wanted) or {"called off": True}
+
+    def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
+        return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0))
 
     def _sweep(self, sent: dict[str, Any]) -> dict[str, Any]:
         return LiveUnits(session=self.session).swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))

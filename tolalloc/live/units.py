@@ -47,6 +47,21 @@ class LiveUnits:
             "figures": [chart(figure) for figure in figures],
         }
 
+    def scene(self, design: LiveDesign, number: int) -> dict[str, Any]:
+        """Return a unit as a moving picture needs it; nothing where the model has none.
+
+        Raises
+        ------
+        InputError
+            There is no such unit.
+        SolveError
+            It does not come to rest somewhere.
+        """
+        names = tuple(own.name for own in self.session.prepared.errors.active)
+        x = self._columns(design, number)
+        label = f"unit {number}" if number else "exact parts"
+        return {"scene": self.session.prepared.model.scene(np.array(design.settings), x, label, names)}
+
     def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
         """Return the leading output of a unit while one of its errors goes from one end of its zone to the other.
 

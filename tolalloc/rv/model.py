@@ -253,6 +253,26 @@ class ReducerModel(Model):
 
         return pictured(self, units)
 
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],
+        x: Float[np.ndarray, " column"],
+        unit: str,
+        sources: tuple[str, ...],
+    ) -> dict[str, Any]:
+        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once.
+
+        Raises
+        ------
+        SolveError
+            An angle without equilibrium.
+        """
+        from tolalloc.rv.scene.scene import scene_of
+
+        kernel = self.at(settings).kernel
+        errors = kernel.errors(x[np.newaxis])[0]
+        return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=sources).record(coarse=True)
+
     @property
     def content(self) -> Any:
         """Reducer, identified stiffnesses and torque."""

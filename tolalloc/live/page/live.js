@@ -2,6 +2,7 @@
 
 import { Chart, number } from "./chart.js";
 import { Designs } from "./designs.js";
+import { Mechanism } from "./mechanism.js";
 import { Zones, make } from "./zones.js";
 
 const token = new URLSearchParams(location.search).get("token");
@@ -9,6 +10,7 @@ const tab = crypto.randomUUID();
 const at = (id) => document.getElementById(id);
 const REST = 350; // ms after which a hand rests and more units are asked for
 
+let mechanism = null, pictured = "";
 let turn = 0, study, zones, designs, drawn = null, judged = null, busy = false, waiting = false, resting = null;
 const history = { past: [], future: [], now: null };
 const charts = new Map();
@@ -80,6 +82,7 @@ async function count(units, record) {
 // More and more of the same units while the hand rests.
 async function more() {
   const mine = turn, record = { design: zones.design, turn };
+  await picture();
   for (const units of [1024, study.most]) {
     if (turn !== mine || busy) return;
     try {
@@ -89,6 +92,37 @@ async function more() {
       throw error;
     }
   }
+}
+
+// The moving picture follows once the hand rests: it needs every angle in both directions.
+async function picture() {
+  const record = { design: zones.design, unit: Number(at("unit").value) }, key = JSON.stringify(record);
+  if (key === pictured || !at("moving").open || at("moving").dataset.none) return;
+  try {
+    const { scene } = await ask("scene", record);
+    pictured = key;
+    at("moving").hidden = !scene;
+    if (!scene) return void (at("moving").dataset.none = "yes");
+    if (mechanism) mechanism.update(scene);
+    else mechanism = new Mechanism(at("mechanism"), scene, { onPoint: (id) => zones.light(sourcesAt(id)), onChoose: (id) => goTo(sourcesAt(id)) });
+    shade();
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+  }
+}
+
+const sourcesAt = (id) => mechanism?.scene.places.find((place) => place.id === id)?.sources ?? [];
+
+function goTo([source]) {
+  const own = study.sources.find((item) => item.name === source);
+  if (own) zones.rows.get(own.group)?.scrollIntoView({ block: "center" });
+}
+
+// Places take the colour of what their sources contribute, as far as a ranking has said it.
+function shade() {
+  if (!mechanism || !zones.shares) return;
+  const most = Math.max(...Object.values(zones.shares), 1e-9);
+  mechanism.shade(Object.fromEntries(mechanism.scene.places.map((place) => [place.id, place.sources.reduce((sum, own) => sum + (zones.shares[own] ?? 0), 0) / most])));
 }
 
 function showDesign() {
@@ -206,7 +240,10 @@ async function question(kind) {
   said.textContent = `${kind}, asked at the quick effort, took ${state.seconds} s.`;
   at("found").replaceChildren(...state.answer.sentences.map((text) => make("p", {}, text)), ...state.answer.warnings.map((text) => make("p", { class: "warning" }, text)));
   if (state.answer.figure) draw("found", at("found"), state.answer.figure);
-  if (state.answer.shares) zones.show(undefined, state.answer.shares);
+  if (state.answer.shares) {
+    zones.show(undefined, state.answer.shares);
+    shade();
+  }
   if (state.answer.zones) at("found").prepend(make("button", { onclick: () => take({ zones: unlocked(state.answer.zones), settings: { ...zones.design.settings, ...state.answer.settings } }) }, "Take this drawing"));
 }
 
@@ -241,7 +278,7 @@ async function begin() {
       look();
     },
     effect,
-    point: () => {},
+    point: (names) => mechanism?.light(mechanism.scene.places.filter((place) => place.sources.some((own) => names.includes(own))).map((place) => place.id)),
   });
   history.now = zones.design;
   at("unit").max = study.most;

@@ -87,7 +87,7 @@ export class Zones {
       field.value = rounded(zone);
       slider.value = Math.round(place(zone));
       const held = this.locked.has(group);
-      lock.textContent = held ? "🔒" : "🔓";
+      lock.textContent = held ? "locked" : "lock";
       lock.setAttribute("aria-pressed", held);
       for (const input of [field, slider, ...(row.fields ?? []).map(([, own]) => own)]) input.disabled = held;
       (row.fields ?? []).forEach(([own, input]) => (input.value = rounded(this.zone(own.name))));

@@ -143,8 +143,8 @@ export class Chart {
     let [xl, xh] = this.zoom ?? padded(range(extent(figure, "x")), 0.02, figure.logarithmic_x);
     const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);
     let [yl, yh] = padded(range(positive(extent(figure, "y"), figure.logarithmic)), 0.05, figure.logarithmic);
-    const left = 14 + LETTER * Math.max(...new Axis(yl, yh, 1, 0, figure.logarithmic).ticks(5).map((v) => number(v).length), 3) + 16;
-    const right = 12, top = 14, bottom = 44;
+    const left = LETTER * Math.max(...new Axis(yl, yh, 1, 0, figure.logarithmic).ticks(5).map((v) => number(v).length), 3) + 16;
+    const right = 12, top = 24, bottom = 44;
     if (figure.equal) {
       const per = Math.max((xh - xl) / (this.width - left - right), (yh - yl) / (height - top - bottom));
       const wide = (per * (this.width - left - right) - (xh - xl)) / 2, tall = (per * (height - top - bottom) - (yh - yl)) / 2;
@@ -177,8 +177,7 @@ export class Chart {
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - bottom + 16, "text-anchor": "middle" }, number(value)));
     }
     svg.append(node("text", { class: "label", x: (left + this.width - right) / 2, y: height - 8, "text-anchor": "middle" }, figure.x_label));
-    const middle = (top + height - bottom) / 2;
-    svg.append(node("text", { class: "label", x: 12, y: middle, "text-anchor": "middle", transform: `rotate(-90 12 ${middle})` }, figure.y_label ?? ""));
+    svg.append(node("text", { class: "label", x: 4, y: 12 }, figure.y_label ?? "")); // above its axis, where it is read without turning
   }
 
   series(inside, item, place, x, y) {
