@@ -29,6 +29,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.chunks import Mapper
+
 _WORTH = 0.05
 """Time that a chunk takes from which its answer is kept [s]."""
 _LARGEST_ANSWER = 2**26
@@ -52,10 +54,13 @@ class KeptUnits:
         Where the files are; made when the first is written. Several runs may share it.
     largest
         Size of all files above which the oldest are taken away before a run [bytes].
+    solved_by
+        Mapper that solves the other chunks: this process, or workers.
     """
 
     folder: Path
     largest: int = 2 * 2**30
+    solved_by: Mapper = map
 
     def __call__(
         self,
@@ -63,17 +68,23 @@ class KeptUnits:
         chunks: Iterable[Float[np.ndarray, "chunk column"]],
     ) -> Iterator[Any]:
         """Yield the answers in the order of the chunks."""
-        for chunk in chunks:
-            digest = _digest(solve, chunk)
-            known = _read(self.folder / f"{digest}{_ENDING}", digest) if digest else None
+        found = [
+            (chunk, digest, self._known(digest)) for chunk, digest in ((own, _digest(solve, own)) for own in chunks)
+        ]
+        answers = iter(self.solved_by(solve, (chunk for chunk, _, known in found if known is None)))
+        for _, digest, known in found:
             if known is not None:
                 yield known[0]
                 continue
             start = time.perf_counter()
-            answer = solve(chunk)
+            answer = next(answers)
             if digest and time.perf_counter() - start >= _WORTH:
                 self._keep(answer, digest)
             yield answer
+
+    def _known(self, digest: str) -> tuple[Any] | None:
+        """Return the answer that a file has to a chunk, if there is one."""
+        return _read(self.folder / f"{digest}{_ENDING}", digest) if digest else None
 
     def pruned(self) -> KeptUnits:
         """Take the oldest files away until the rest is small enough, and return the same."""
@@ -112,14 +123,19 @@ class KeptUnits:
 
 
 @cache
+def code_digest() -> str:
+    """Return what tells this package's code, with the libraries that compute, from every other version."""
+    package = Path(__file__).parent
+    code = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(package.glob("**/*.py")))).hexdigest()
+    return "\n".join([code, *(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))])
+
+
+@cache
 def _machine() -> bytes:
     """Return what answers follow from beside the question: code, libraries and kind of processor."""
     from tolalloc.compiled import processor
 
-    package = Path(__file__).parent
-    code = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(package.glob("**/*.py")))).hexdigest()
-    libraries = [f"{name} {version(name)}" for name in ("numpy", "scipy", "numba")]
-    return "\n".join([code, *libraries, *processor()]).encode()
+    return "\n".join([code_digest(), *processor()]).encode()
 
 
 class _Pickler(pickle.Pickler):

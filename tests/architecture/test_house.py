@@ -25,6 +25,7 @@ DOORS = {
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
     "openpyxl": ("report/", "allocation/answer/", "drawings/workbook.py"),
+    "distributed": ("workers.py",),
     "numba": ("compiled.py", "rv/equivalent/solvers/lanes.py"),
     "llvmlite": ("rv/equivalent/solvers/lanes.py",),
     "ezdxf": ("rv/teeth/",),

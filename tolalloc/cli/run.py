@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import Float
 
+    from tolalloc.chunks import Mapper
     from tolalloc.report.answer import Answer
     from tolalloc.study.prepared import Prepared
     from tolalloc.study.study import Study
@@ -27,6 +29,10 @@ Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide interv
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
+Scheduler = Annotated[
+    str,
+    typer.Option(help="Workers that solve the units: 'local' for one per core, or the address of a Dask scheduler."),
+]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report to report.pdf too, by an installed browser.")]
 Kept = Annotated[
     Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
@@ -43,13 +49,23 @@ def run(
     checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
+    scheduler: Scheduler = "",
     pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
     study = _asked(script, quick, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(study, kinds, out or Path("runs") / study.name, checkpoint, fresh=fresh, pdf=pdf, as_json=as_json)
+    _run(
+        study,
+        kinds,
+        out or Path("runs") / study.name,
+        checkpoint,
+        fresh=fresh,
+        scheduler=scheduler,
+        pdf=pdf,
+        as_json=as_json,
+    )
 
 
 def rank(
@@ -58,12 +74,22 @@ def rank(
     seed: Seed = None,
     out: Out = None,
     fresh: Fresh = False,
+    scheduler: Scheduler = "",
     pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seed)
-    _run(study, ("ranking",), out or Path("runs") / f"{study.name}-rank", None, fresh=fresh, pdf=pdf, as_json=as_json)
+    _run(
+        study,
+        ("ranking",),
+        out or Path("runs") / f"{study.name}-rank",
+        None,
+        fresh=fresh,
+        scheduler=scheduler,
+        pdf=pdf,
+        as_json=as_json,
+    )
 
 
 def allocate(
@@ -82,6 +108,7 @@ def allocate(
     checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
+    scheduler: Scheduler = "",
     pdf: Pdf = False,
     as_json: AsJson = False,
 ) -> None:
@@ -94,7 +121,7 @@ def allocate(
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     folder = out or Path("runs") / f"{study.name}-allocate"
-    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, pdf=pdf, as_json=as_json)
+    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, scheduler=scheduler, pdf=pdf, as_json=as_json)
 
 
 def _asked(script: Path, quick: bool, seed: int | None) -> Study:
@@ -137,6 +164,7 @@ def _run(
     checkpoint: Path | None,
     *,
     fresh: bool,
+    scheduler: str,
     pdf: bool,
     as_json: bool,
 ) -> None:
@@ -153,8 +181,8 @@ def _run(
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
     try:
-        with shown_progress() as progress:
-            found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh)
+        with _solvers(scheduler) as solved_by, shown_progress() as progress:
+            found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh, solved_by=solved_by)
     except KeyboardInterrupt:
         kept = kept_beside(folder).folder
         what = f"Solved units are kept in {kept}; the same command goes on from there."
@@ -169,6 +197,15 @@ def _run(
         return
     for answer in found.answers.values():
         _show(answer)
+
+
+def _solvers(scheduler: str) -> AbstractContextManager[Mapper]:
+    """Return what solves the units: this process, or the workers of a scheduler."""
+    if not scheduler:
+        return nullcontext(map)
+    from tolalloc.workers import workers_at
+
+    return workers_at(scheduler)
 
 
 def _show(answer: Answer) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tolalloc.chunks import Mapper
 from tolalloc.kept_units import KeptUnits
 from tolalloc.progress import Progress, RunRecord, Silent
 from tolalloc.report.answer import Answer
@@ -67,11 +68,13 @@ def run(
     checkpoint: Path | None = None,
     *,
     fresh: bool = False,
+    solved_by: Mapper = map,
 ) -> Run:
     """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
 
     Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `kept_beside`, and a
-    run that was stopped takes them from there, unless it is to begin afresh.
+    run that was stopped takes them from there, unless it is to begin afresh. All others are solved by a mapper: this
+    process unless given.
 
     Raises
     ------
@@ -79,7 +82,8 @@ def run(
         One sentence on what is wrong.
     """
     asked = questions or tuple(study.questions)
-    prepared = Prepared(study=study, mapper=map if fresh else kept_beside(folder).pruned())
+    kept = replace(kept_beside(folder), solved_by=solved_by).pruned()
+    prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
         answers = {
             question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)

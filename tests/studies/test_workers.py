@@ -1,0 +1,93 @@
+"""Units solved by the workers of a scheduler: the same bits, workers killed or not, and clear refusals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import tolalloc as ta
+from tests.prepared import prepared
+from tests.studies.command import tolalloc
+from tests.studies.scripts import study_script
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError
+from tolalloc.kept_units import KeptUnits
+from tolalloc.workers import workers_at
+
+UNITS = 12 * 1024
+
+
+@pytest.fixture(scope="module")
+def study():
+    return prepared()
+
+
+@pytest.fixture(scope="module")
+def units(study):
+    uniform = np.concatenate([*SeedTree(5).uniform_chunks(UNITS, len(study.errors.columns))])
+    return study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+
+
+@pytest.fixture(scope="module")
+def in_this_process(study, units):
+    return study.model.reading((ta.PEAK_TO_PEAK,))(units).values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_workers_that_are_killed_leave_the_same_bits(study, units, in_this_process, seed):
+    generator = np.random.default_rng(seed)
+    with workers_at("local") as workers:
+        pids = list(workers.client.run(os.getpid).values())
+        assert len(pids) > 1 or os.cpu_count() == 1
+
+        def kill():
+            for pid in generator.permutation(pids):
+                time.sleep(generator.uniform(0.2, 1.5))
+                os.kill(int(pid), signal.SIGKILL)
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        found = study.model.mapped(workers).reading((ta.PEAK_TO_PEAK,))(units).values
+        killer.join()
+        assert not set(workers.client.run(os.getpid).values()) & set(pids)
+    np.testing.assert_array_equal(found, in_this_process)
+
+
+@pytest.mark.slow
+def test_what_workers_solved_is_kept_for_this_process(study, units, in_this_process, tmp_path, monkeypatch):
+    monkeypatch.setattr("tolalloc.kept_units._WORTH", 0.0)
+    with workers_at("local") as workers:
+        kept = KeptUnits(folder=tmp_path, solved_by=workers)
+        study.model.mapped(kept).reading((ta.PEAK_TO_PEAK,))(units[:4096])
+    known = len(list(tmp_path.iterdir()))
+    assert known == 4
+
+    def solves_nothing(solve, chunks):
+        assert not list(chunks)
+        return iter(())
+
+    mine = study.model.mapped(KeptUnits(folder=tmp_path, solved_by=solves_nothing)).reading((ta.PEAK_TO_PEAK,))
+    np.testing.assert_array_equal(mine(units[:4096]).values, in_this_process[:4096])
+
+
+@pytest.mark.slow
+def test_nobody_at_the_address_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr("tolalloc.workers._PATIENCE", 1)
+    script = study_script(tmp_path)
+    result = tolalloc("rank", script, "--out", tmp_path / "run", "--scheduler", "tcp://127.0.0.1:9")
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    assert "--scheduler is 'tcp://127.0.0.1:9'" in " ".join(result.stderr.split())
+    assert not (tmp_path / "run").exists()
+
+
+def test_without_dask_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'tolalloc\[distributed\]'"), workers_at("local"):
+        pass
