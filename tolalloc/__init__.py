@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from tolalloc.function_model import model as model
     from tolalloc.models import Evaluation as Evaluation
     from tolalloc.models import Model as Model
-    from tolalloc.models import Setting as Setting
     from tolalloc.report.answer import Answer as Answer
     from tolalloc.report.document import Section as Section
     from tolalloc.rv import BACKLASH as BACKLASH
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.rv.choice import reducer as reducer
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
+    from tolalloc.settings import Setting as Setting
     from tolalloc.study.effort import Effort as Effort
     from tolalloc.study.limit import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -88,7 +88,7 @@ _WHERE = {
     "RunFolderError": "exceptions",
     "Section": "report.document",
     "SeedTree": "drawings.seeds",
-    "Setting": "models",
+    "Setting": "settings",
     "SolveError": "exceptions",
     "Study": "study.study",
     "TORSIONAL_STIFFNESS": "rv",

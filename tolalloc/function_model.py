@@ -14,7 +14,8 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Model, Observer, Setting, SettingDerivatives, require_settings, unobserved
+from tolalloc.models import Evaluation, Model, Observer, SettingDerivatives, unobserved
+from tolalloc.settings import Setting, require_settings
 from tolalloc.units import MILLIMETRE
 from tolalloc.user_function import UserFunction, identity
 

@@ -11,7 +11,7 @@ from tolalloc.allocation.confirmation import Confirmed
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.search import ROUNDING, ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, answer
-from tolalloc.models import DrawnAmounts
+from tolalloc.settings import DrawnAmounts
 
 TABLE, ALIKE, ALONE = "tolerance table as it is", "all zones scaled alike", "tolerances alone"
 FREE, GRADES = "everything free", "grades"

@@ -15,7 +15,7 @@ from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError
-from tolalloc.models import Setting
+from tolalloc.settings import Setting
 
 _ROUNDING = 1e-9
 """Distance of a scale from a process's range up to which it is rounding [-]."""

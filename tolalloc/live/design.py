@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import require_settings
 from tolalloc.named_fields import is_number
+from tolalloc.settings import require_settings
 from tolalloc.study.prepared import Prepared
 from tolalloc.units import MICROMETRE
 

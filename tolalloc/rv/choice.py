@@ -11,8 +11,8 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import neglected_columns
 from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
-from tolalloc.models import require_settings
 from tolalloc.named_fields import is_number
+from tolalloc.rv.clearance_settings import clearance_settings
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -22,6 +22,7 @@ from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.settings import require_settings
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -143,8 +144,6 @@ class ReducerChoice:
         InputError, UnknownNameError
             A setting that it does not have, or a clearance outside its bounds.
         """
-        from tolalloc.rv.model import clearance_settings
-
         own, stage = self.reducer.modification, self.reducer.cycloid_stage
         present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
         known = clearance_settings(present, (self.flank_clearance, self.radial_clearance))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,10 +13,11 @@ from jaxtyping import Float
 from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models import DrawnAmounts, Model, Observer, Response, Setting, SettingDerivatives
+from tolalloc.models import Model, Observer, Response, SettingDerivatives
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
+from tolalloc.rv.clearance_settings import FLANK, RADIAL, clearance_settings
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
@@ -37,13 +38,9 @@ from tolalloc.rv.response.outputs import (
 )
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force
+from tolalloc.settings import DrawnAmounts, Setting
 from tolalloc.units import ARCMINUTE, MICROMETRE
 
-FLANK = "flank clearance [µm]"
-RADIAL = "radial clearance [µm]"
-
-_STEP = 0.1
-"""Step of a difference by a clearance, to either side [µm]."""
 _MULTIPLES = 4
 """Multiples of pins and teeth whose waves are told apart [-]."""
 _ANGLES = (468, 936)
@@ -398,13 +395,3 @@ class ReducerModel(Model):
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
         _, far = against_catalogue(self.reducer, self._exact_loop)
         return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)
-
-
-def clearance_settings(
-    present: tuple[float, float], bounds: Iterable[tuple[float, float] | None]
-) -> tuple[Setting, ...]:
-    """Return flank and radial clearance as settings [µm]; without bounds one is locked at its present value."""
-    return tuple(
-        Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
-        for name, value, own in zip((FLANK, RADIAL), present, bounds, strict=True)
-    )
