@@ -77,7 +77,7 @@ def test_of_designs_just_at_their_limit_no_more_than_the_stated_error_are_drawn(
     design, costs = designed(study), count(10)
 
     def another(kind, judged, attempt):
-        return replace(design, cost=float(next(costs)))
+        return kind, replace(design, cost=float(next(costs)))
 
     answers = [
         confirm(judge_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another)
@@ -126,7 +126,7 @@ def test_of_what_was_confirmed_one_cheaper_design_is_tried_and_a_miss_changes_no
 
     def cheaper(kind, judged, attempt):
         asked.append(judged.confirmed)
-        return beyond
+        return kind, beyond
 
     found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper)
     assert [(kind, own.confirmed) for kind, own in found.judged] == [("table", True), ("table", False)]
@@ -186,3 +186,21 @@ def test_one_limit_alone_needs_no_joint_requirement():
     study = prepared({GAP: ta.Limit(upper=at(0.99))}, ta.AtYield(0.9))
     assert study.requirements_with_joint == study.requirements
     assert study.requirements[0].guarantee == ta.AtYield(0.9)
+
+
+@pytest.mark.slow
+def test_quick_answers_do_not_lose_a_drawing_that_is_just_good_enough():
+    """Of 24 seeds; 99.85 % of the units of the table keep the limits, 99.73 % are asked for."""
+
+    def gap(housing, shaft):
+        return housing - shaft
+
+    zone = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
+    study = ta.Study(
+        ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+        ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **zone}, {"id": "shaft", "nominal": 30.0, **zone}]),
+        limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.13)},
+        questions=[ta.Allocation(front=False, what_if=False)],
+    )
+    met = [replace(study, seed=seed).allocate(effort="quick").met for seed in range(1, 25)]
+    assert sum(met) >= 22  # 18 where four nearly equal designs were judged one after the other

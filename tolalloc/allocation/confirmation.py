@@ -24,6 +24,8 @@ _SPENT = 0.75
 _LOOKS = (0.25, 0.5, 1.0)
 """Shares of the units after which a design may be given up; it is confirmed after the last one alone [-]."""
 _EVEN_ODDS = 0.5
+_NEAR = 1.25
+"""Factor between the zones of two designs up to which the models of one are believed of the other [-]."""
 
 
 def error_of(error: float, attempt: int) -> float:
@@ -186,11 +188,11 @@ class Confirmed:
         return next((design for name, design in reversed(self.judged) if name == kind), None)
 
 
-def confirm(
-    judge: Judge,
-    candidates: Mapping[str, VerifiedDesign],
-    following: Callable[[str, VerifiedDesign, int], VerifiedDesign | None],
-) -> Confirmed:
+Following = Callable[[str, VerifiedDesign, int], tuple[str, VerifiedDesign] | None]
+"""Makes of a kind, a judged design of it and its attempt what its search would try next, with the kind of that."""
+
+
+def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: Following) -> Confirmed:
     """Return the cheapest design that fresh units confirm.
 
     Parameters
@@ -200,18 +202,18 @@ def confirm(
     candidates
         Kind → design that its search holds for good.
     following
-        Makes of a kind, a judged design of it and the attempt the design that its search would try next: a cheaper
-        one after a confirmed design, a safer one after any other; none where there is no such design.
+        Gives a cheaper design after a confirmed one, a safer one after any other; none where there is no such design.
 
     Notes
     -----
-    The cheapest design that was not yet judged is judged next. The first one confirmed is the answer, unless the one
-    cheaper design that is tried after it is confirmed as well.
+    The cheapest design that was not yet judged is judged next, those last that what was judged speaks against. The
+    first one confirmed is the answer, unless the one cheaper design that is tried after it is confirmed as well.
     """
-    waiting, judged = dict(candidates), list[tuple[str, VerifiedDesign]]()
+    waiting, judged, doubtful = dict(candidates), list[tuple[str, VerifiedDesign]](), set[str]()
     drawn: tuple[str, VerifiedDesign] | None = None
     for attempt in range(1, ATTEMPTS + 1):
-        kind = min(waiting, key=lambda own: waiting[own].cost, default=None)
+        doubted = doubtful if drawn is None else set[str]()
+        kind = min(waiting, key=lambda own, late=doubted: (own in late, waiting[own].cost), default=None)  # type: ignore[misc]
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
         found = judge.judge(waiting.pop(kind), attempt)
@@ -220,7 +222,17 @@ def confirm(
         drawn = (kind, found) if found.confirmed else drawn
         if was_drawn:
             break
-        after = following(kind, found, attempt) if attempt < ATTEMPTS else None
-        if after is not None:
-            waiting[kind] = after
+        if not found.confirmed:
+            doubtful |= {name for name, own in waiting.items() if _speaks_against(found, own)}
+        if attempt < ATTEMPTS and (after := following(kind, found, attempt)):
+            name, design = after
+            waiting[name] = design
+            doubtful.discard(name)
     return Confirmed(drawn=drawn, judged=tuple(judged))
+
+
+def _speaks_against(judged: VerifiedDesign, other: VerifiedDesign) -> bool:
+    """Return whether a judged design that was not confirmed leads one to expect the same of another one near it."""
+    apart = np.abs(np.log(other.scales / judged.scales)).max(initial=0.0)
+    near = apart <= np.log(_NEAR) and np.allclose(other.settings, judged.settings)
+    return bool(near and any(side.predicted(other.design) > 0 for side in judged.sides))

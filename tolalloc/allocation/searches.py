@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.candidates import ALONE, FREE, GRADES, Candidates
+from tolalloc.allocation.candidates import ALIKE, ALONE, FREE, GRADES, TABLE, Candidates
 from tolalloc.allocation.confirmation import Judge, confidence_of_fewer, confirm, error_of
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
@@ -187,9 +187,16 @@ class DrawingQuestion:
         result = confirm(judge, promising, partial(self._following, found))
         return found.with_confirmed(result, self.model.drawn_amounts)
 
-    def _following(self, found: Candidates, kind: str, judged: VerifiedDesign, attempt: int) -> VerifiedDesign | None:
-        """Return the design that the search of a judged one would try next, none where it would try no other."""
+    def _following(
+        self, found: Candidates, kind: str, judged: VerifiedDesign, attempt: int
+    ) -> tuple[str, VerifiedDesign] | None:
+        """Return the design that the search of a judged one would try next, none where it would try no other.
+
+        From a drawing that no search made and that is not good enough, the search for free zones goes on.
+        """
         searches = {ALONE: found.fixed, FREE: found.free}
+        if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
+            kind = FREE
         errors = _MARGIN if judged.confirmed else 2 * _MARGIN
         # The next design is judged by all units, where this one may have been given up by few of them.
         margin = errors * np.sqrt(judged.achieved.units / self.effort.confirmation_units)
@@ -202,7 +209,8 @@ class DrawingQuestion:
         worth = (1 - self.effort.gain) * judged.cost if judged.confirmed else np.inf
         if design is None or judged.space.cost(design) > worth:
             return None
-        return self.verifier("confirmation", judged.space).verify(design, f"beside attempt {attempt}")
+        space = self.space if kind == FREE else judged.space
+        return kind, self.verifier("confirmation", space).verify(design, f"beside attempt {attempt}")
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""

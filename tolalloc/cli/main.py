@@ -20,6 +20,7 @@ from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.open import open_page
 from tolalloc.cli.run import allocate, check, rank, run
+from tolalloc.cli.series import series
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
 from tolalloc.cli.whatif import whatif
@@ -49,6 +50,7 @@ for command in (
     rank,
     allocate,
     whatif,
+    series,
     costs,
     te,
     contact,

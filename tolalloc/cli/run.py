@@ -181,7 +181,7 @@ def _run(
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
     try:
-        with _solvers(scheduler) as solved_by, shown_progress() as progress:
+        with solvers(scheduler) as solved_by, shown_progress() as progress:
             found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh, solved_by=solved_by)
     except KeyboardInterrupt:
         kept = kept_beside(folder).folder
@@ -199,7 +199,7 @@ def _run(
         _show(answer)
 
 
-def _solvers(scheduler: str) -> AbstractContextManager[Mapper]:
+def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     """Return what solves the units: this process, or the workers of a scheduler."""
     if not scheduler:
         return nullcontext(map)
