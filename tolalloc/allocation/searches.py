@@ -262,13 +262,19 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
 
-    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SobolIndices:
-        """Return the indices of the leading output at the zones and the settings of a design."""
+    def shares(
+        self, space: DesignSpace, design: Float[np.ndarray, " variable"], factor_groups: tuple[str, ...] = ()
+    ) -> SobolIndices:
+        """Return the indices of the leading output at the zones and the settings of a design.
+
+        Those of the sources, unless every column is said to belong to something else.
+        """
         errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
         response = self.model.at(space.settings_of(design)).reading((leading,))
         return sobol_indices(
             Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share),
             SobolEffort(start=blocks, limit=blocks),
+            factor_groups=factor_groups,
         ).of(leading)
 
 
@@ -336,6 +342,8 @@ def allocate_drawing(
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
             shares = question.shares(chosen.space, chosen.design)
+            dimensions = chosen.space.errors.dimension_of_column
+            of_dimensions = question.shares(chosen.space, chosen.design, dimensions)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationAnswer(
         header=replace(header, statuses=statuses, stages=record.stages),
@@ -346,6 +354,7 @@ def allocate_drawing(
         free=free,
         graded=graded,
         shares=shares,
+        shares_of_dimensions=of_dimensions,
         trade=trade,
         fronts=fronts,
         robustness=robust,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,14 +29,16 @@ Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide interv
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
+Kept = Annotated[
+    Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
+]
+
 Scheduler = Annotated[
     str,
     typer.Option(help="Workers that solve the units: 'local' for one per core, or the address of a Dask scheduler."),
 ]
-Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report to report.pdf too, by an installed browser.")]
-Kept = Annotated[
-    Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
-]
+Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report as report.pdf too, by an installed browser.")]
+Paper = Annotated[str, typer.Option(help="Paper of --pdf: A4 or Letter.")]
 
 _ROWS = 16  # of an answer's first table that are printed
 
@@ -51,6 +53,7 @@ def run(
     fresh: Fresh = False,
     scheduler: Scheduler = "",
     pdf: Pdf = False,
+    paper: Paper = "A4",
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
@@ -61,10 +64,7 @@ def run(
         kinds,
         out or Path("runs") / study.name,
         checkpoint,
-        fresh=fresh,
-        scheduler=scheduler,
-        pdf=pdf,
-        as_json=as_json,
+        _Way(fresh, scheduler, paper if pdf else "", as_json),
     )
 
 
@@ -76,6 +76,7 @@ def rank(
     fresh: Fresh = False,
     scheduler: Scheduler = "",
     pdf: Pdf = False,
+    paper: Paper = "A4",
     as_json: AsJson = False,
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
@@ -85,10 +86,7 @@ def rank(
         ("ranking",),
         out or Path("runs") / f"{study.name}-rank",
         None,
-        fresh=fresh,
-        scheduler=scheduler,
-        pdf=pdf,
-        as_json=as_json,
+        _Way(fresh, scheduler, paper if pdf else "", as_json),
     )
 
 
@@ -110,6 +108,7 @@ def allocate(
     fresh: Fresh = False,
     scheduler: Scheduler = "",
     pdf: Pdf = False,
+    paper: Paper = "A4",
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
@@ -121,7 +120,7 @@ def allocate(
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     folder = out or Path("runs") / f"{study.name}-allocate"
-    _run(study, ("allocation",), folder, checkpoint, fresh=fresh, scheduler=scheduler, pdf=pdf, as_json=as_json)
+    _run(study, ("allocation",), folder, checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
 
 def _asked(script: Path, quick: bool, seed: int | None) -> Study:
@@ -157,32 +156,32 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
     return replace(study, limits={**study.limits, leading: changed})
 
 
-def _run(
-    study: Study,
-    kinds: tuple[str, ...],
-    folder: Path,
-    checkpoint: Path | None,
-    *,
-    fresh: bool,
-    scheduler: str,
-    pdf: bool,
-    as_json: bool,
-) -> None:
+@dataclass(frozen=True)
+class _Way:
+    """How a run goes and what it gives beside its folder."""
+
+    fresh: bool
+    scheduler: str  # Whose workers solve the units; empty for this process
+    paper: str  # On which the report is printed; empty if it is not
+    as_json: bool
+
+
+def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.function_model import FunctionModel
-    from tolalloc.report.printing import browser, print_page
+    from tolalloc.report.pdf import require_printable, write_pdf
     from tolalloc.study.questions import named
     from tolalloc.study.runner import kept_beside
     from tolalloc.study.runner import run as run_study
 
     questions = named(kinds, tuple(study.questions), f"study {study.name}")
-    if pdf:
-        browser()  # before the work rather than after it
+    if way.paper:
+        require_printable(way.paper)
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
     try:
-        with solvers(scheduler) as solved_by, shown_progress() as progress:
-            found = run_study(study, folder, questions, progress, checkpoint, fresh=fresh, solved_by=solved_by)
+        with solvers(way.scheduler) as solved_by, shown_progress() as progress:
+            found = run_study(study, folder, questions, progress, checkpoint, fresh=way.fresh, solved_by=solved_by)
     except KeyboardInterrupt:
         kept = kept_beside(folder).folder
         what = f"Solved units are kept in {kept}; the same command goes on from there."
@@ -190,9 +189,10 @@ def _run(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None
     note(f"Report: {folder / 'report.html'}")
-    if pdf:
-        note(f"Printed: {print_page(folder / 'report.html')}")
-    if as_json:
+    if way.paper:
+        write_pdf(folder / "report.html", folder / "report.pdf", way.paper)
+        note(f"Printed: {folder / 'report.pdf'}")
+    if way.as_json:
         print_json({"folder": str(folder), **found.document.summary})
         return
     for answer in found.answers.values():

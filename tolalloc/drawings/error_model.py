@@ -79,6 +79,17 @@ class ErrorModel:
         return tuple(block_of[name] for name in self.source_of_column)
 
     @property
+    def dimension_of_column(self) -> tuple[str, ...]:
+        """Name of the drawing dimension of each column: its group, or several joined by " + " where they correlate."""
+        found = {name: name for block in self.blocks for name in block}
+        found |= {source.name: source.group or source.name for source in self.active}
+        for block in self.blocks:
+            met = dict.fromkeys(found[name] for name in block)
+            if len(met) > 1:
+                found = {name: " + ".join(met) if own in met else own for name, own in found.items()}
+        return tuple(found[name] for name in self.source_of_column)
+
+    @property
     def is_correlated(self) -> bool:
         """Whether some sources of the table depend on each other."""
         return any(len(block) > 1 for block in self.blocks)

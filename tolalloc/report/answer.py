@@ -202,7 +202,8 @@ class Answer(ABC):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the key sentence, the first table, one figure."""
-        from tolalloc.report.writer import html_table, inline_png
+        from tolalloc.report.html_table import html_table
+        from tolalloc.report.writer import inline_png
 
         shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:1])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tolalloc.report.figure import Figure, HeatMap
@@ -30,6 +30,8 @@ class Section:
         Title of the report that it comes from; empty where there is one report alone.
     unfolded
         Whether its tables stand open however large they are, as a drawing does.
+    first
+        Whether it stands on the first page, behind the answer.
     """
 
     heading: str
@@ -38,6 +40,7 @@ class Section:
     tables: tuple[tuple[str, pd.DataFrame], ...] = ()
     part: str = ""
     unfolded: bool = False
+    first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +65,10 @@ class Document:
         Seed of the random numbers; none if nothing is random [-].
     manifest
         What else is needed to repeat the run and to trust it.
+    answers
+        Title and sentences of each report that this one joins; none of a report alone.
+    title_block
+        What the first page says beside study and date, as a drawing does: its number, revision and author.
     """
 
     title: str
@@ -73,6 +80,8 @@ class Document:
     summary: dict[str, Any]
     seed: int | None = None
     manifest: dict[str, Any] | None = None
+    answers: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -140,7 +149,15 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         summary=summary,
         seed=manifest.get("seed"),
         manifest=manifest,
+        answers=_leading_first(reports) if len(reports) > 1 else (),
     )
+
+
+def _leading_first(reports: Iterable[tuple[str, Document]]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return titles and answers, those first that have something for the first page, such as a drawing."""
+    documents = [document for _, document in reports]
+    documents.sort(key=lambda document: not any(section.first for section in document.sections))
+    return tuple((document.title, document.answer) for document in documents)
 
 
 def _same(earlier: pd.DataFrame | None, frame: pd.DataFrame) -> bool:

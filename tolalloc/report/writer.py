@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from base64 import b64encode
+from datetime import date
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader
-from markupsafe import Markup, escape
+from markupsafe import escape
 
 from tolalloc.compiled import thread_count
 from tolalloc.files import no_formula
@@ -20,13 +21,15 @@ from tolalloc.report.charts import chart
 from tolalloc.report.document import Document
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, HeatMap
+from tolalloc.report.glossary import words_in
+from tolalloc.report.html_table import html_table
 from tolalloc.report.page import as_json, script, style
 from tolalloc.report.plots import drawn, save_png
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
-_PRINTED = 10
-"""Columns beyond which a table is printed small [-]."""
+_SENTENCES = 3
+"""Sentences of each answer on the first page of a report that joins several [-]."""
 _LISTED = 6
 """Sections beyond which a page begins with a list of them [-]."""
 _LIBRARIES = (
@@ -35,35 +38,9 @@ _LIBRARIES = (
 )
 
 
-def _number(value: object) -> str:
-    """Return a cell as text with five significant digits at most."""
-    if isinstance(value, float):
-        if pd.isna(value):
-            return ""
-        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}"
-    return str(value)
-
-
 def _is_large(frame: pd.DataFrame) -> bool:
     """Return whether a page shows a table only when it is asked for."""
     return len(frame) > _LARGE[0] or frame.shape[1] > _LARGE[1]
-
-
-def html_table(frame: pd.DataFrame) -> Markup:
-    """Return a frame as an HTML table; a number that is rounded there says itself whole to a pointer."""
-    page = Markup('<table class="data{}"><thead><tr>{}</tr></thead><tbody>{}</tbody></table>')
-    many = " many" if frame.shape[1] > _PRINTED else ""
-    head = Markup("").join(Markup("<th>{}</th>").format(name) for name in frame.columns)
-    rows = (Markup("").join(_html_cell(value) for value in row) for row in frame.itertuples(index=False))
-    return page.format(many, head, Markup("").join(Markup("<tr>{}</tr>").format(row) for row in rows))
-
-
-def _html_cell(value: object) -> Markup:
-    if not isinstance(value, float):
-        return Markup("<td>{}</td>").format(value)
-    text = _number(value)
-    whole = "" if not text or float(text) == value else Markup(' title="{}"').format(f"{value:.12g}")
-    return Markup('<td class="number"{}>{}</td>').format(whole, text)
 
 
 def inline_png(figure: Figure | HeatMap) -> str:
@@ -104,12 +81,36 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     frame.rename(columns=no_formula).map(no_formula).to_csv(path, index=False, encoding="utf-8")
 
 
+def _told(document: Document) -> list[tuple[str, tuple[str, ...]]]:
+    """Return what the box of the first page says: all that one report found, the first sentences of several."""
+    if not document.answers:
+        return [("", document.answer)]
+    return [(title, sentences[:_SENTENCES]) for title, sentences in document.answers]
+
+
+def _block(document: Document) -> list[tuple[str, str]]:
+    """Return the title block: what is not known stays empty, to be filled in by hand."""
+    known = {"study": str((document.manifest or {}).get("study", document.title)), **document.title_block}
+    labels = ("study", "drawing number", "revision", "author")
+    return [*((label, known.get(label, "")) for label in labels), ("date", date.today().isoformat())]
+
+
+def _in_full(document: Document) -> list[dict[str, Any]]:
+    """Return the answers in full where the first page has only their first sentences."""
+    return [
+        {"part": title, "heading": "The answer in full", "paragraphs": sentences, "figures": (), "tables": ()}
+        for title, sentences in document.answers
+        if len(sentences) > _SENTENCES
+    ]
+
+
 def _write_page(document: Document, path: Path) -> None:
-    """Write the page, with its style and its script inside."""
-    sections = [
+    """Write the page, all that it shows inside."""
+    sections: list[dict[str, Any]] = [
         {
             "part": section.part,
             "heading": section.heading,
+            "first": section.first,
             "paragraphs": section.paragraphs,
             "figures": [(figure.title, as_json(chart(figure))) for figure in section.figures],
             "tables": [
@@ -119,11 +120,27 @@ def _write_page(document: Document, path: Path) -> None:
         }
         for section in document.sections
     ]
-    loader = PackageLoader("tolalloc.report")
-    page = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    template = page.get_template("document.html.j2")
-    is_long = len(sections) > _LISTED
-    content = template.render(document=document, sections=sections, is_long=is_long, style=style(), script=script())
+    for full in reversed(_in_full(document)):
+        sections.insert(next((at for at, own in enumerate(sections) if own["part"] == full["part"]), 0), full)
+    for number, section in enumerate(sections, start=1):
+        section["number"] = number
+    page = Environment(
+        loader=PackageLoader("tolalloc.report"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    ).get_template("document.html.j2")
+    headers = [str(header) for frame in document.tables.values() for header in frame.columns]
+    texts = [*document.answer, *document.warnings, *(own.heading for own in document.sections), *headers]
+    texts += [paragraph for own in document.sections for paragraph in own.paragraphs]
+    content = page.render(
+        document=document,
+        style=style(),
+        script=script(),
+        answers=_told(document),
+        block=_block(document),
+        footer=document.title.replace("\\", "").replace('"', "”"),
+        sections=sections,
+        is_long=len(sections) > _LISTED,
+        glossary=words_in(texts) if len(sections) > _LISTED else (),
+    )
     path.write_text(content, encoding="utf-8")
 
 

@@ -22,7 +22,12 @@ _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
 
 
-def sobol_indices(experiment: Experiment[Response], effort: SobolEffort, ranked: tuple[str, ...] = ()) -> SobolAnalysis:
+def sobol_indices(
+    experiment: Experiment[Response],
+    effort: SobolEffort,
+    ranked: tuple[str, ...] = (),
+    factor_groups: tuple[str, ...] = (),
+) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
     Sources that depend on each other have one index together: a share of each alone would be arbitrary.
@@ -33,6 +38,9 @@ def sobol_indices(experiment: Experiment[Response], effort: SobolEffort, ranked:
         Blocks, from a first number doubled up to a limit, and what stops them.
     ranked
         Outputs that count in the ranking over all, which is the one that must become stable; all of them if empty.
+    factor_groups
+        Name of what every column belongs to, such as its dimension of the drawing; independent of each other. The
+        sources, or blocks of dependent ones, unless given.
 
     Raises
     ------
@@ -51,7 +59,9 @@ def sobol_indices(experiment: Experiment[Response], effort: SobolEffort, ranked:
     """
     errors, seeds, outputs = experiment.errors, experiment.seeds, experiment.response.outputs
     counted, sample = ranked or outputs, seeds.child("sample").integer()
-    design = SaltelliDesign(factor_groups=errors.block_of_column, seed=sample, second_order=effort.second_order)
+    design = SaltelliDesign(
+        factor_groups=factor_groups or errors.block_of_column, seed=sample, second_order=effort.second_order
+    )
     answers, steps = list[Evaluation](), list[SaltelliIndices]()
 
     def resampled(blocks: int) -> Resampled:

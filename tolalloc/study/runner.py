@@ -115,8 +115,10 @@ def _document(prepared: Prepared, answers: dict[str, Answer]) -> Document:
         "stages": {kind: dict(answer.header.stages) for kind, answer in answers.items()},
     }
     if not set(answers) - {Calculation.kind}:
-        return replace(first.document, manifest=known)  # a calculation has a summary of its own, not one beside others
+        return replace(
+            first.document, manifest=known, title_block=study.title_block
+        )  # a calculation has a summary of its own, not one beside others
     title = first.title if len(answers) == 1 else f"{first.header.model}: {study.name}"
-    return joined(
-        title, first.subtitle, [(kind, answer.document) for kind, answer in answers.items()], **known, seed=study.seed
-    )
+    parts = [(kind, answer.document) for kind, answer in answers.items()]
+    whole = joined(title, first.subtitle, parts, **known, seed=study.seed)
+    return replace(whole, title_block=study.title_block)

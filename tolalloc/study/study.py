@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from tolalloc.study.runner import Run
 
 
+_TITLE_BLOCK = ("drawing number", "revision", "author")
+_LONGEST_TEXT = 60
 _NAME = r"[\w-][\w. -]{0,99}"
 
 
@@ -63,6 +65,12 @@ def _are_named(limits: object) -> bool:
     return isinstance(limits, Mapping) and all(isinstance(output, str) for output in limits)
 
 
+def _is_title_block(given: object) -> bool:
+    return isinstance(given, Mapping) and all(
+        label in _TITLE_BLOCK and isinstance(text, str) and len(text) <= _LONGEST_TEXT for label, text in given.items()
+    )
+
+
 def _are_questions(given: object) -> bool:
     return isinstance(given, Sequence) and bool(given) and all(isinstance(one, Question) for one in given)
 
@@ -93,6 +101,9 @@ class Study(NamedFields):
         Share of units without an answer above which a question stops [-].
     effort
         How much may be computed.
+    title_block
+        What the first page of a report says beside study and date: ``drawing number``, ``revision``, ``author``. What
+        is not said stays empty there, to be filled in by hand.
 
     Raises
     ------
@@ -118,6 +129,7 @@ class Study(NamedFields):
     seed: int = 1
     largest_failed_share: float = 0.01
     effort: Effort = field(default_factory=_full)
+    title_block: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         is_name = isinstance(self.name, str) and re.fullmatch(_NAME, self.name)
@@ -135,6 +147,11 @@ class Study(NamedFields):
             ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
             ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
             ("questions", _are_questions(self.questions), "ta.Ranking(...), ta.Allocation(...) and other questions"),
+            (
+                "title_block",
+                _is_title_block(self.title_block),
+                f"a dictionary of texts up to {_LONGEST_TEXT} characters under {', '.join(_TITLE_BLOCK)}",
+            ),
             ("effort", hasattr(self.effort, "is_quick"), "'quick', 'full' or ta.Effort(...)"),
         ):
             if not good:
@@ -153,7 +170,12 @@ class Study(NamedFields):
 
     def _require_read(self, place: str) -> None:
         """Raise if a field is given that no question reads."""
-        read = frozenset().union(*(question.reads for question in self.questions)) | {"name", "questions", "effort"}
+        read = frozenset().union(*(question.reads for question in self.questions)) | {
+            "name",
+            "questions",
+            "effort",
+            "title_block",
+        }
         kinds = ", ".join(question.kind for question in self.questions)
         for own in fields(self):
             default = own.default_factory() if callable(own.default_factory) else own.default

@@ -51,6 +51,8 @@ class AllocationAnswer(Answer):
         The same on ladders of zones, if the question asks for it.
     shares
         Sobol indices of the leading output at the zones of the drawing.
+    shares_of_dimensions
+        The same of the dimensions of the drawing: all members of a group exchanged together.
     trade
         Cost of the cheapest zones over the settings, if asked for.
     fronts
@@ -67,8 +69,8 @@ class AllocationAnswer(Answer):
 
     kind: ClassVar[str] = "allocation"
     shown: ClassVar[tuple[str, ...]] = (
-        *("source", "zone before [µm]", "zone [µm]", "grade", "process"),
-        *("share of variance [%]", "cost [cost units]"),
+        *("dimension", "write [mm]", "zone before [µm]", "zone [µm]", "grade", "process"),
+        *("part in the variance (total index) [%]", "cost [cost units]"),
     )
 
     model: Model
@@ -78,6 +80,7 @@ class AllocationAnswer(Answer):
     free: ZoneAllocation
     graded: GradedAllocation | None
     shares: SobolIndices
+    shares_of_dimensions: SobolIndices
     trade: SettingTrade | None
     fronts: Fronts | None
     robustness: Robustness | None
@@ -151,6 +154,13 @@ class AllocationAnswer(Answer):
         from tolalloc.allocation.answer.drawing import drawing_table
 
         return drawing_table(self)
+
+    @cached_property
+    def dimensions_table(self) -> pd.DataFrame:
+        """The drawing with one line per dimension, which all members of a group share."""
+        from tolalloc.allocation.answer.dimensions import dimensions_table
+
+        return dimensions_table(self)
 
     @cached_property
     def requirements_table(self) -> pd.DataFrame:

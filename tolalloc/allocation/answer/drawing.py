@@ -9,11 +9,13 @@ import pandas as pd
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.calculator import calculator_sheets, style_calculator
+from tolalloc.allocation.answer.dimensions import frames_of
 from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.drawings.fields import HEADERS
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.report.excel import write_sheets
+from tolalloc.report.feature_frame import write_frames
 from tolalloc.report.wording import unit_of
 from tolalloc.report.writer import write_csv
 from tolalloc.units import MICROMETRE
@@ -119,3 +121,4 @@ def write_drawing(answer: AllocationAnswer, folder: Path) -> None:
     sheets = {"drawing": full_drawing_table(answer), **calculator_sheets(answer)}
     write_sheets(sheets, folder / "drawing.xlsx")
     style_calculator(folder / "drawing.xlsx")
+    write_frames(frames_of(answer), folder / "frames.dxf")

@@ -7,6 +7,7 @@ import numpy as np
 from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.before_after import units_figure, zones_figure
+from tolalloc.allocation.answer.dimensions import effects_figure
 from tolalloc.allocation.answer.drawing import full_drawing_table
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.report.document import Section
@@ -17,15 +18,13 @@ from tolalloc.sensitivity.driver_tables import sobol_table
 def sections(answer: AllocationAnswer) -> tuple[Section, ...]:
     """Return the sections of the report."""
     return (
+        _drawing(answer),
         Section(
-            heading="What to write on the drawing",
+            heading="Every source of the drawing",
             figures=(zones_figure(answer.drawing_table, "zone [µm]"),),
             tables=(("drawing", answer.drawing_table),),
+            paragraphs=("The members of each dimension, with the share of each in the sum of all total indices.",),
             unfolded=True,
-            paragraphs=(
-                "allocation.csv beside this report has the layout of the tolerance table and is read back by tolalloc; "
-                "drawing.xlsx goes on calculating: change a zone there and see cost and limits.",
-            ),
         ),
         Section(
             heading=f"What still drives the {short(answer.leading)} of the drawing",
@@ -51,6 +50,26 @@ def sections(answer: AllocationAnswer) -> tuple[Section, ...]:
                 ("work", tables.work_table(answer)),
             ),
         ),
+    )
+
+
+def _drawing(answer: AllocationAnswer) -> Section:
+    """Return the first page: what to write, a line per dimension."""
+    effects = effects_figure(answer)
+    return Section(
+        heading="What to write on the drawing",
+        paragraphs=(
+            "One line per dimension. What to write is rounded down to 0.1 µm, so that it allows nothing wider than the "
+            "zone that was verified. The part in the variance (total index) is that of all members of a dimension "
+            "together, alone or with others, so the parts of all may add up to more than 100 %.",
+            "allocation.csv beside this report has the layout of the tolerance table and is read back by tolalloc; "
+            "drawing.xlsx goes on calculating: change a zone there and see cost and limits; frames.dxf has the frames "
+            "for a drawing program.",
+        ),
+        figures=(effects,) if effects else (),
+        tables=(("dimensions", answer.dimensions_table),),
+        unfolded=True,
+        first=True,
     )
 
 

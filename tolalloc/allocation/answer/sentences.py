@@ -8,6 +8,7 @@ from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.drawings.callouts import callout_assumptions
 from tolalloc.report.wording import short, unit_of, with_unit
 from tolalloc.surrogate.regression import NEEDED_Q2
 
@@ -288,4 +289,5 @@ def assumptions(answer: AllocationAnswer) -> tuple[str, ...]:
         "sources correlated as their file states; the bounds of the models do not know of correlations"
         if answer.space.errors.is_correlated
         else "all sources are independent of each other",
+        *callout_assumptions(tuple(source for source in answer.space.errors.sources if source.zone > 0.0)),
     )

@@ -2,4 +2,3 @@
 
 for (const record of document.querySelectorAll("script.figure"))
   new Chart(record.parentElement.querySelector("div"), JSON.parse(record.textContent));
-for (const place of document.querySelectorAll(".title-block .date")) place.append(new Date().toISOString().slice(0, 10));
