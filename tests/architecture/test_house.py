@@ -28,7 +28,7 @@ DOORS = {
     "distributed": ("workers.py",),
     "numba": ("compiled.py", "rv/equivalent/solvers/lanes.py"),
     "llvmlite": ("rv/equivalent/solvers/lanes.py",),
-    "ezdxf": ("rv/teeth/",),
+    "ezdxf": ("rv/teeth/", "report/feature_frame.py"),
     "exudyn": ("rv/multibody/",),
     "typer": ("cli/",),
     "rich": ("cli/",),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from math import exp, sqrt
+from math import exp, floor, sqrt
 
+import ezdxf
 import numpy as np
 import pytest
 from openpyxl import load_workbook
@@ -15,6 +16,8 @@ import tolalloc as ta
 from tests.prepared import prepared
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer.cost_formulas import cost_formula
+from tolalloc.allocation.answer.dimensions import dimensions
+from tolalloc.allocation.answer.dimensions import frames as frames_of_members
 from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
 from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.model import SumOfCosts, Weighted
@@ -23,6 +26,7 @@ from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
+from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 
 UM = 1e-6
@@ -49,7 +53,7 @@ class Workbook:
         held = self.sheets[sheet][cell].value
         return self.calculated(held[1:], sheet) if isinstance(held, str) and held.startswith("=") else held
 
-    def calculated(self, formula, sheet="zones"):
+    def calculated(self, formula, sheet="drawing"):
         def looked_up(found):
             if found["text"]:
                 return found["text"]
@@ -63,6 +67,7 @@ class Workbook:
         known = {
             "EXP": exp,
             "SQRT": sqrt,
+            "INT": floor,
             "MAX": max,
             "SUM": np.sum,
             "SUMPRODUCT": lambda *arrays: float(np.sum(np.prod(arrays, axis=0))),
@@ -163,7 +168,7 @@ def scaled(results, workbook, position, factor):
     """Return the design whose zone at a position is another one, and change it in the workbook."""
     design = results.chosen.design.copy()
     design[position] *= factor
-    workbook.sheets["zones"].cell(2 + position, 2).value *= factor
+    workbook.sheets["drawing"].cell(2 + position, 2).value *= factor
     return design
 
 
@@ -178,7 +183,7 @@ def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
         assert told == pytest.approx(side.limit + side.sign * side.predicted(results.chosen.design))
         assert workbook.value("requirements", f"E{row}") == ("yes" if side.excess <= 0 else "no")
     for row in range(2, 2 + len(results.drawn.groups)):
-        assert workbook.value("zones", f"G{row}") == "yes"
+        assert workbook.value("drawing", f"G{row}") == "yes"
 
 
 @pytest.mark.slow
@@ -197,28 +202,67 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
             assert told == pytest.approx(side.limit + side.sign * side.predicted(design))
         held = feature.processes[process]
         inside = held.minimum * (1 - 1e-6) <= design[position] <= held.maximum * (1 + 1e-6)
-        assert workbook.value("zones", f"G{2 + position}") == ("yes" if inside else "no")
+        assert workbook.value("drawing", f"G{2 + position}") == ("yes" if inside else "no")
 
 
 @pytest.mark.slow
 def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     results, folder = drawn
     sheets = load_workbook(folder / "drawing.xlsx")
-    assert sheets.sheetnames == ["drawing", "zones", "requirements"]
+    assert sheets.sheetnames == ["drawing", "requirements", "tolerances"]
     formulas = [
         cell.value
-        for name in ("zones", "requirements")
+        for name in ("drawing", "requirements")
         for row in sheets[name].iter_rows()
         for cell in row
         if isinstance(cell.value, str) and cell.value.startswith("=")
     ]
-    assert len(formulas) == 3 * len(results.drawn.groups) + 2 * len(results.chosen.sides) + 1
+    sides = len(results.chosen.sides)
+    assert len(formulas) == 4 * len(results.drawn.groups) + 2 * sides + 1 + 3 * sides + 1
     assert not any("np." in formula or "e-" in formula or "nan" in formula for formula in formulas)
-    zones = sheets["zones"]
+    zones = sheets["drawing"]
     marked = {zones.cell(2 + at, 2).fill.fgColor.rgb for at in range(len(results.drawn.groups))}
     assert marked == {"00FFF2CC"}
     assert zones["C2"].fill.fgColor.rgb not in marked
-    assert "yellow" in zones.cell(3 + len(results.drawn.groups), 1).value
+    assert any("yellow" in str(row[0].value) for row in zones.iter_rows())
+    (guard,) = zones.data_validations.dataValidation
+    assert all(zones.cell(2 + at, 2).coordinate in guard.sqref for at in range(len(results.drawn.groups)))
+    assert zones.page_setup.orientation == "landscape" and zones.print_title_rows == "$1:$1"
+
+
+@pytest.mark.slow
+def test_a_reader_that_calculates_nothing_sees_what_the_formulas_give(drawn):
+    _, folder = drawn
+    workbook, kept = Workbook(folder / "drawing.xlsx"), load_workbook(folder / "drawing.xlsx", data_only=True)
+    formulas = [
+        (sheet.title, cell.coordinate)
+        for sheet in workbook.sheets
+        for row in sheet.iter_rows()
+        for cell in row
+        if isinstance(cell.value, str) and cell.value.startswith("=")
+    ]
+    for sheet, cell in formulas:
+        seen, calculated = kept[sheet][cell].value, workbook.value(sheet, cell)
+        assert seen == (calculated if isinstance(calculated, str) else pytest.approx(calculated, rel=1e-9)), (
+            sheet,
+            cell,
+        )
+
+
+@pytest.mark.slow
+def test_what_is_written_on_the_drawing_allows_nothing_wider(drawn):
+    results, folder = drawn
+    workbook, members = Workbook(folder / "drawing.xlsx"), dimensions(results)
+    for row, name in enumerate(results.drawn.groups, start=2):
+        frame, source = callout(members[name][0]), members[name][0]
+        written = workbook.value("drawing", f"K{row}")
+        whole = 2 * written if frame.characteristic == "size" else written
+        assert -1e-9 < source.zone / 1e-3 - whole < 2.01e-4
+        assert frame.zone.lstrip("±⌀") == f"{written:.4f}".rstrip("0").rstrip(".")
+    frames = ezdxf.readfile(folder / "frames.dxf")
+    shown = [entity.dxf.name for entity in frames.modelspace().query("INSERT")]
+    assert len(shown) == sum(len(frames_of_members(own)) for own in members.values())
+    assert all(len(frames.blocks[name]) >= 1 for name in shown)
 
 
 @pytest.mark.slow

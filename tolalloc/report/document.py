@@ -108,7 +108,8 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         Of the whole.
     parts
         Name and report of each; a table or figure whose name an earlier one has gets the part's name before its own,
-        and a table that says the same as the earlier one is left out.
+        and a table that says the same as the earlier one is left out. The answer of the last report that has something
+        for the first page, such as a drawing, stands first.
     manifest
         What is needed to repeat the run and to trust it.
     """
@@ -120,6 +121,7 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     drawn: set[str] = set()
     known: dict[str, pd.DataFrame] = {}
     reports = tuple(parts)
+    leading = [part for part, document in reports if any(section.first for section in document.sections)][-1:]
     for part, document in reports:
         own = {name: frame for name, frame in document.tables.items() if not _same(known.get(name), frame)}
         tables = {name: f"{part} {name}" if name in known else name for name in own}
@@ -131,6 +133,7 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
                 replace(
                     section,
                     part=document.title if len(reports) > 1 else "",
+                    first=section.first and part in leading,
                     tables=tuple((tables[name], frame) for name, frame in section.tables if name in tables),
                     figures=tuple(replace(figure, name=figures[figure.name]) for figure in section.figures),
                 )
@@ -149,15 +152,13 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         summary=summary,
         seed=manifest.get("seed"),
         manifest=manifest,
-        answers=_leading_first(reports) if len(reports) > 1 else (),
+        answers=tuple(
+            (document.title, document.answer)
+            for part, document in sorted(reports, key=lambda report: report[0] not in leading)
+        )
+        if len(reports) > 1
+        else (),
     )
-
-
-def _leading_first(reports: Iterable[tuple[str, Document]]) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return titles and answers, those first that have something for the first page, such as a drawing."""
-    documents = [document for _, document in reports]
-    documents.sort(key=lambda document: not any(section.first for section in document.sections))
-    return tuple((document.title, document.answer) for document in documents)
 
 
 def _same(earlier: pd.DataFrame | None, frame: pd.DataFrame) -> bool:

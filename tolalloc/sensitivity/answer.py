@@ -56,6 +56,8 @@ class RankingAnswer(Answer):
     sample: MonteCarlo
     design: SamplingDesign
     sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
+    # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
+    dimensions: SobolIndices | None
     reproduction: Reproduction  # How much of the ranking a second seed has shown
     orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
     # What not knowing the model itself does to the leading output; none where all of it is known
@@ -220,6 +222,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         with record.stage("Sobol indices"):
             sobol = measures.sobol("sobol", tuple(name for names in spectra.values() for name in names))
             effect = measures.uncertain(sample)
+            dimensions = measures.dimensions(sobol.growth.history[-1].blocks)
         with record.stage("Sobol, second seed"):
             again = measures.sobol("second seed", blocks=sobol.growth.history[-1].blocks)
         with record.stage("other measures"):
@@ -253,6 +256,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         sample=sample,
         design=effort.design,
         sobol=sobol,
+        dimensions=dimensions,
         reproduction=sobol.of(leading).reproduced_by(again.of(leading)),
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,

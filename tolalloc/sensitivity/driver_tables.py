@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from tolalloc.drawings.callouts import callout
+from tolalloc.drawings.sources import Source
+from tolalloc.report.feature_frame import Frames
 from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
@@ -59,6 +62,29 @@ def ranking_table(answer: RankingAnswer) -> pd.DataFrame:
             f"Sens, root mean square [{answer.unit}/µm]": [sens.get(name, np.nan) for name in frame["source"]],
         }
     )
+
+
+def dimensions_table(answer: RankingAnswer, found: SobolIndices) -> pd.DataFrame:
+    """Return the dimensions of the drawing, largest part in the variance first, with what stands on the drawing."""
+    members: dict[str, list[Source]] = {}
+    for source in answer.errors.active:
+        members.setdefault(source.group or source.name, []).append(source)
+    low, high = found.total_interval
+    rows = []
+    for at in found.order:
+        own = [source for name in found.sources[at].split(" + ") for source in members.get(name, ())]
+        rows.append(
+            {
+                "dimension": found.sources[at],
+                "places [-]": len(own),
+                "as written [mm]": Frames(dict.fromkeys(map(callout, own))),
+                "part in the variance (total index) [%]": found.total[at] * 100,
+                "low 5 % [%]": low[at] * 100,
+                "high 95 % [%]": high[at] * 100,
+                "alone (first-order index) [%]": max(found.first[at], 0.0) * 100,
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def pairs_table(answer: RankingAnswer) -> pd.DataFrame:

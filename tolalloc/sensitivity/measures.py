@@ -19,12 +19,12 @@ from tolalloc.differences import DifferencedResponse
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model, Response, ResponseWithDerivatives, SettingDerivatives
-from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices
 from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 from tolalloc.surrogate.choice import Choice, choose
@@ -116,6 +116,20 @@ class Measures:
             replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
             ranked=tuple(self.limits),
         )
+
+    def dimensions(self, blocks: int) -> SobolIndices | None:
+        """Return the indices of the leading output by the dimensions of the drawing, with so many blocks.
+
+        All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
+        every dimension has one member, or as many as are correlated with it.
+        """
+        joint = replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
+        groups, outputs = joint.dimension_of_column, (self.leading,)
+        if len(set(groups)) == len(joint.blocks):
+            return None
+        response = self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
+        experiment = self.experiment("dimensions", response, joint)
+        return sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), factor_groups=groups).of(0)
 
     def uncertain(self, sample: MonteCarlo) -> UncertainEffect | None:
         """Return what not knowing the model itself does to the leading output; none where all of it is known."""

@@ -27,6 +27,7 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
                 ("growth", driver_tables.growth_table(answer)),
             ),
         ),
+        *_dimensions(answer),
         *_correlated(answer),
         Section(
             heading="One ranking over all requirements",
@@ -38,6 +39,25 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             tables=(("all requirements", driver_tables.overall_table(answer)),),
         ),
         *_orders(answer),
+    )
+
+
+def _dimensions(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return the ranking with one line per dimension of the drawing; nothing where each is one source."""
+    if answer.dimensions is None:
+        return ()
+    return (
+        Section(
+            heading=f"Which dimension of the drawing drives the {answer.spoken}",
+            paragraphs=(
+                "One line per dimension, whose members (both discs of one drawing) are taken together and not set "
+                "against each other. A dimension has a part, alone or with others, in so much of the variance (total "
+                "index); the parts of all may add up to more than 100 %.",
+            ),
+            tables=(("dimensions", driver_tables.dimensions_table(answer, answer.dimensions)),),
+            unfolded=True,
+            first=True,
+        ),
     )
 
 

@@ -24,7 +24,7 @@ _NAMED = 3
 def sentences(answer: RankingAnswer) -> tuple[str, ...]:
     """Return the answer in sentences."""
     return (
-        *_drivers(answer.indices),
+        *_drivers(answer.dimensions or answer.indices),
         answer.sobol.growth.status,
         *_reproduced(answer),
         *_orders(answer),
@@ -53,8 +53,9 @@ def _drivers(sobol: SobolIndices) -> tuple[str, ...]:
     interval, among = sobol.total_interval, sobol.among_first(min(_NAMED, len(sobol.sources)))
     following = {pair.before: pair.probability for pair in sobol.neighbours}
     return tuple(
-        f"{place}. {sobol.sources[at]}: total index {sobol.total[at]:.3f} "
-        f"({interval[0, at]:.3f}…{interval[1, at]:.3f}), among the first {_NAMED} with {among[at]:.0%} probability"
+        f"{place}. {sobol.sources[at]} has a part in {sobol.total[at]:.0%} of the variance (total index "
+        f"{sobol.total[at]:.3f}, {interval[0, at]:.3f}…{interval[1, at]:.3f}), among the first {_NAMED} with "
+        f"{among[at]:.0%} probability"
         f"{f', before the next one with {following[at]:.0%}' if at in following else ''}."
         for place, at in enumerate(sobol.order[:_NAMED], start=1)
     )

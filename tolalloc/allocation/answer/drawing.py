@@ -118,7 +118,7 @@ def full_drawing_table(answer: AllocationAnswer) -> pd.DataFrame:
 def write_drawing(answer: AllocationAnswer, folder: Path) -> None:
     """Write ``allocation.csv``, which ``tolalloc`` reads back, and ``drawing.xlsx``, which goes on calculating."""
     write_csv(table_frame(sources_to_go_on_from(answer), folder), folder / "allocation.csv")
-    sheets = {"drawing": full_drawing_table(answer), **calculator_sheets(answer)}
+    sheets = {**calculator_sheets(answer), "tolerances": full_drawing_table(answer)}
     write_sheets(sheets, folder / "drawing.xlsx")
-    style_calculator(folder / "drawing.xlsx")
+    style_calculator(answer, folder / "drawing.xlsx")
     write_frames(frames_of(answer), folder / "frames.dxf")

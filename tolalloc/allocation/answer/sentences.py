@@ -227,10 +227,10 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
     chosen, found = answer.chosen, []
     if answer.header.quick:
-        found.append(
-            "Quick run: small samples, wide intervals, a design just at its limits is called met at even odds. "
-            "Run without --quick before setting a drawing."
-        )
+        found += [
+            "Quick run: small samples, wide intervals. Run without --quick before setting a drawing.",
+            "A quick run calls a design just at its limits met at even odds.",
+        ]
     if not answer.met:
         found.append(
             "No design was verified to meet all limits. This is the least violating one; what blocks is "
