@@ -30,6 +30,25 @@ def test_no_number_is_cut_however_narrow_the_screen(capsys, monkeypatch, width):
     assert all(word in said for word in label.split())
 
 
+def test_a_table_that_just_fits_is_not_cut(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    frame = pd.DataFrame(
+        {
+            "what": ["cost", "yield, all limits", "99.73% of peak-to-peak"],
+            "unit": ["cost units", "%", "arcsec"],
+            "before [unit]": [31.8, 80.86, 86.12],
+            "after [unit]": [32.13, 80.47, 85.29],
+            "change [unit]": [0.3333, -0.3906, -0.8345],
+            "low 95 % [unit]": [float("nan"), -2.157, -0.9883],
+            "high 95 % [unit]": [float("nan"), 1.421, -0.1123],
+        }
+    )
+    print_table(frame, "What changes")
+    said = capsys.readouterr().out
+    assert all(len(line) <= 80 for line in said.splitlines())
+    assert "-0.1123 │" in said and "1.421 │" in said
+
+
 def test_a_log_has_a_line_every_few_seconds_and_one_for_each_stage(capsys, monkeypatch):
     now = [0.0]
     monkeypatch.setattr(lines.time, "perf_counter", lambda: now[0])

@@ -63,9 +63,12 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     widths = [max(map(len, (" ", *name.split(), *own))) for name, own in zip(names, cells, strict=True)]
     for number, columns in enumerate(_side_by_side(widths[1:], console.width - first - _FRAME)):
         table = Table(title=escape(title if number == 0 else f"{title}, continued"))
-        table.add_column(escape(names[0]), min_width=first)
-        for column in columns:
-            table.add_column(escape(names[column]), justify="right", min_width=widths[column])
+        shown = [0, *columns]
+        least = [first, *(widths[column] for column in columns)]
+        most = [max(map(len, (names[column], *cells[column]))) for column in shown]
+        room = console.width - _FRAME - _BETWEEN * len(columns)
+        for column, width in zip(shown, _widened(least, most, room), strict=True):
+            table.add_column(escape(names[column]), justify="right" if column else "left", width=width)
         for row in rows:
             table.add_row(escape(row[0]), *(escape(row[column]) for column in columns))
         console.print(table)
@@ -82,6 +85,20 @@ def _side_by_side(widths: list[int], room: int) -> list[list[int]]:
         groups[-1].append(column)
         left -= width + _BETWEEN
     return groups
+
+
+def _widened(least: list[int], most: list[int], room: int) -> list[int]:
+    """Return widths of columns [characters]: none below its least, what room is left to those that have less than most.
+
+    rich, left to itself, takes from columns in proportion and then cuts the last one.
+    """
+    widths = list(least)
+    for _ in range(room - sum(least)):
+        wanting = [at for at, width in enumerate(widths) if width < most[at]]
+        if not wanting:
+            break
+        widths[max(wanting, key=lambda at: most[at] - widths[at])] += 1
+    return widths
 
 
 def _cell(value: object) -> str:
