@@ -120,6 +120,7 @@ def test_the_report_is_complete(allocated):
         "tables",
         "allocation.csv",
         "drawing.xlsx",
+        "frames.dxf",
     }
     page = (folder / "report.html").read_text(encoding="utf-8")
     for heading in (

@@ -67,6 +67,9 @@ def set_cell(row: int, column: str, value: str):
     return change
 
 
+DRAWN = {"drawing.xlsx", "frames.dxf"}
+
+
 @pytest.mark.slow
 def test_te_of_table_4(tmp_path):
     folder = tmp_path / "report"
@@ -101,10 +104,29 @@ def test_check_is_in_order():
 @pytest.mark.slow
 def test_run_folder_is_complete(run_folder):
     names = {str(path.relative_to(run_folder)) for path in run_folder.rglob("*") if path.is_file()}
-    files = {"manifest.json", "summary.json", "report.html", "results.xlsx", "allocation.csv", "drawing.xlsx"}
+    files = {"manifest.json", "summary.json", "report.html", "results.xlsx", "allocation.csv"} | DRAWN
     assert {name for name in names if "/" not in name} == files
-    tables = {"ranking", "requirements", "allocation requirements", "tolerances", "front", "drawing", "shares"}
-    figures = {"ranking", "zones", "peak_to_peak", "front", "transmission_error", "orders", "orders_of_units"}
+    tables = {
+        "ranking",
+        "dimensions",
+        "allocation dimensions",
+        "requirements",
+        "allocation requirements",
+        "tolerances",
+        "front",
+        "drawing",
+        "shares",
+    }
+    figures = {
+        "ranking",
+        "effects",
+        "zones",
+        "peak_to_peak",
+        "front",
+        "transmission_error",
+        "orders",
+        "orders_of_units",
+    }
     assert names >= {f"tables/{name}.csv" for name in tables} | {f"figures/{name}.png" for name in figures}
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,7 +9,6 @@ import pytest
 from tolalloc.report.charts import chart
 from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.report.pdf import write_pdf
 from tolalloc.report.plots import drawn
 from tolalloc.report.writer import write_document
 
@@ -90,20 +86,3 @@ def test_a_rounded_number_says_itself_whole_and_no_text_ends_a_script(tmp_path):
     assert page.count("</script>") == page.count("<script") == 4
     assert "\\u003c/script>" in page
     assert len(page) < 100_000
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    shutil.which("chromium") is None, reason="no browser is installed that prints: apt install chromium"
-)
-@pytest.mark.parametrize("paper", ["A4", "Letter"])
-def test_a_printed_report_cuts_no_table_and_draws_its_charts(tmp_path, paper):
-    page, pdf = _report(tmp_path / "report"), tmp_path / "report.pdf"
-    write_pdf(page, pdf, paper)
-    said = subprocess.run(["pdftotext", "-layout", pdf, "-"], check=True, capture_output=True, text=True).stdout
-    said = "".join(said.split())
-    for row in (0, 59):
-        assert f"{row + 13 / 7:.4g}" in said  # the last column, which a page cut off
-    assert "drawingnumber" in said
-    for drawn_text in ("a.b", "share[-]", "angle[°]"):
-        assert drawn_text in said

@@ -130,7 +130,7 @@ class Drawing:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the name and the table."""
-        from tolalloc.report.writer import html_table
+        from tolalloc.report.html_table import html_table
 
         return f"<p><b>{self.name}: {len(self.sources)} sources</b></p>\n{html_table(self.to_frame())}"
 

@@ -100,7 +100,7 @@ def _with_values(sheet: bytes, values: Mapping[str, float | str]) -> bytes:
         shown.text = value if isinstance(value, str) else repr(float(value))
         if isinstance(value, str):
             cell.set("t", "str")
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _shown(value: object) -> object:

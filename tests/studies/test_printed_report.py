@@ -1,0 +1,158 @@
+"""A report on screen and on paper: its structure, and that a printed one has lost nothing."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.studies.command import refused, tolalloc
+from tolalloc.report import pdf
+from tolalloc.report.document import Document, Section, joined
+from tolalloc.report.feature_frame import FeatureFrame
+from tolalloc.report.figure import Figure, HeatMap, Series
+from tolalloc.report.html_table import html_table
+from tolalloc.report.writer import write_document
+
+VOID = {"meta", "br", "wbr", "img", "link", "hr"}
+
+
+class Page(HTMLParser):
+    """What stands in a page: open and closed tags, names, links, tables with their cells, texts of pictures."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.open, self.faults, self.names, self.links = [], [], [], []
+        self.tables, self.pictures, self.headings = [], 0, []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        known = dict(attrs)
+        self.names += [known["id"]] if "id" in known else []
+        self.links += [known["href"]] if tag == "a" else []
+        self.pictures += tag == "svg"
+        if tag == "table":
+            self.tables.append([])
+        elif tag == "tr":
+            self.tables[-1].append(0)
+        elif tag in ("td", "th"):
+            self.tables[-1][-1] += 1
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.names += [own for name, own in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(tag)
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("h1", "h2", "h3"):
+            self.headings.append(data)
+
+
+def report(title: str, *, first: bool = False, rows: int = 60) -> Document:
+    numbers = np.arange(rows, dtype=float)
+    long = pd.DataFrame(
+        {"source": [f"{title}.part{at}.position" for at in range(rows)], "zone [µm]": numbers + 0.123456}
+    )
+    wide = pd.DataFrame({f"a long header of column {at} [arcsec]": numbers[:3] * 1234.5678 for at in range(12)})
+    framed = pd.DataFrame(
+        {"dimension": ["bores"], "write [mm]": [FeatureFrame("position", "⌀0.0047", ("A",), "4.75 µm")]}
+    )
+    bars = Series(label="index", kind="bars", x=[f"s{at}" for at in range(24)], y=list(numbers[:24]))
+    cells = HeatMap(
+        name=f"{title} cells", title="Cells", columns=["1", "2"], rows=["a"], label="[-]", values=[[1.0, 0.2]]
+    )
+    return Document(
+        title=title,
+        subtitle="seed 1",
+        answer=tuple(f"{title}: sentence {at} on the yield." for at in range(5)),
+        warnings=(f"{title} is quick.",),
+        sections=(
+            Section(heading="What to write", tables=((f"{title} drawing", framed),), first=first, unfolded=True),
+            Section(heading="Long", tables=((f"{title} long", long),), unfolded=True),
+            Section(heading="Wide", tables=((f"{title} wide", wide),)),
+            Section(
+                heading="Pictures", figures=(Figure(name=title, title="Bars", x_label="[-]", series=(bars,)), cells)
+            ),
+        ),
+        assumptions=("none is printed",),
+        summary={},
+    )
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    whole = joined("Both", "seed 1", [("r", report("Ranking", first=True)), ("a", report("Allocation", first=True))])
+    write_document(whole, folder)
+    return folder / "report.html"
+
+
+def test_a_page_is_sound_and_begins_with_answer_and_drawing(written):
+    text = written.read_text(encoding="utf-8")
+    page = Page(text)
+    assert not page.faults and not page.open
+    assert len(page.names) == len(set(page.names))
+    assert page.links and all(link.startswith("#") and link[1:] in page.names for link in page.links)
+    assert page.pictures == 2  # the frames; charts are drawn from their records when the page is opened
+    assert text.count('class="figure"') == 4
+    for table in page.tables:
+        assert len(set(table)) == 1
+    assert page.headings[:4] == ["Both", "Allocation", "Ranking", "What to write"]
+    assert text.index("Allocation: sentence 0") < text.index("Ranking: sentence 0") < text.index("<nav>")
+    assert text.index("Allocation drawing" if "Allocation drawing" in text else "⌀0.0047") < text.index("<nav>")
+    assert text.count("The answer in full") == 4
+    assert "display: table-header-group" in text
+    assert "<dt>yield</dt>" in text and "<dt>jammed</dt>" not in text
+
+
+def test_a_number_is_rounded_and_says_its_exact_value():
+    frame = pd.DataFrame(
+        {"zone [µm]": [4.75003571846641, 4.0], "cost [cost units]": [0.8421, 12.0], "span [µm]": ["1…2", "3…4"]}
+    )
+    table = str(html_table(frame))
+    assert '<td class="number" title="4.750035718">4.75</td>' in table
+    assert '<td class="number">4</td>' in table
+    assert '<td class="number" title="0.8421">0.84</td>' in table
+    assert '<td class="number">1…2</td>' in table
+    assert str(html_table(pd.DataFrame({"a": ["<b>"], "b [-]": [float("nan")]}))).count("&lt;b&gt;") == 1
+
+
+def test_what_cannot_be_printed_is_said_before_anything_runs(tmp_path, monkeypatch):
+    study = "studies/rv20e_allocation.py"
+    result = tolalloc("run", study, "--pdf", "--paper", "A5", "--out", tmp_path / "run")
+    refused(result, "--paper", "A4 or Letter")
+    monkeypatch.setattr(pdf, "which", lambda name: None)
+    refused(tolalloc("run", study, "--pdf", "--out", tmp_path / "run"), "open report.html")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("paper", "size"), [("A4", "594"), ("Letter", "612 x 792")])
+def test_a_printed_report_has_lost_nothing(written, tmp_path, paper, size):
+    if not any(map(shutil.which, pdf.BROWSERS)):
+        pytest.skip("no browser is installed that prints a page")
+    if not shutil.which("pdftotext"):
+        pytest.skip("pdftotext of poppler is not installed")
+    path = tmp_path / "report.pdf"
+    pdf.write_pdf(written, path, paper)
+    said = subprocess.run(["pdfinfo", path], capture_output=True, text=True, check=True).stdout
+    assert size in said
+    text = subprocess.run(["pdftotext", "-layout", path, "-"], capture_output=True, text=True, check=True).stdout
+    pages = text.split("\f")
+    assert 6 <= len(pages) <= 16
+    for title in ("Ranking", "Allocation"):
+        assert all(f"{title}.part{at}.position" in text for at in range(60))
+        assert f"{title}: sentence 4 on the yield." in " ".join(text.split())
+    assert text.count("⌀0.0047") == 2
+    assert "Both" in pages[0] and "drawing number" in pages[0] and "⌀0.0047" in pages[0]
+    continued = [page for page in pages if ".part59." in page]
+    assert continued and all("zone [µm]" in page for page in continued)  # the header stands on every page of a table
+    assert text.count(f"{2 * 1234.5678:.4g}") >= 24  # no column of a wide table is cut
