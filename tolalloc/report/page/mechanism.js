@@ -9,7 +9,8 @@ const VERSION = 1;
 
 /** Numbers of an entry that `tolalloc.rv.scene.blocks` wrote. */
 export function numbers(entry) {
-  const bytes = Uint8Array.from(atob(entry.data), (sign) => sign.charCodeAt(0));
+  const text = atob(entry.data), bytes = new Uint8Array(text.length);
+  for (let at = 0; at < text.length; at += 1) bytes[at] = text.charCodeAt(at);
   if (entry.type === "u1") return Float64Array.from(bytes, (step) => entry.low + entry.step * step);
   return new Float64Array(bytes.buffer);
 }
@@ -48,6 +49,19 @@ const degrees = (angle) => (angle * 360) / TURN;
 const moved = ([x, y], angle = 0) => `translate(${x.toFixed(4)} ${y.toFixed(4)}) rotate(${degrees(angle).toFixed(4)})`;
 const ring = ([x, y], radius) =>
   `M${(x + radius).toFixed(3)} ${y.toFixed(3)}a${radius} ${radius} 0 1 0 ${-2 * radius} 0a${radius} ${radius} 0 1 0 ${2 * radius} 0Z`;
+
+/** The outer half of a circle about a place: a groove in the ring that the place lies on. */
+const half = ([x, y], radius) => {
+  const away = radius / Math.hypot(x, y), [sx, sy] = [-y * away, x * away];
+  const write = (side) => `${(x + side * sx).toFixed(3)} ${(y + side * sy).toFixed(3)}`;
+  return `M${write(-1)}A${radius} ${radius} 0 0 1 ${write(1)}Z`;
+};
+
+/** A number with three digits that count, as a reader writes it. */
+const short = (value) => {
+  const size = Math.abs(value), text = String(size >= 1000 ? Math.round(size) : Number(size.toPrecision(3)));
+  return (value < 0 ? "−" : "") + text.replace(/\B(?=(\d{3})+(?!\d)(?<!\.\d*))/g, ",");
+};
 
 /** An involute spur gear about the origin, its first tooth on the x axis. */
 function gear(teeth, module, pressureAngle) {
@@ -134,6 +148,23 @@ class Teeth {
   }
 }
 
+/** Light a place for the rows of tables that name one of its sources, and those rows for the place. */
+export function follow(mechanism, root = document) {
+  const placeOf = new Map(mechanism.scene.places.flatMap(({ id, sources }) => sources.map((source) => [source, id])));
+  const rows = new Map(mechanism.scene.places.map(({ id }) => [id, []]));
+  for (const cell of root.querySelectorAll("table td, table th")) {
+    const id = placeOf.get(cell.textContent.trim());
+    if (!id) continue;
+    const row = cell.parentElement;
+    rows.get(id).push(row);
+    row.addEventListener("pointerenter", () => mechanism.light([id]));
+    row.addEventListener("pointerleave", () => mechanism.light([]));
+  }
+  mechanism.handlers.onPoint = (pointed) => {
+    for (const [id, own] of rows) for (const row of own) row.classList.toggle("mechanism-row", id === pointed);
+  };
+}
+
 export class Mechanism {
   constructor(element, scene, { onPoint = () => {}, onChoose = () => {}, controls = true } = {}) {
     this.element = element;
@@ -153,7 +184,8 @@ export class Mechanism {
     if (scene.version !== VERSION) throw new Error(`The picture knows version ${VERSION} of a scene, not ${scene.version}.`);
     const structure = JSON.stringify([scene.outline, scene.places.map((place) => place.id)]);
     this.scene = scene;
-    this.teeth = new Teeth(scene);
+    const shape = JSON.stringify(scene.tooth);
+    if (shape !== this.shape) [this.shape, this.teeth] = [shape, new Teeth(scene)];
     this.states = Object.fromEntries(["forward", "backward"].map((name) => {
       const states = scene[name];
       return [name, {
@@ -258,13 +290,13 @@ export class Mechanism {
     element.classList.add("mechanism");
     element.replaceChildren();
     if (this.withControls) this.buildControls();
+    this.said = html("p", "mechanism-said", "", element);
+    this.said.setAttribute("aria-live", "polite");
     const views = html("div", "mechanism-views", "", element);
     for (let disc = 0; disc < scene.outline.disc_count; disc += 1) {
       this.buildView(views, `Disc ${disc + 1} on the pins`, (view) => this.buildDisc(view, disc));
     }
     this.buildView(views, "Carrier, planets and sun", (view) => this.buildFirstStage(view));
-    this.said = html("p", "mechanism-said", "", element);
-    this.said.setAttribute("aria-live", "polite");
     this.buildLegend();
     this.shade(this.shares);
     this.light([...this.lit]);
@@ -341,7 +373,7 @@ export class Mechanism {
       class: "housing", "fill-rule": "evenodd", d: ring(origin, outline.housing_radius) + ring(origin, circle),
     }, view);
     const at = positions(scene, 0).pins;
-    this.place("housing.grooves", "path", { class: "groove", d: at.map((place) => ring(place, 1.14 * pin)).join("") }, view);
+    this.place("housing.grooves", "path", { class: "groove", d: at.map((place) => half(place, 1.45 * pin)).join("") }, view);
     const others = [];
     for (let other = outline.disc_count - 1; other >= 0; other -= 1) {
       if (other !== disc) others.push([other, made("path", { class: "other-disc", d: this.teeth.exact }, view)]);
@@ -361,6 +393,8 @@ export class Mechanism {
       cranks.push({ other, journal, shaft, lever });
     }
     const arrows = made("path", { class: "force" }, view);
+    const end = outline.housing_radius, inner = circle + 1.6 * pin;
+    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
     this.painters.push((pose) => {
       const angle = pose.at.disc[disc], centre = pose.at.discs[disc];
       for (const [other, path] of others) path.setAttribute("transform", moved(pose.at.discs[other], pose.at.disc[other]));
@@ -381,6 +415,7 @@ export class Mechanism {
         lever.setAttribute("d", `M${axis[0]} ${axis[1]}L${eccentric[0]} ${eccentric[1]}`);
       });
       arrows.setAttribute("d", this.arrows(pose.contacts[disc]));
+      output.setAttribute("transform", moved([0, 0], pose.output));
     });
   }
 
@@ -391,7 +426,7 @@ export class Mechanism {
   }
 
   arrows(contacts) {
-    const { outline } = this.scene, longest = 0.2 * outline.pin_circle_radius, parts = [];
+    const { outline } = this.scene, longest = 0.3 * outline.pin_circle_radius, parts = [];
     for (const { force, point, normal } of contacts) {
       const length = (longest * force) / this.largest;
       if (length < 0.004 * outline.pin_circle_radius) continue;
@@ -409,7 +444,8 @@ export class Mechanism {
     made("circle", { class: "outline", r: outline.housing_radius }, view);
     const carrier = this.place("carrier", "path", { class: "carrier" }, view);
     carrier.setAttribute("d", ring([0, 0], outline.carrier_radius));
-    const needle = made("path", { class: "needle" }, view);
+    const { pin_circle_radius: circle, pin_radius: pin, housing_radius: end } = outline, inner = circle + 1.6 * pin;
+    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
     const planetShape = gear(outline.planet_teeth, outline.module, outline.pressure_angle);
     const sunShape = gear(outline.sun_teeth, outline.module, outline.pressure_angle);
     const web = (teeth) => Math.max((outline.module * teeth) / 2 - 2 * outline.module, 0.35 * outline.module * teeth);
@@ -429,10 +465,7 @@ export class Mechanism {
     const meshes = planets.map((_, crank) => this.place(`mesh${crank + 1}`, "circle", { class: "mesh", r: 1.1 * outline.module }, view));
     this.painters.push((pose) => {
       carrier.setAttribute("transform", moved(pose.carrierCentre));
-      const turned = pose.at.carrier[0] + pose.magnification * pose.state.error;
-      const edge = outline.carrier_radius, end = outline.housing_radius;
-      needle.setAttribute("d", `M${0.86 * edge} 0L${0.99 * end} 0M${0.93 * end} ${0.02 * end}L${0.99 * end} 0L${0.93 * end} ${-0.02 * end}`);
-      needle.setAttribute("transform", moved(pose.carrierCentre, turned));
+      output.setAttribute("transform", moved([0, 0], pose.output));
       planets.forEach(({ turning, bore, shaft }, crank) => {
         turning.setAttribute("transform", moved(pose.planets[crank], pose.at.planet[crank]));
         bore.setAttribute("transform", moved(pose.carrierBores[crank]));
@@ -451,7 +484,7 @@ export class Mechanism {
     const legend = html("ul", "mechanism-legend", "", this.element);
     for (const [className, text] of [
       ["key-force", "force of a pin on the disc"], ["key-other", "the other discs, without errors"],
-      ["key-needle", "output, turned further by the magnified transmission error"], ["key-share", "share in what is asked"],
+      ["key-output", "where the output stands, turned further by the magnified transmission error"], ["key-share", "share in what is asked"],
     ]) {
       const item = html("li", className, "", legend);
       html("span", "key", "", item);
@@ -478,7 +511,7 @@ export class Mechanism {
     const planetOf = (crank) => coordinates.planet[crank], discOf = (disc) => coordinates.disc[disc];
     const cranks = at.cranks.map((own, crank) => sum(own, shift(planetOf(crank))));
     return {
-      at, state, magnification: large, cranks,
+      at, state, magnification: large, cranks, output: carrierAngle + large * state.error,
       journals: at.journals.map((row, crank) => row.map((own, disc) => sum(own, shift(planetOf(crank)),
         [...across(outline.eccentricity, at.crank[disc]), q[planetOf(crank) + 2]],
         turned(`crank${crank + 1}.journal${disc + 1}`, crankAngle)))),
@@ -514,16 +547,17 @@ export class Mechanism {
   draw() {
     const pose = this.pose;
     for (const paint of this.painters) paint(pose);
-    this.state_(pose);
+    this.tell(pose);
   }
 
-  state_(pose) {
+  tell(pose) {
     const turn = degrees(this.carrierAngle), seconds = degrees(pose.state.error) * 3600;
     const touching = pose.contacts.map((own) => own.filter(({ force }) => force > 0).length).join(" and ");
     this.stated.textContent =
-      `Errors, gaps and displacements are drawn ${pose.magnification} times larger. Carrier at ${turn.toFixed(2)}°, ` +
-      `torque ${pose.state.torque.toPrecision(4)} N·m, transmission error ${seconds.toFixed(1)}″, ${touching} pins carry; ` +
-      `the longest arrow is ${this.largest.toPrecision(3)} N.`;
+      `Errors, gaps and displacements are drawn ${short(pose.magnification)} times larger. Carrier at ${turn.toFixed(2)}°, ` +
+      `torque ${short(pose.state.torque)} N·m, transmission error ${seconds.toFixed(1).replace("-", "−")}″, ${touching} pins carry; ` +
+      `the longest arrow of the turn is ${short(this.largest)} N. In one output turn the sun turns ${short(Math.abs(this.scene.turns.sun))} ` +
+      `times the same way, the cranks ${short(Math.abs(this.scene.turns.crank))} times the other way.`;
     if (!this.withControls) return;
     if (document.activeElement !== this.angleInput) this.angleInput.value = String(this.phase);
     this.angleInput.setAttribute("aria-valuetext", `${turn.toFixed(1)} degrees`);
