@@ -319,6 +319,16 @@ class Model(ABC):
         """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one."""
         return None
 
+    def moving(
+        self,
+        errors: ErrorModel,  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        shares: Mapping[str, float],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+    ) -> tuple[Section, ...]:
+        """Return a picture of one unit's columns whose places show the sources' shares; nothing unless there is one."""
+        return ()
+
 
 @runtime_checkable
 class ModelSource(Protocol):

@@ -49,6 +49,7 @@ def _draw(axes: Any, figure: Figure, number: int) -> None:
         _draw_bars(axes, figure, number)
 
 
+@singledispatch
 def save_png(figure: Figure | HeatMap, path: Path) -> None:
     """Draw a figure into a PNG file."""
     drawn(figure).savefig(path, dpi=130)

@@ -23,13 +23,14 @@ from tolalloc.report.excel import write_sheets
 from tolalloc.report.figure import Figure, HeatMap
 from tolalloc.report.glossary import words_in
 from tolalloc.report.html_table import html_table
-from tolalloc.report.page import as_json, script, style
+from tolalloc.report.page import as_json, scripts, style
 from tolalloc.report.plots import drawn, save_png
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
 _SENTENCES = 3
 """Sentences of each answer on the first page of a report that joins several [-]."""
+_MOVING = "moving"
 _LISTED = 6
 """Sections beyond which a page begins with a list of them [-]."""
 _LIBRARIES = (
@@ -104,6 +105,11 @@ def _in_full(document: Document) -> list[dict[str, Any]]:
     ]
 
 
+def _drawn_by(record: dict[str, Any]) -> tuple[str, str, Markup]:
+    """Return the title of a figure, what kind of script draws it, and the record that it is drawn from."""
+    return record["title"], _MOVING if "scene" in record else "figure", as_json(record)
+
+
 def _write_page(document: Document, path: Path) -> None:
     """Write the page, all that it shows inside."""
     sections: list[dict[str, Any]] = [
@@ -112,7 +118,7 @@ def _write_page(document: Document, path: Path) -> None:
             "heading": section.heading,
             "first": section.first,
             "paragraphs": section.paragraphs,
-            "figures": [(figure.title, as_json(chart(figure))) for figure in section.figures],
+            "figures": [_drawn_by(chart(figure)) for figure in section.figures],
             "tables": [
                 (name, len(frame), _is_large(frame) and not section.unfolded, html_table(frame))
                 for name, frame in section.tables
@@ -130,10 +136,11 @@ def _write_page(document: Document, path: Path) -> None:
     headers = [str(header) for frame in document.tables.values() for header in frame.columns]
     texts = [*document.answer, *document.warnings, *(own.heading for own in document.sections), *headers]
     texts += [paragraph for own in document.sections for paragraph in own.paragraphs]
+    moving = any(kind == _MOVING for own in sections for _, kind, _ in own["figures"])
     content = page.render(
         document=document,
-        style=style(),
-        script=script(),
+        style=style(moving=moving),
+        scripts=scripts(moving=moving),
         answers=_told(document),
         block=_block(document),
         footer=document.title.replace("\\", "").replace('"', "”"),

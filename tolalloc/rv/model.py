@@ -12,7 +12,8 @@ from jaxtyping import Float
 
 from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
-from tolalloc.exceptions import UnknownNameError
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.exceptions import SolveError, UnknownNameError
 from tolalloc.models import Model, Observer, Response, SettingDerivatives
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
@@ -269,6 +270,17 @@ class ReducerModel(Model):
         kernel = self.at(settings).kernel
         errors = kernel.errors(x[np.newaxis])[0]
         return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=sources).record(coarse=True)
+
+    def moving(
+        self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
+    ) -> tuple[Section, ...]:
+        """Return the moving picture of a unit; nothing of one that has no equilibrium at some angle."""
+        from tolalloc.rv.scene.section import moving
+
+        try:
+            return moving(self, errors, x, shares, unit)
+        except SolveError:
+            return ()
 
     @property
     def content(self) -> Any:

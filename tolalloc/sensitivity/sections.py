@@ -39,6 +39,7 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             tables=(("all requirements", driver_tables.overall_table(answer)),),
         ),
         *_orders(answer),
+        *_reducer(answer),
     )
 
 
@@ -59,6 +60,13 @@ def _dimensions(answer: RankingAnswer) -> tuple[Section, ...]:
             first=True,
         ),
     )
+
+
+def _reducer(answer: RankingAnswer) -> tuple[Section, ...]:
+    """Return the model's picture of the median unit, coloured by the drivers of the leading output; or nothing."""
+    total = answer.indices.total
+    shares = dict(zip(answer.indices.sources, (total / total.sum()).tolist(), strict=True))
+    return answer.model.moving(answer.errors, answer.sample.unit_at(0.5)[0], shares, "median unit")
 
 
 def _orders(answer: RankingAnswer) -> tuple[Section, ...]:

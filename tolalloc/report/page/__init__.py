@@ -14,14 +14,15 @@ def asset(name: str) -> str:
     return (files(__name__) / name).read_text(encoding="utf-8")
 
 
-def style() -> Markup:
-    """Return the style sheet, for screen and print."""
-    return Markup(asset("page.css"))
+def style(*, moving: bool) -> Markup:
+    """Return the style sheet, for screen and print, with that of moving pictures where there are any."""
+    return Markup(asset("page.css") + (asset("mechanism.css") if moving else ""))
 
 
-def script() -> Markup:
-    """Return the module that draws the figures of a report, as it stands inside the page."""
-    return Markup(asset("chart.js") + asset("report.js"))
+def scripts(*, moving: bool) -> tuple[Markup, ...]:
+    """Return the modules that draw the figures of a report, as they stand inside the page."""
+    charts = Markup(asset("chart.js") + asset("report.js"))
+    return (charts, Markup(asset("mechanism.js") + asset("moving.js"))) if moving else (charts,)
 
 
 def as_json(content: Any) -> Markup:

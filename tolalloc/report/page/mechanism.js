@@ -7,7 +7,7 @@ const SECONDS_PER_CRANK_TURN = 8;
 const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 const VERSION = 1;
 
-/** Numbers of an entry that `tolalloc.rv.scene.blocks` wrote. */
+/** Numbers of an entry that `tolalloc.report.picture.blocks` wrote. */
 export function numbers(entry) {
   const text = atob(entry.data), bytes = new Uint8Array(text.length);
   for (let at = 0; at < text.length; at += 1) bytes[at] = text.charCodeAt(at);

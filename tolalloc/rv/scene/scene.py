@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.report.picture.blocks import block, coarse_block, values_of
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.scene.blocks import block, coarse_block, values_of
 from tolalloc.rv.scene.outlines import outlines, tooth
 from tolalloc.rv.scene.places import Place, places_of
 from tolalloc.rv.scene.states import States, solved_states
