@@ -23,11 +23,9 @@ _LONGEST = 0.3
 """Length of the arrow of the largest force over the radius of the pin circle [-]."""
 
 
-def _mixed(colour: str, share: float) -> tuple[float, ...]:
-    """Return a colour with a share of the accent [-]."""
-    return tuple(
-        (1 - share) * own + share * accent for own, accent in zip(to_rgb(colour), to_rgb(_ACCENT), strict=True)
-    )
+def mixed(colour: str, other: str, share: float) -> tuple[float, ...]:
+    """Return red, green and blue of a colour with a share of another one [-]."""
+    return tuple((1 - share) * own + share * more for own, more in zip(to_rgb(colour), to_rgb(other), strict=True))
 
 
 def _points(values: Complex[np.ndarray, " point"]) -> Float[np.ndarray, "point 2"]:
