@@ -28,12 +28,12 @@ def block(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
 def coarse_block(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
     """Return an array in 255 equal steps from its smallest to its largest number: an eighth of the size, for the eye.
 
-    A number that is not finite becomes 0.
+    A number that is not finite becomes 0; one above the smallest stays above it, so that what carries goes on carrying.
     """
     finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
     low, high = (float(edge(finite)) if finite.size else 0.0 for edge in (np.min, np.max))
     step = (high - low) / LEVELS
-    steps = np.rint((finite - low) / step) if step else np.zeros(finite.shape)
+    steps = np.maximum(np.rint((finite - low) / step), finite > low) if step else np.zeros(finite.shape)
     content = b64encode(steps.astype(np.uint8).tobytes()).decode()
     return {"type": "u1", "shape": list(values.shape), "low": low, "step": step, "data": content}
 

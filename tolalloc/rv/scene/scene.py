@@ -63,13 +63,14 @@ class Scene:
         return float(self.start[part][number] + self.turns[part] * carrier_angle)
 
     def record(self, coarse: bool = False) -> dict[str, Any]:
-        """Return the scene as JSON knows it; coarse in 255 steps per quantity, for a report that stays small."""
-        write = coarse_block if coarse else block
+        """Return the scene as JSON knows it; a coarse one is small, 255 steps for all pins or parts."""
         found = {field.name: getattr(self, field.name) for field in fields(self)}
         for name in ("forward", "backward"):
-            states = asdict(found[name])
             found[name] = {
-                key: write(value) if isinstance(value, np.ndarray) else value for key, value in states.items()
+                key: (coarse_block if coarse and value.ndim > 1 else block)(value)
+                if isinstance(value, np.ndarray)
+                else value
+                for key, value in asdict(found[name]).items()
             }
         found["places"] = [asdict(place) | {"sources": list(place.sources)} for place in self.places]
         return {"version": VERSION, **found, "carrier_angle": block(self.carrier_angle)}
