@@ -89,42 +89,28 @@ class Teeth {
   constructor(scene) {
     const { tooth, outline } = scene, count = tooth.exact.length * outline.disc_teeth;
     this.count = count;
-    for (const field of ["x", "y", "removedX", "removedY", "normalX", "normalY", "polar"]) this[field] = new Float64Array(count);
+    for (const field of ["x", "y", "modifiedX", "modifiedY", "normalX", "normalY", "polar"]) this[field] = new Float64Array(count);
     let at = 0;
     for (let number = 0; number < outline.disc_teeth; number += 1) {
       const turn = (TURN * number) / outline.disc_teeth, cosine = Math.cos(turn), sine = Math.sin(turn);
       const turned = ([x, y]) => [cosine * x - sine * y, sine * x + cosine * y];
       for (let point = 0; point < tooth.exact.length; point += 1, at += 1) {
-        const exact = tooth.exact[point], modified = tooth.modified[point];
-        [this.x[at], this.y[at]] = turned(exact);
-        [this.removedX[at], this.removedY[at]] = turned([modified[0] - exact[0], modified[1] - exact[1]]);
+        [this.x[at], this.y[at]] = turned(tooth.exact[point]);
+        [this.modifiedX[at], this.modifiedY[at]] = turned(tooth.modified[point]);
         [this.normalX[at], this.normalY[at]] = turned(tooth.normal[point]);
-        this.polar[at] = Math.atan2(exact[1], exact[0]) + turn;
+        this.polar[at] = Math.atan2(tooth.exact[point][1], tooth.exact[point][0]) + turn;
       }
     }
-    // φ from 0 to π with what the modification removes there, to tell it from the rest of a gap.
-    const middle = (tooth.angle.length) / 2;
-    this.angle = tooth.angle.slice(middle);
-    this.removed = tooth.removed.slice(middle);
-    this.angle.push(tooth.angle[0]);
-    this.removed.push(tooth.removed[0]);
   }
 
-  /** What the modification removes where a pin at φ touches [mm]. */
-  removedAt(angle) {
-    const last = this.angle.length - 1;
-    let above = 1;
-    while (above < last && this.angle[above] < angle) above += 1;
-    const low = this.angle[above - 1], share = (angle - low) / (this.angle[above] - low);
-    return this.removed[above - 1] * (1 - share) + this.removed[above] * share;
-  }
-
-  /** The outline whose distance from every pin is the gap, magnified: contacts in the disc's frame, gaps in mm. */
+  /**
+   * The outline whose distance from every pin is the gap, magnified: contacts in the disc's frame, gaps in mm.
+   * Without modification and errors every tooth touches its pin; from there it is moved along its normal.
+   */
   outline(contacts, magnification) {
     const pins = contacts.length, parts = new Array(this.count);
     const from = (polar) => ((polar - contacts[0].polar) % TURN + TURN) % TURN;
     const reach = contacts.map((contact) => from(contact.polar));
-    const rest = contacts.map((contact) => contact.gap - this.removedAt(contact.angle));
     let first = 0, least = Infinity;
     for (let at = 0; at < this.count; at += 1) {
       const own = from(this.polar[at]);
@@ -135,16 +121,15 @@ class Teeth {
       while (pin < pins - 1 && reach[pin + 1] <= own) pin += 1;
       const end = pin + 1 < pins ? reach[pin + 1] : TURN, next = (pin + 1) % pins;
       const share = (own - reach[pin]) / (end - reach[pin] || 1);
-      const more = rest[pin] * (1 - share) + rest[next] * share;
-      const x = this.x[at] + magnification * (this.removedX[at] + more * this.normalX[at]);
-      const y = this.y[at] + magnification * (this.removedY[at] + more * this.normalY[at]);
+      const away = magnification * (contacts[pin].gap * (1 - share) + contacts[next].gap * share);
+      const x = this.x[at] + away * this.normalX[at], y = this.y[at] + away * this.normalY[at];
       parts[at] = `${x.toFixed(3)} ${y.toFixed(3)}`;
     }
     return `M${parts.join("L")}Z`;
   }
 
-  get exact() {
-    return `M${Array.from(this.x, (x, at) => `${x.toFixed(3)} ${this.y[at].toFixed(3)}`).join("L")}Z`;
+  get modified() {
+    return `M${Array.from(this.modifiedX, (x, at) => `${x.toFixed(3)} ${this.modifiedY[at].toFixed(3)}`).join("L")}Z`;
   }
 }
 
@@ -185,7 +170,10 @@ export class Mechanism {
     const structure = JSON.stringify([scene.outline, scene.places.map((place) => place.id)]);
     this.scene = scene;
     const shape = JSON.stringify(scene.tooth);
-    if (shape !== this.shape) [this.shape, this.teeth] = [shape, new Teeth(scene)];
+    if (shape !== this.shape) {
+      [this.shape, this.teeth] = [shape, new Teeth(scene)];
+      for (const path of this.element.querySelectorAll(".other-disc")) path.setAttribute("d", this.teeth.modified);
+    }
     this.states = Object.fromEntries(["forward", "backward"].map((name) => {
       const states = scene[name];
       return [name, {
@@ -251,6 +239,7 @@ export class Mechanism {
       for (const element of elements) {
         const share = Math.min(Math.max(shares[id] ?? 0, 0), 1);
         element.style.setProperty("--share", `${(100 * share).toFixed(1)}%`);
+        element.style.setProperty("--weight", share.toFixed(3));
         element.classList.toggle("shaded", share > 0);
       }
     }
@@ -376,7 +365,7 @@ export class Mechanism {
     this.place("housing.grooves", "path", { class: "groove", d: at.map((place) => half(place, 1.45 * pin)).join("") }, view);
     const others = [];
     for (let other = outline.disc_count - 1; other >= 0; other -= 1) {
-      if (other !== disc) others.push([other, made("path", { class: "other-disc", d: this.teeth.exact }, view)]);
+      if (other !== disc) others.push([other, made("path", { class: "other-disc", d: this.teeth.modified }, view)]);
     }
     const body = this.place(`disc${number}`, "path", { class: "disc", "fill-rule": "evenodd" }, view);
     this.place("pins", "path", { class: "pin", d: at.map((place) => ring(place, pin)).join("") }, view);
@@ -483,7 +472,7 @@ export class Mechanism {
   buildLegend() {
     const legend = html("ul", "mechanism-legend", "", this.element);
     for (const [className, text] of [
-      ["key-force", "force of a pin on the disc"], ["key-other", "the other discs, without errors"],
+      ["key-force", "force of a pin on the disc"], ["key-other", "the other discs, modified teeth without errors"],
       ["key-output", "where the output stands, turned further by the magnified transmission error"], ["key-share", "share in what is asked"],
     ]) {
       const item = html("li", className, "", legend);
@@ -536,9 +525,8 @@ export class Mechanism {
     return at.pins.map(([x, y], pin) => {
       const way = Math.hypot(rolling[0] - x, rolling[1] - y), normal = [(rolling[0] - x) / way, (rolling[1] - y) / way];
       const point = [x + outline.pin_radius * normal[0], y + outline.pin_radius * normal[1]];
-      const apart = Math.abs((((this.scene.start.pin[pin] - direction) % TURN) + 1.5 * TURN) % TURN - TURN / 2);
       return {
-        normal, point, angle: apart, polar: Math.atan2(point[1] - centre[1], point[0] - centre[0]) - at.disc[disc],
+        normal, point, polar: Math.atan2(point[1] - centre[1], point[0] - centre[0]) - at.disc[disc],
         force: state.force[disc * state.pins + pin], gap: 1000 * state.gap[disc * state.pins + pin],
       };
     });

@@ -12,6 +12,8 @@ from jaxtyping import Complex, Float
 
 from tolalloc.report.picture.blocks import values_of
 
+_TOOTH = ("exact", "normal")
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -110,25 +112,18 @@ class Pose:
         return self.pins + self.outline["pin_radius"] * normal, normal
 
     def teeth(self, disc: int) -> Complex[np.ndarray, " point"]:
-        """Return the outline of a disc whose distance from every pin is the gap, magnified."""
-        tooth, magnified = self.record["tooth"], self.record["magnification"]
-        turn = np.exp(2j * np.pi * np.arange(self.outline["disc_teeth"]) / self.outline["disc_teeth"])
+        """Return the outline of a disc whose distance from every pin is the gap, magnified.
 
-        def around(name: str) -> Complex[np.ndarray, " point"]:
-            return np.asarray(np.multiply.outer(turn, np.asarray(tooth[name]) @ (1.0, 1j)).ravel())
-
-        exact, rotated = around("exact"), np.exp(1j * self.at("disc")[disc])
-        removed = around("modified") - exact
-        point, _ = self.contact(disc)
+        Without modification and errors every tooth touches its pin; from there it is moved along its normal.
+        """
+        tooth, teeth = self.record["tooth"], self.outline["disc_teeth"]
+        turn = np.exp(2j * np.pi * np.arange(teeth) / teeth)
+        exact, normal = (np.multiply.outer(turn, np.asarray(tooth[name]) @ (1.0, 1j)).ravel() for name in _TOOTH)
+        rotated, (point, _) = np.exp(1j * self.at("disc")[disc]), self.contact(disc)
         seen = np.angle((point - self.discs[disc]) / rotated)
-        # φ from −π up to π; what the modification removes is told from the rest of the gap.
-        apart = np.abs(np.angle(np.exp(1j * (self.at("pin") - self.at("crank")[disc]))))
-        middle = len(tooth["angle"]) // 2
-        angle = [*tooth["angle"][middle:], tooth["angle"][0]]
-        amounts = [*tooth["removed"][middle:], tooth["removed"][0]]
-        rest = 1e3 * self.state("gap")[disc] - np.interp(apart, angle, amounts)
-        more = np.interp(np.angle(exact), seen, rest, period=2 * np.pi)
-        return np.asarray((exact + magnified * (removed + more * around("normal"))) * rotated + self.discs[disc])
+        gap = 1e3 * self.record["magnification"] * self.state("gap")[disc]
+        away = np.interp(np.angle(exact), seen, gap, period=2 * np.pi)
+        return np.asarray((exact + away * normal) * rotated + self.discs[disc])
 
 
 def gear(teeth: int, module: float, pressure_angle: float) -> Complex[np.ndarray, " point"]:

@@ -47,7 +47,7 @@ class _Pen:
         self.axes.add_patch(Circle((centre.real, centre.imag), radius, transform=self.transform, **given))
 
     def ring(self, centre: complex, radius: float, place: str, width: float = 1.4, **style: Any) -> None:
-        wide = 2.2 * width if self.shares.get(place, 0.0) > 0 else width
+        wide = width * (1.0 + self.shares.get(place, 0.0))
         edge = self.colour(place, _LINE)
         self.circle(centre, radius, place, _PAPER, fill=False, edgecolor=edge, linewidth=wide, **style)
 
@@ -86,7 +86,7 @@ def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
             pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
     teeth = pose.teeth(disc)
     edge = pen.colour(f"disc{number}.teeth", _INK)
-    wide = 2.4 if pen.shares.get(f"disc{number}.teeth", 0.0) > 0 else 1.2
+    wide = 1.2 * (1.0 + pen.shares.get(f"disc{number}.teeth", 0.0))
     pen.polygon(teeth, pen.colour(f"disc{number}", _DISC), edge, wide)
     pen.circle(complex(pose.discs[disc]), outline["disc_hole_radius"], "", _PAPER)
     centre = complex(pose.discs[disc] + pose.shift("disc", disc))

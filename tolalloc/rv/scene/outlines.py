@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.rv.cycloid.mesh import normals
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
+from tolalloc.rv.cycloid.tooth_profile import ToothProfile, profile_points
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.rolling_bearing import RollingBearing
 from tolalloc.units import MILLIMETRE
@@ -17,8 +16,8 @@ _BORE, _JOURNAL = 0.155, 0.103
 """Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
 _HOUSING, _LAND = 1.17, 0.05
 """Outer radius of the ring of pins, and least material between drawn features, both over that of the pin circle."""
-_POINTS = 12
-"""Points of a flank, root and tip included [-]."""
+_POINTS = 22
+"""Points of a tooth [-]."""
 
 
 def outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -72,23 +71,19 @@ def tooth(reducer: Reducer) -> dict[str, list[Any]]:
     """Return one tooth space of a disc, counter-clockwise from tip to tip about its root at angle 0.
 
     ``exact`` and ``modified`` are points of the profile without and with the tooth modification [mm], ``normal`` the
-    unit vector into the disc [-], ``angle`` φ of the pin that grinds the point [rad]; the last point is left out, as it
-    is the next space's first.
+    unit vector into the disc [-]; the last point is left out, as it is the next space's first.
     """
-    stage, flank = reducer.cycloid_stage, np.linspace(0.0, pi, _POINTS)
+    stage = reducer.cycloid_stage
     exact, modified = ToothProfile(stage=stage), ToothProfile(stage=stage, modification=reducer.modification)
+    # Points stand dense where the tooth bends most; those of a space begin at the tip before it.
+    flank = -profile_points(exact, _POINTS).angle[: _POINTS // 2 + 1][::-1]
 
     def around(flank_values: np.ndarray) -> list[list[float]]:
         # The flank turns clockwise from the root; the other one is its mirror image.
         return np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1].tolist()
 
-    angle = np.concatenate([flank[::-1], flank[1:]])[:-1]
-    into = normals(stage.shortening, angle)
-    removed = reducer.modification.equidistant - reducer.modification.shift * into.along_radius
     return {
         "exact": around(exact.points(flank) / MILLIMETRE),
         "modified": around(modified.points(flank) / MILLIMETRE),
         "normal": around(exact.normals(flank)),
-        "angle": angle.tolist(),
-        "removed": (removed / MILLIMETRE).tolist(),
     }

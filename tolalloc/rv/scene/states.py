@@ -13,7 +13,6 @@ from tolalloc.rv.equivalent.condensation import bilateral_groups, retained_coord
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Forces, forces
-from tolalloc.rv.equivalent.solvers.records import design_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,23 +56,33 @@ def solved_states(
 def compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
     """Return the compression at mid-width of every pin and disc of one unit, negative where a gap is left [m].
 
-    They are those that the solver balances, made by its own functions, so that no digit differs.
+    Summed in the order of the solver, so that no digit differs from what it balances.
     """
-    from tolalloc.rv.equivalent.solvers.energy import compress
-    from tolalloc.rv.equivalent.solvers.interpolation import make_memory
-    from tolalloc.rv.equivalent.solvers.problem import problem_at_node, values_of
-
-    tables, columns = equilibria.tables, equilibria.columns
-    design, layout = design_of(equilibria.reducer), columns.layout
-    values = np.empty((1, layout.end))
-    values_of(np.ascontiguousarray(equilibria.errors), equilibria.torque, layout, columns.map, values)
-    memory, work = make_memory(design.law, tables)[:2]
+    tables, layout = equilibria.tables, equilibria.columns.layout
+    values = _values(equilibria)
+    radial, tangential, radius = values[layout.pin : layout.wave].reshape(3, layout.pins)
     found = np.empty((equilibria.carrier_angle.size, *tables.contact_by_disc.shape[1::2]))
-    for at in range(equilibria.carrier_angle.size):
-        _, problem = problem_at_node(at, tables, layout, design.face_width, values[0], memory)
-        compress(problem, equilibria.retained[0, at], work.compression, work.play)
-        found[at] = work.compression.reshape(found.shape[1:])
+    for disc in range(found.shape[1]):
+        by_error, by_disc = tables.contact_by_error[:, disc], tables.contact_by_disc[:, disc]
+        undisturbed = radius + (by_error[:, 0] * radial + by_error[:, 1] * tangential)
+        first = layout.wave + disc * layout.waves
+        for wave in np.flatnonzero(values[first : first + layout.waves]):
+            undisturbed = undisturbed + by_error[:, 2 + wave] * values[first + wave]
+        first = layout.tooth + disc * 2 * layout.teeth
+        for kind, own in enumerate(values[first : first + 2 * layout.teeth].reshape(2, layout.teeth)):
+            if own.any():
+                undisturbed = undisturbed + by_error[:, 2 + layout.waves + kind] * own[tables.tooth[:, disc]]
+        x, y, turn = (equilibria.retained[0, :, 3 * disc + axis, np.newaxis] for axis in range(3))
+        found[:, disc] = by_disc[:, 0] * x + by_disc[:, 1] * y + by_disc[:, 2] * turn + undisturbed
     return found
+
+
+def _values(equilibria: Equilibria) -> Float[np.ndarray, " value"]:
+    """Return the values that the tables take of one unit, entry by entry as the solver adds them [m, rad]."""
+    mapped = equilibria.columns.map
+    values = mapped.nominal.copy()
+    np.add.at(values, mapped.value, mapped.factor * equilibria.errors[0, mapped.column])
+    return values
 
 
 def displacements(
@@ -89,7 +98,7 @@ def displacements(
     found = np.zeros((equilibria.carrier_angle.size, at.coordinates.count))
     found[:, retained] = equilibria.retained[0] * rotation_scale(reducer, at.coordinates)[retained]
     rest = np.setdiff1d(np.arange(at.coordinates.count), retained)
-    values = np.asarray(equilibria.columns.matrix @ equilibria.errors[0])
+    values = _values(equilibria)
     way = carried.rows[0] / equilibria.tables.row_stiffness
     rows, first, row = [], 0, 0
     for group in groups:
