@@ -57,7 +57,7 @@ class _Pen:
 
     def lines(self, ends: Complex[np.ndarray, "line 2"], colour: str, width: float) -> None:
         drawn = LineCollection(
-            np.stack([ends.real, ends.imag], axis=-1), colors=colour, linewidths=width, transform=self.transform
+            list(np.stack([ends.real, ends.imag], axis=-1)), colors=colour, linewidths=width, transform=self.transform
         )
         self.axes.add_collection(drawn)
 
@@ -85,9 +85,9 @@ def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
         if radius > 1.0:
             pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
     teeth = pose.teeth(disc)
-    edge = pen.colour(f"disc{number}.teeth", _INK)
+    edge_colour = pen.colour(f"disc{number}.teeth", _INK)
     wide = 1.2 * (1.0 + pen.shares.get(f"disc{number}.teeth", 0.0))
-    pen.polygon(teeth, pen.colour(f"disc{number}", _DISC), edge, wide)
+    pen.polygon(teeth, pen.colour(f"disc{number}", _DISC), edge_colour, wide)
     pen.circle(complex(pose.discs[disc]), outline["disc_hole_radius"], "", _PAPER)
     centre = complex(pose.discs[disc] + pose.shift("disc", disc))
     pen.ring(centre, outline["crank_circle_radius"], f"disc{number}.bores", 0.8, linestyle="--")
@@ -115,7 +115,7 @@ def _draw_forces(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
     pen.lines(np.stack([point, tip], axis=-1), _FORCE, 1.2)
     barbs = np.stack([tip, tip - head * normal * (1 - 0.5j), tip - head * normal * (1 + 0.5j)], axis=-1)
     corners = np.stack([barbs.real, barbs.imag], axis=-1)
-    pen.axes.add_collection(PolyCollection(corners, facecolor=_FORCE, edgecolor="none", transform=pen.transform))
+    pen.axes.add_collection(PolyCollection(list(corners), facecolor=_FORCE, edgecolor="none", transform=pen.transform))
 
 
 def _draw_first_stage(pen: _Pen, pose: Pose) -> None:

@@ -80,7 +80,8 @@ def tooth(reducer: Reducer) -> dict[str, list[Any]]:
 
     def around(flank_values: np.ndarray) -> list[list[float]]:
         # The flank turns clockwise from the root; the other one is its mirror image.
-        return np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1].tolist()
+        found = np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1]
+        return [[float(x), float(y)] for x, y in found]
 
     return {
         "exact": around(exact.points(flank) / MILLIMETRE),

@@ -85,7 +85,9 @@ class Scene:
         found = json.loads(text)
         found.pop("version")
         for name in ("forward", "backward"):
-            states = {key: values_of(value) if isinstance(value, dict) else value for key, value in found[name].items()}
+            states: dict[str, Any] = {
+                key: values_of(value) if isinstance(value, dict) else value for key, value in found[name].items()
+            }
             found[name] = States(**states)
         places = tuple(Place(**{**place, "sources": tuple(place["sources"])}) for place in found["places"])
         angles, assumptions = values_of(found["carrier_angle"]), tuple(found["assumptions"])
