@@ -4,6 +4,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const TURN = 2 * Math.PI;
 const SECONDS_PER_CRANK_TURN = 8;
+const STEPS_PER_CRANK_TURN = 24;
 const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 const VERSION = 1;
 
@@ -196,10 +197,15 @@ export class Mechanism {
     this.draw();
   }
 
+  /** Run; for readers who asked for less motion one step of a crank's turn instead. */
   play() {
     if (this.running !== null) return;
-    let before = null;
     const crankTurns = Math.abs(this.scene.turns.crank) * this.scene.output_turns;
+    if (this.stepwise) {
+      this.turn(this.phase + this.sense / STEPS_PER_CRANK_TURN / crankTurns);
+      return;
+    }
+    let before = null;
     const step = (now) => {
       const passed = before === null ? 0 : Math.min((now - before) / 1000, 0.1);
       before = now;
@@ -244,6 +250,10 @@ export class Mechanism {
       }
     }
     this.element.classList.toggle("has-shades", Object.values(shares).some((share) => share > 0));
+  }
+
+  get stepwise() {
+    return matchMedia("(prefers-reduced-motion: reduce)").matches;
   }
 
   get carrierAngle() {
@@ -321,16 +331,15 @@ export class Mechanism {
     own.forEach((element, at) => {
       element.setAttribute("tabindex", at === 0 ? "0" : "-1");
       element.addEventListener("keydown", (event) => this.onKey(event, own, at));
+      // One stop for the tabulator in every view, the place that was focused last; arrows go on from there.
+      element.addEventListener("focus", () => own.forEach((other) => other.setAttribute("tabindex", other === element ? "0" : "-1")));
     });
   }
 
   onKey(event, own, at) {
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (step) {
-      const next = own[(at + step + own.length) % own.length];
-      own[at].setAttribute("tabindex", "-1");
-      next.setAttribute("tabindex", "0");
-      next.focus();
+      own[(at + step + own.length) % own.length].focus();
       event.preventDefault();
     } else if (event.key === "Enter" || event.key === " ") {
       this.handlers.onChoose(own[at].dataset.place);
@@ -556,7 +565,7 @@ export class Mechanism {
 
   showState() {
     if (!this.withControls || !this.playButton) return;
-    this.playButton.textContent = this.running === null ? "Play" : "Pause";
+    this.playButton.textContent = this.running !== null ? "Pause" : this.stepwise ? "Step" : "Play";
     this.senseButton.textContent = this.sense > 0 ? "Output turns ↺" : "Output turns ↻";
     this.senseButton.setAttribute("aria-label", `The output turns ${this.sense > 0 ? "counter-clockwise" : "clockwise"}; reverse it`);
   }
