@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,10 @@ from tolalloc.settings import require_settings
 from tolalloc.study.prepared import Prepared
 from tolalloc.units import MICROMETRE
 
+_DECIMALS = 4
+"""Decimals of a zone; a table writes one more, so that half a zone is written whole too [-]."""
+_SMALLEST = 1e-4
+"""Smallest zone with these decimals [µm]."""
 _LARGEST = 1e6
 """Zone that is no slip of the hand any more [µm]."""
 
@@ -45,10 +49,14 @@ class LiveDesign:
         for name, zone in zones.items():
             if name not in present:
                 raise UnknownNameError.among("page", "source", name, present)
-            if not 0 < zone < _LARGEST:
-                raise InputError.at("page", name, zone, "a zone above 0 and below 1 m, in µm")
+            if not _SMALLEST <= zone < _LARGEST:
+                raise InputError.at("page", name, zone, f"a zone of {_SMALLEST} µm or more and below 1 m, in µm")
         # A zone that the drawing has is said by the drawing, so that no bit of it depends on the way to the page.
-        told = {name: zone * MICROMETRE for name, zone in zones.items() if zone != shown_zone(present[name])}
+        told = {
+            name: round(zone, _DECIMALS) * MICROMETRE
+            for name, zone in zones.items()
+            if zone != shown_zone(present[name])
+        }
         require_settings("page", prepared.model.settings, settings)
         values = tuple(float(settings.get(own.name, own.value)) for own in prepared.model.settings)
         return cls(zones=tuple(sorted(told.items())), settings=values)
@@ -65,3 +73,20 @@ def _numbers(sent: Any, key: str) -> Mapping[str, float]:
     if not isinstance(found, dict) or not all(is_number(value) for value in found.values()):
         raise InputError.at("page", key, found, "names with their numbers")
     return found
+
+
+def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> frozenset[str]:
+    """Return the names that a request lists, none where it lists none.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is no list, or a name that is not known.
+    """
+    found = sent.get(key, [])
+    if not isinstance(found, list):
+        raise InputError.at("page", key, found, "a list of names")
+    for name in found:
+        if name not in known:
+            raise UnknownNameError.among("page", key, str(name), known)
+    return frozenset(found)

@@ -10,7 +10,7 @@ from threading import Lock
 from typing import Any
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.live.design import LiveDesign
+from tolalloc.live.design import LiveDesign, names_in
 from tolalloc.live.jobs import Job
 from tolalloc.live.saving import Saving
 from tolalloc.live.session import Session
@@ -84,7 +84,8 @@ class Desk:
         return Saving(session=self.session, script=self.script).save(self._read(sent), sent.get("name", ""))
 
     def _ask(self, sent: dict[str, Any]) -> dict[str, Any]:
-        study = Saving(session=self.session, script=self.script).study(self._read(sent))
+        held = names_in(sent, "locked", [own.name for own in self.session.prepared.errors.active])
+        study = Saving(session=self.session, script=self.script).study(self._read(sent), locked=held)
         names = tuple(own.name for own in self.session.prepared.model.settings)
         tab = self._tab(sent)
         with self._lock:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +38,13 @@ class Saving:
     session: Session
     script: Path
 
-    def study(self, design: LiveDesign, name: str = "") -> Study:
-        """Return the study at a design."""
+    def study(self, design: LiveDesign, name: str = "", locked: frozenset[str] = frozenset()) -> Study:
+        """Return the study at a design, with further sources locked."""
         before = self.session.prepared.study
         if before.drawing is None:
             raise InputError(f"study {before.name}: it has no drawing that could change.")
-        drawing = before.drawing.with_sources(self.session.sources(design))
+        sources = (replace(own, locked=own.locked or own.name in locked) for own in self.session.sources(design))
+        drawing = before.drawing.with_sources(sources)
         return before.changed(drawing, self._settings(design), name)
 
     def save(self, design: LiveDesign, name: str) -> dict[str, Any]:

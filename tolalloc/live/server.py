@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import secrets
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from http import HTTPStatus
@@ -21,6 +22,8 @@ LARGEST = 64 * 1024
 """Largest request [bytes]."""
 MOST_AT_ONCE = 32
 """Requests that are answered at the same time [-]."""
+MOST_CONNECTIONS = 64
+"""Connections that are open at the same time; a browser keeps six for a tab [-]."""
 PATIENCE = 10.0
 """Time that a connection may take to say what it wants [s]."""
 _KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
@@ -52,10 +55,9 @@ class LiveServer:
             "Handler", (_Handler,), {"live": self, "timeout": PATIENCE, "free": BoundedSemaphore(MOST_AT_ONCE)}
         )
         try:
-            server = ThreadingHTTPServer(("127.0.0.1", self.port), handler)
+            server = _BoundedServer(("127.0.0.1", self.port), handler)
         except (OSError, OverflowError) as error:
             raise InputError.at("tolalloc open", "--port", self.port, f"a free port ({error})") from None
-        server.daemon_threads = True
         return server
 
     @property
@@ -75,6 +77,36 @@ class LiveServer:
         shared = {name: asset(name) for name in _SHARED}
         found = {f"/{name}": text.encode() for name, text in (own | shared).items()}
         return {"/": found.pop("/live.html"), **found}
+
+
+class _BoundedServer(ThreadingHTTPServer):
+    """A server that closes a connection at once when too many are open."""
+
+    daemon_threads = True
+    request_queue_size = 128
+
+    def __init__(self, *arguments: Any) -> None:
+        self._free = BoundedSemaphore(MOST_CONNECTIONS)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own, if one is free."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer a connection, and give its place back."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a page that was closed while it was answered."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -115,18 +147,23 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self) -> None:
         size = self.headers.get("Content-Length", "")
-        if not (size.isascii() and size.isdecimal() and int(size) <= LARGEST):
+        if not (size.isascii() and size.isdecimal() and len(size) < 10 and int(size) <= LARGEST):
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"A request says its length, up to {LARGEST} bytes.")
             return
         try:
             sent = json.loads(self.rfile.read(int(size)), parse_constant=_no_number)
+        except (ValueError, RecursionError):
+            self._refuse(HTTPStatus.BAD_REQUEST, "The request is no record in JSON.")
+            return
+        try:
             if not isinstance(sent, dict):
                 raise InputError.at("page", "request", type(sent).__name__, "a record in JSON")
             found = self.live.desk.answer(self.path.removeprefix("/api/"), sent)
         except TolallocError as error:
             self._refuse(HTTPStatus.BAD_REQUEST, str(error))
-        except (ValueError, RecursionError):
-            self._refuse(HTTPStatus.BAD_REQUEST, "The request is no record in JSON.")
+        except Exception:
+            self._refuse(HTTPStatus.INTERNAL_SERVER_ERROR, "The program failed; the terminal says where.")
+            raise
         else:
             self._send(
                 HTTPStatus.OK, json.dumps(found, ensure_ascii=False, allow_nan=False).encode(), "application/json"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.difference import repriced
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.requirement import Requirement
@@ -26,7 +27,9 @@ from tolalloc.report.wording import short, unit_of
 from tolalloc.study.prepared import Prepared
 from tolalloc.units import MICROMETRE
 
-CHUNK = 256
+FIRST = 256
+"""Units that are judged at once [-]."""
+_LOOK = 128
 """Units that are solved between two looks whether somebody still wants them [-]."""
 MOST = 6144
 """Most units of one design [-]."""
@@ -86,7 +89,14 @@ class Session:
             "cost": sum(own.cost for own in sources),
             "before": sum(own.cost for own in self.prepared.errors.active),
             "costs": {own.name: own.cost for own in sources},
+            "made": {own.name: self._process(own) for own in sources if own.name in self.prepared.space.processes},
+            "cautions": list(self.prepared.model.cautions(np.array(design.settings))),
         }
+
+    def _process(self, source: Source) -> str:
+        """Return the cheapest process that holds a source's zone, the one that prices it."""
+        ways = [own for own in self.prepared.space.processes[source.name] if own.minimum <= source.zone <= own.maximum]
+        return min(ways, key=lambda own: float(own.total(np.array(source.zone)))).name if ways else "as drawn"
 
     def units(self, design: LiveDesign, count: int, wanted: Callable[[], bool]) -> dict[str, Any] | None:
         """Return what random units of a design say; nothing if they are not wanted any more.
@@ -108,18 +118,20 @@ class Session:
         with self._lock:
             values = self._known.get(design, np.empty((0, len(self.outputs))))
         response = self.prepared.model.at(np.array(design.settings)).reading(self.outputs)
-        while len(values) < count:
-            if not wanted():
-                return None
-            evaluation = response(self.deviations(design, slice(len(values), min(len(values) + CHUNK, count))))
+        while len(values) < count and wanted():
+            evaluation = response(self.deviations(design, slice(len(values), min(len(values) + _LOOK, count))))
             good = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
             values = np.concatenate([values, good])
+        self._remember(design, values)
+        return values if len(values) >= count else None
+
+    def _remember(self, design: LiveDesign, values: Float[np.ndarray, "unit output"]) -> None:
+        """Remember the units of a design, and forget those of the oldest ones."""
         with self._lock:
-            self._known.pop(design, None)
-            self._known[design] = values
+            known = self._known.pop(design, values)
+            self._known[design] = max(values, known, key=len)
             while len(self._known) > _REMEMBERED:
                 self._known.pop(next(iter(self._known)))
-        return values
 
     def judged(self, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
         """Return the yield of all limits, and of each output its quantile, its share and its histogram."""
@@ -130,8 +142,14 @@ class Session:
             "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
             "yield": [found.estimate, found.low, found.high],
             "target": self.prepared.target,
+            "broken": self._broken(values),
             "outputs": [self._output(own, self._of(own, values), kept) for own in self.requirements],
         }
+
+    def _broken(self, values: Float[np.ndarray, "unit output"]) -> dict[str, float]:
+        """Return the share of units that do not work at all, for every limit that the model has of its own [-]."""
+        own = [own for own in self.requirements if own.output in self.prepared.model.own_limits]
+        return {item.output: float((~item.limits.kept_by(self._of(item, values))).mean()) for item in own}
 
     def _of(self, requirement: Requirement, values: Float[np.ndarray, "unit output"]) -> Float[np.ndarray, " unit"]:
         return values[:, self.outputs.index(requirement.output)]
@@ -171,10 +189,12 @@ class Session:
             "model": model.name,
             "seed": study.seed,
             "most": MOST,
-            "chunk": CHUNK,
+            "first": FIRST,
             "conditions": [f"{name} {value}" for name, value in model.conditions.items()],
             "settings_word": model.settings_word,
-            "sources": [_described(own) for own in self.prepared.errors.active],
+            "sources": [
+                _described(own, self.prepared.space.processes.get(own.name, ())) for own in self.prepared.errors.active
+            ],
             "settings": [
                 {"name": own.name, "value": own.value, "lower": own.lower, "upper": own.upper} for own in model.settings
             ],
@@ -182,15 +202,18 @@ class Session:
         }
 
 
-def _described(source: Source) -> dict[str, Any]:
+def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]:
+    smallest = min((own.minimum for own in processes), default=source.minimum)
+    largest = max((own.maximum for own in processes), default=source.maximum)
     return {
         "name": source.name,
         "part": source.part,
         "feature": source.feature.value,
         "meaning": source.feature.zone_meaning,
         "zone": shown_zone(source.zone),
-        "lower": source.minimum / MICROMETRE,
-        "upper": source.maximum / MICROMETRE,
+        "lower": smallest / MICROMETRE,
+        "upper": largest / MICROMETRE,
+        "processes": [[own.name, own.minimum / MICROMETRE, own.maximum / MICROMETRE] for own in processes],
         "group": source.group or source.name,
         "locked": source.locked,
         "cost": source.cost,

@@ -73,11 +73,15 @@ class LiveUnits:
         errors, sources = self.session.prepared.errors, {own.name: own for own in self.session.sources(design)}
         if source not in sources:
             raise UnknownNameError.among("page", "source", source, sources)
-        x, at = self._columns(design, number), np.array([name == source for name in errors.source_of_column])
+        x = self._columns(design, number)
+        own = np.array([name == source for name in errors.source_of_column])
         shares = np.linspace(-1.0, 1.0, _SWEPT)
         tried = np.tile(x, (_SWEPT, 1))
-        tried[:, at] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, at))
+        tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
         values = self._values(design, tried)[:, 0]
+        model, settings = self.session.prepared.model, np.array(design.settings)
+        labels = [f"{source} at {100 * share:+.0f} % of its zone" for share in shares]
+        curves = [model.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
         leading = self.session.outputs[0]
         figure = Figure(
             name="sweep",
@@ -86,7 +90,13 @@ class LiveUnits:
             y_label=f"{short(leading)} [{unit_of(leading)}]",
             series=(Series(label=source, kind="line", x=list(shares), y=list(values)),),
         )
-        return {"source": source, "figure": chart(figure), "spread": float(np.nanmax(values) - np.nanmin(values))}
+        known = values[np.isfinite(values)]
+        return {
+            "source": source,
+            "figure": chart(figure),
+            "spread": float(known.max() - known.min()) if known.size else None,
+            "curves": [[chart(own) for own in figures] for figures in curves],
+        }
 
     def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
         """Return the deviations of a unit [m, angles rad]."""

@@ -60,9 +60,8 @@ def pictured(model: ReducerModel, units: Units) -> tuple[Figure, Figure]:
 def _curves(model: ReducerModel, units: Units) -> dict[str, Equilibria]:
     """Return the curve of every unit."""
     kernel, curves = model.kernel, {}
-    if model.unit:
-        own = model.unit.errors(kernel.model.columns, model.reducer.modification.deviations)
-        curves[f"unit {model.unit.name}"] = kernel.model.equilibria(own, kernel.torque)
+    if model.unit and model.built_curve:
+        curves[f"unit {model.unit.name}"] = model.built_curve
     for label, (settings, x) in units.items():
         errors = model.at(settings).kernel.errors(x[np.newaxis])
         curves[label] = kernel.model.equilibria(errors, kernel.torque)

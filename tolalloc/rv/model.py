@@ -20,7 +20,7 @@ from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
 from tolalloc.rv.clearance_settings import FLANK, RADIAL, clearance_settings
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
-from tolalloc.rv.equivalent.answers import OUTCOMES
+from tolalloc.rv.equivalent.answers import OUTCOMES, Equilibria
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.equivalent.perfect import exact_loop
 from tolalloc.rv.equivalent.preload import preload
@@ -242,6 +242,14 @@ class ReducerModel(Model):
         from tolalloc.rv.illustration import illustrated
 
         return illustrated(self, units)
+
+    @cached_property
+    def built_curve(self) -> Equilibria | None:
+        """Equilibria of the built unit over one output turn, if there is such a unit."""
+        if self.unit is None:
+            return None
+        own = self.unit.errors(self.kernel.model.columns, self.reducer.modification.deviations)
+        return self.kernel.model.equilibria(own, self.kernel.torque)
 
     def pictured(
         self, units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]

@@ -1,0 +1,345 @@
+"""The live page without a browser: the numbers of the command, files that confirm them, and a server that refuses."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import threading
+from pathlib import Path
+
+import pytest
+
+import tolalloc as ta
+from tests.studies.command import tolalloc
+from tolalloc.cli.study_script import load_study
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.live.address import Address
+from tolalloc.live.design import LiveDesign
+from tolalloc.live.desk import Desk
+from tolalloc.live.server import LARGEST, MOST_CONNECTIONS, LiveServer
+from tolalloc.live.session import Session
+from tolalloc.study.prepared import Prepared
+
+SCRIPT = """
+import tolalloc as ta
+
+def gap(housing, shaft, shim):
+    return housing - shaft - shim
+
+SHIM = ta.Setting(name="shim [mm]", value=0.01, lower=0.0, upper=0.05, step=0.001)
+ZONE = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 2}
+study = ta.Study(
+    ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",), settings=(SHIM,)),
+    ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]),
+    limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.11, show=ta.AtYield(target=0.98))},
+    name="fit",
+    seed=3,
+)
+"""
+
+
+@pytest.fixture
+def script(tmp_path) -> Path:
+    path = tmp_path / "fit.py"
+    path.write_text(SCRIPT, encoding="utf-8")
+    return path
+
+
+def desk_of(script: Path) -> Desk:
+    return Desk(session=Session(prepared=Prepared(study=load_study(script))), script=script)
+
+
+@pytest.fixture
+def desk(script) -> Desk:
+    return desk_of(script)
+
+
+def ask(desk: Desk, request: str, /, **sent):
+    return desk.answer(request, {"tab": "tab", "turn": 1, **sent})
+
+
+def compared(answer, found) -> None:
+    """Assert that the page's record says what the command's answer says, to the last digit."""
+    rows = answer.changes.set_index("what")
+    assert found["yield"][0] == rows.loc["yield, all limits", "after [unit]"] / 100
+    quantiles = rows.iloc[2:]["after [unit]"]
+    assert [own["quantile"] for own in found["outputs"]] == list(quantiles)
+
+
+@pytest.mark.parametrize("units", [256, 1000, 1024])
+def test_the_page_says_the_digits_of_whatif(script, desk, units):
+    zones = {"housing": 20.0, "shaft": 33.0}
+    answer = load_study(script).ask(ta.Difference(zones=zones, units=units))
+    compared(answer, ask(desk, "units", design={"zones": zones}, units=units))
+    priced = ask(desk, "design", design={"zones": zones})
+    assert priced["cost"] == answer.whole_cost + answer.cost_change
+    assert priced["before"] == answer.whole_cost
+
+
+@pytest.mark.slow
+def test_the_page_says_the_digits_of_whatif_on_a_reducer():
+    script = Path(__file__).parents[2] / "studies" / "rv20e_allocation.py"
+    zones = {"pin.diameter": 3.0, "disc1.pitch": 10.0}
+    answer = load_study(script).ask(ta.Difference(zones=zones, units=300))
+    found = ask(desk_of(script), "units", design={"zones": zones}, units=300)
+    compared(answer, found)
+    worst = found["outputs"][0]["worst"]
+    drawn = ask(desk_of(script), "design", design={"zones": zones}, unit=worst)
+    assert drawn["values"][0]["value"] == pytest.approx(answer.values[1].max(), rel=1e-5)
+    curve = drawn["figures"][0]["series"][-1]["y"]
+    # the command's peak-to-peak is searched between the angles of the curve
+    assert max(curve) - min(curve) == pytest.approx(answer.values[1].max(), rel=5e-3)
+
+
+def test_a_yield_is_one_of_all_limits_with_its_interval(desk):
+    found = ask(desk, "units", design={}, units=1024)
+    values = desk.session._known[LiveDesign.read({}, desk.session.prepared)][:, 0]
+    kept = (values >= 0.07) & (values <= 0.11)
+    assert found["yield"][0] == kept.mean()
+    assert found["yield"][1] < kept.mean() < found["yield"][2]
+    assert values[found["outputs"][0]["worst"] - 1] == values.max()
+    reject = found["outputs"][0]["reject"]
+    assert not kept[reject - 1] and kept[: reject - 1].all()
+    assert found["broken"] == {}
+    assert sum(found["outputs"][0]["histogram"]["y"]) == pytest.approx(100.0)
+
+
+def test_more_units_keep_the_first_ones_and_a_newer_request_calls_off_an_older_one(desk):
+    few = ask(desk, "units", design={}, units=256)
+    ask(desk, "units", design={}, units=2048)
+    assert ask(desk, "units", design={}, units=256) == few
+    asked = iter([True, True, False])
+    design = LiveDesign.read({"zones": {"shaft": 30.0}}, desk.session.prepared)
+    assert desk.session.units(design, 6144, lambda: next(asked)) is None
+    assert len(desk.session._known[design]) == 256  # two looks' worth, kept for the next time
+    ask(desk, "design", turn=8, design={})
+    assert ask(desk, "units", turn=7, design={"zones": {"shaft": 29.0}}, units=256) == {"called off": True}
+    assert ask(desk, "units", turn=7, tab="other", design={"zones": {"shaft": 29.0}}, units=256)["units"] == 256
+
+
+def test_a_unit_comes_again_and_a_source_is_swept_over_its_zone(desk):
+    first = ask(desk, "design", design={}, unit=7)
+    ask(desk, "design", design={"zones": {"shaft": 20.0}}, unit=7)
+    assert ask(desk, "design", design={}, unit=7) == first
+    assert first["figures"] == []
+    exact = ask(desk, "design", design={}, unit=0)["values"][0]["value"]
+    assert exact == pytest.approx(30.1 - 30.0 - 0.01)
+    swept = ask(desk, "sweep", design={"zones": {"shaft": 20.0}}, unit=0, source="shaft")
+    series = swept["figure"]["series"][0]
+    assert (series["x"][0], series["x"][-1]) == (-1.0, 1.0)
+    assert swept["spread"] == pytest.approx(0.02)  # a full zone of 20 µm
+    assert ask(desk, "scene", design={}, unit=7) == {"scene": None}
+
+
+def test_a_setting_moves_the_answer_and_keeps_its_bounds(desk):
+    free, shimmed = (ask(desk, "units", design={"settings": {"shim [mm]": own}}, units=256) for own in (0.0, 0.05))
+    shift = free["outputs"][0]["quantile"] - shimmed["outputs"][0]["quantile"]
+    assert shift == pytest.approx(0.05)
+    with pytest.raises(InputError, match=r"0 to 0\.05"):
+        ask(desk, "units", design={"settings": {"shim [mm]": 0.06}}, units=256)
+
+
+def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk):
+    design = {"zones": {"housing": 22.22225, "shaft": 41.7}, "settings": {"shim [mm]": 0.0123}}
+    found = ask(desk, "units", design=design, units=1024)
+    cost = ask(desk, "design", design=design)["cost"]
+    said = ask(desk, "save", design=design, name="tighter")
+    assert {path.name for path in script.parent.iterdir()} >= {"tighter.py", "tighter.tolerances.csv", "fit.py"}
+    saved = script.parent / said["script"]
+    assert tolalloc("check", saved).returncode == 0
+    again = desk_of(saved)
+    assert ask(again, "units", design={}, units=1024) == found
+    # a table writes a cost to 12 decimals
+    assert ask(again, "design", design={})["cost"] == pytest.approx(cost, abs=1e-11)
+    answer = load_study(saved).ask(ta.Difference(zones={"shaft": 41.7}, units=1024))
+    compared(answer, found)
+    before = saved.read_bytes()
+    with pytest.raises(InputError, match="already"):
+        ask(desk, "save", design={}, name="tighter")
+    for name in ("../out", "a/b", "", "x" * 61, "1st", ".py", "a.b", None, 3, "con\0"):
+        with pytest.raises(InputError, match="name is"):
+            ask(desk, "save", design={}, name=name)
+    assert saved.read_bytes() == before
+
+
+@pytest.mark.slow
+def test_an_allocation_leaves_locked_sources_alone_and_can_be_stopped(desk):
+    start = {"zones": {"housing": 16.0, "shaft": 16.0}}
+    state = ask(desk, "ask", question="allocation", design=start, locked=["shaft"])
+    while not (state["answer"] or state["error"]):
+        state = ask(desk, "state")
+    assert state["error"] == ""
+    assert state["answer"]["zones"].get("shaft", 16.0) == pytest.approx(16.0)
+    assert state["answer"]["zones"]["housing"] != pytest.approx(16.0)
+    ask(desk, "ask", question="ranking", design=start)
+    ask(desk, "stop")
+    while not (state["answer"] or state["error"]) or state["kind"] != "ranking":
+        state = ask(desk, "state")
+    assert state["error"] in ("stopped", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "sent"),
+    [
+        ("delete", {}),
+        ("design", {"design": {"zones": {"nut": 3.0}}}),
+        ("design", {"design": {"zones": {"shaft": -3.0}}}),
+        ("design", {"design": {"zones": {"shaft": "3"}}}),
+        ("design", {"design": {"zones": {"shaft": 1e-5}}}),
+        ("design", {"design": {"zones": {"shaft": 10**400}}}),
+        ("design", {"design": {"zones": [3]}}),
+        ("design", {"design": {"settings": {"torque": 1.0}}}),
+        ("design", {"design": [1]}),
+        ("design", {"design": {}, "unit": 6145}),
+        ("design", {"design": {}, "unit": True}),
+        ("design", {"design": {}, "turn": "1"}),
+        ("design", {"design": {}, "tab": "x" * 41}),
+        ("units", {"units": 10**9}),
+        ("units", {"units": 256.0}),
+        ("sweep", {"design": {}, "source": "nut"}),
+        ("sweep", {"design": {}, "source": ["shaft"]}),
+        ("ask", {"question": "everything"}),
+        ("ask", {"question": "allocation", "locked": [["shaft"]]}),
+    ],
+)
+def test_a_request_that_is_none_is_refused_in_a_sentence(desk, name, sent):
+    with pytest.raises((InputError, UnknownNameError)) as refusal:
+        ask(desk, name, **sent)
+    assert len(str(refusal.value).splitlines()) == 1
+
+
+@pytest.fixture
+def server(desk):
+    live = LiveServer(desk=desk)
+    thread = threading.Thread(target=live.http.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    yield live
+    live.http.shutdown()
+    live.http.server_close()
+
+
+def send(live: LiveServer, path: str = "/api/study", body: object = b"{}", method: str = "POST", **headers):
+    """Return status and text of a request as the page sends it, with some headers changed; None leaves one out."""
+    sent = {"Host": live.host, "X-Token": live.token, "Content-Type": "application/json"}
+    sent |= {name.replace("_", "-"): value for name, value in headers.items()}
+    connection = http.client.HTTPConnection("127.0.0.1", live.http.server_port, timeout=10)
+    try:
+        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+        if "Content-Length" not in sent:
+            sent["Content-Length"] = str(len(body))
+        for name, value in sent.items():
+            if value is not None:
+                connection.putheader(name, value)
+        connection.endheaders(body)
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode()
+    finally:
+        connection.close()
+
+
+def test_the_page_and_its_modules_are_served_with_a_token(server):
+    status, page = send(server, f"/?token={server.token}", b"", "GET")
+    assert status == 200
+    for name in ("live.js", "live.css", "page.css"):
+        assert f"/{name}" in page
+        assert send(server, f"/{name}", b"", "GET")[0] == 200
+    assert "http" not in page.replace("http-equiv", "")  # nothing is fetched from elsewhere
+    assert json.loads(send(server)[1])["name"] == "fit"
+
+
+HOSTILE = [
+    (403, {"X_Token": None}),
+    (403, {"X_Token": "guess"}),
+    (403, {"X_Token": "ä"}),
+    (403, {"Origin": "http://evil.example"}),
+    (403, {"Origin": "null"}),
+    (403, {"Origin": "https://127.0.0.1"}),
+    (403, {"Host": "evil.example"}),
+    (403, {"Host": None}),
+    (400, {"body": b"{"}),
+    (400, {"body": b"[]"}),
+    (400, {"body": b"\xff\xfe"}),
+    (400, {"body": b'{"design": NaN}'}),
+    (400, {"body": b'{"a": ' + b"[" * 30000 + b"]" * 30000 + b"}"}),
+    (400, {"body": b'{"a": ' + b"9" * 5000 + b"}"}),
+    (400, {"path": "/api/../../etc/passwd"}),
+    (400, {"path": "/etc/passwd"}),
+    (413, {"Content_Length": str(LARGEST + 1)}),
+    (413, {"Content_Length": "9" * 5000}),
+    (413, {"Content_Length": "-1"}),
+    (413, {"Content_Length": None}),
+    (404, {"method": "GET", "path": "/../fit.py"}),
+    (404, {"method": "GET", "path": "/%2e%2e/fit.py"}),
+    (404, {"method": "GET", "path": "//etc/passwd"}),
+    (404, {"method": "GET", "path": "/live/server.py"}),
+    (403, {"method": "GET", "path": "/"}),
+    (403, {"method": "GET", "path": "/?token=guess"}),
+    (403, {"method": "GET", "path": "/", "Host": "evil.example"}),
+    (501, {"method": "PUT"}),
+    (501, {"method": "OPTIONS", "Origin": "http://evil.example"}),
+]
+
+
+@pytest.mark.parametrize(("status", "request_"), HOSTILE)
+def test_a_hostile_request_is_refused_and_the_study_is_unharmed(server, script, capfd, status, request_):
+    before = {path.name: path.read_bytes() for path in script.parent.iterdir() if path.is_file()}
+    found, text = send(server, **request_)
+    assert found == status
+    assert "Traceback" not in text + capfd.readouterr().err
+    assert {path.name: path.read_bytes() for path in script.parent.iterdir() if path.is_file()} == before
+    assert send(server)[0] == 200
+
+
+def test_two_hundred_connections_are_bounded_and_leave_room_again(server, monkeypatch):
+    before = threading.active_count()
+    held = [socket.create_connection(("127.0.0.1", server.http.server_port), timeout=10) for _ in range(200)]
+    closed = sum(_is_closed(own) for own in held)
+    assert closed >= 200 - MOST_CONNECTIONS
+    assert threading.active_count() <= before + MOST_CONNECTIONS
+    for own in held:
+        own.close()
+    for _ in range(100):
+        try:
+            if send(server)[0] == 200:
+                return
+        except OSError:
+            threading.Event().wait(0.02)
+    raise AssertionError("no room again")
+
+
+def _is_closed(own: socket.socket) -> bool:
+    own.settimeout(0.02)
+    try:
+        return own.recv(1) == b""
+    except TimeoutError:
+        return False
+    except OSError:
+        return True
+
+
+def test_the_program_that_fails_says_so_and_goes_on(server, monkeypatch, capfd):
+    monkeypatch.setattr(Session, "priced", lambda *_: 1 / 0)
+    status, text = send(server, "/api/design", b'{"tab": "a", "turn": 1, "design": {}}')
+    assert status == 500
+    assert "program failed" in json.loads(text)["error"]
+    assert send(server)[0] == 200
+
+
+def test_a_server_started_again_stands_where_it_was(script):
+    first = Address(port=8123, token=Address.of(script).token)
+    first.keep(script)
+    assert Address.of(script) == first
+    kept = next((script.parent / ".tolalloc-live").iterdir())
+    assert kept.stat().st_mode & 0o077 == 0
+    for text in ("", "{", "[]", '{"port": 0, "token": "x"}', json.dumps({"port": 80, "token": "../x"})):
+        kept.write_text(text)
+        assert Address.of(script).port == 0
+
+
+def test_bad_input_of_the_command_is_one_sentence(tmp_path, script):
+    for words in (("open", tmp_path / "none.py"), ("open", script, "--port", "99999999")):
+        found = tolalloc(*words, "--no-browser")
+        assert found.returncode == 2
+        assert found.stderr.strip().splitlines()[-1].startswith("Error: ")
+        assert "Traceback" not in found.stderr
