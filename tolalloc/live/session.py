@@ -190,7 +190,7 @@ class Session:
             "seed": study.seed,
             "most": MOST,
             "first": FIRST,
-            "conditions": [f"{name} {value}" for name, value in model.conditions.items()],
+            "conditions": [[name, value] for name, value in model.conditions.items()],
             "settings_word": model.settings_word,
             "sources": [
                 _described(own, self.prepared.space.processes.get(own.name, ())) for own in self.prepared.errors.active

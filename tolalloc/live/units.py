@@ -80,7 +80,7 @@ class LiveUnits:
         tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
         values = self._values(design, tried)[:, 0]
         model, settings = self.session.prepared.model, np.array(design.settings)
-        labels = [f"{source} at {100 * share:+.0f} % of its zone" for share in shares]
+        labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
         curves = [model.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
         leading = self.session.outputs[0]
         figure = Figure(

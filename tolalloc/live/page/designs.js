@@ -19,7 +19,7 @@ export class Designs {
   }
 
   get ghosts() {
-    return this.pinned.map((own, place) => ({ ...own.curve, label: own.name, ghost: true, colour: colour(place + 1) })).filter((own) => own.x);
+    return this.pinned.map((own, place) => ({ ...own.curve, label: own.name, ghost: true, colour: colour(place + 2) })).filter((own) => own.x);
   }
 
   draw() {
@@ -57,7 +57,7 @@ export class Designs {
     });
     this.pinned.forEach((own, k) => {
       const path = shown.map((_, axis) => `${axis ? "L" : "M"}${45 + 90 * axis} ${place[axis](own).toFixed(1)}`).join("");
-      const line = node("path", { d: path, fill: "none", stroke: colour(k + 1), "stroke-width": 2 });
+      const line = node("path", { d: path, fill: "none", stroke: colour(k + 2), "stroke-width": 2 });
       line.append(node("title", {}, own.name));
       svg.append(line);
     });

@@ -1,44 +1,18 @@
 // The live page: what a hand does becomes a design, a design becomes answers, a newer design calls off older ones.
 
-import { Chart, number } from "./chart.js";
+import { Chart, colour, number } from "./chart.js";
 import { Designs } from "./designs.js";
 import { Mechanism } from "./mechanism.js";
+import { Refusal, ask, trouble } from "./requests.js";
 import { Zones, make } from "./zones.js";
 
-const token = new URLSearchParams(location.search).get("token");
-const tab = crypto.randomUUID();
 const at = (id) => document.getElementById(id);
 const REST = 350; // ms after which a hand rests and more units are asked for
 
 let mechanism = null, pictured = "";
-let turn = 0, study, zones, designs, drawn = null, judged = null, busy = false, waiting = false, resting = null;
+let turn = 0, study, zones, designs, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
 const history = { past: [], future: [], now: null };
 const charts = new Map();
-
-class Refusal extends Error {}
-
-async function ask(name, record = {}) {
-  let answer;
-  try {
-    answer = await fetch(`/api/${name}`, { method: "POST", headers: { "Content-Type": "application/json", "X-Token": token }, body: JSON.stringify({ tab, ...record }) });
-  } catch {
-    trouble("The server does not answer. Start tolalloc open again in the same folder: the page then goes on.");
-    await new Promise((done) => setTimeout(done, 1500));
-    return ask(name, record);
-  }
-  const found = await answer.json();
-  if (answer.ok) {
-    trouble("");
-    return found;
-  }
-  trouble(found.error);
-  throw new Refusal(found.error);
-}
-
-function trouble(sentence) {
-  at("trouble").hidden = !sentence;
-  at("trouble").textContent = sentence;
-}
 
 function draw(key, element, figure) {
   if (!charts.has(key)) {
@@ -50,48 +24,48 @@ function draw(key, element, figure) {
   caption.textContent = `${figure.title}.`;
 }
 
-// Price and curve at once; while one request is under way the newest design waits.
+// Price and curve at once; while one request is under way the newest design waits, and what older ones count is called off.
 async function look() {
   if (busy) return void (waiting = true);
   busy = true;
+  clearTimeout(resting);
+  let record;
   try {
     do {
       waiting = false;
-      const record = { design: zones.design, unit: Number(at("unit").value), turn: ++turn };
+      record = { design: zones.design, unit: Number(at("unit").value), turn: ++turn };
       drawn = await ask("design", record);
-      showDesign();
-      await count(study.chunk, record);
+      trouble("");
+      showDesign(record.turn);
     } while (waiting);
   } catch (error) {
     if (!(error instanceof Refusal)) throw error;
+    return;
   } finally {
     busy = false;
   }
-  clearTimeout(resting);
-  resting = setTimeout(more, REST);
+  if (await count(study.first, record)) resting = setTimeout(() => more(record), REST);
 }
 
+// Return whether the units were counted and are still those of the design that is shown.
 async function count(units, record) {
-  const found = await ask("units", { ...record, units });
-  if (found["called off"]) return false;
-  judged = found;
-  showUnits();
-  return true;
+  try {
+    const found = await ask("units", { ...record, units });
+    if (found["called off"] || record.turn !== turn) return false;
+    judged = found;
+    showUnits(record.turn);
+    return true;
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    return false;
+  }
 }
 
 // More and more of the same units while the hand rests.
-async function more() {
-  const mine = turn, record = { design: zones.design, turn };
+async function more(record) {
+  if (!(await count(Math.min(1024, study.most), record))) return;
   await picture();
-  for (const units of [1024, study.most]) {
-    if (turn !== mine || busy) return;
-    try {
-      if (!(await count(units, record))) return;
-    } catch (error) {
-      if (error instanceof Refusal) return;
-      throw error;
-    }
-  }
+  await count(study.most, record);
 }
 
 // The moving picture follows once the hand rests: it needs every angle in both directions.
@@ -125,55 +99,71 @@ function shade() {
   mechanism.shade(Object.fromEntries(mechanism.scene.places.map((place) => [place.id, place.sources.reduce((sum, own) => sum + (zones.shares[own] ?? 0), 0) / most])));
 }
 
-function showDesign() {
+function showDesign(shown) {
   const change = drawn.cost - drawn.before;
   at("cost").textContent = drawn.cost.toFixed(2);
-  at("cost-change").textContent = Math.abs(change) < 5e-4 ? "as drawn" : `${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
+  at("cost-change").textContent = Math.abs(change) < 5e-4 ? "cost units, as drawn" : `cost units, ${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
   at("answer").classList.add("stale");
-  zones.show(drawn.costs);
+  zones.show(drawn);
+  at("cautions").replaceChildren(...drawn.cautions.map((text) => make("p", { class: "warning" }, text)));
   at("values").textContent = drawn.values.map((own) => `${own.name} ${own.value === null ? "without an answer" : `${number(own.value)} ${own.unit}`}`).join(" · ");
-  drawn.figures.forEach((figure, place) => {
+  unsweep();
+  curves(drawn.figures);
+  at("answer").dataset.drawn = shown;
+}
+
+// Curve and orders, the curves of pinned designs behind the first.
+function curves(figures) {
+  figures.forEach((figure, place) => {
     const ghosts = place === 0 ? designs.ghosts : [];
-    draw(`curve ${place}`, at("curves"), { ...figure, height: place ? 200 : 260, series: [...figure.series, ...ghosts] });
+    draw(`curve ${place}`, at("curves"), { ...figure, height: place ? 200 : 260, series: [...ghosts, ...figure.series.map((own, k) => ({ ...own, colour: colour(k) }))] });
   });
 }
 
 const percent = (share) => `${(100 * share).toFixed(2)} %`;
 
-function showUnits() {
+function showUnits(shown) {
   at("answer").classList.remove("stale");
   const [share, low, high] = judged.yield;
   at("yield").textContent = percent(share);
   at("yield").classList.toggle("bad", high < judged.target);
-  at("yield-interval").textContent = `${percent(low)} … ${percent(high)}`;
+  at("yield-interval").textContent = `${percent(low)} … ${percent(high)} (95 %)`;
   at("counted").textContent = `${judged.units} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
   at("quantiles").replaceChildren(...judged.outputs.map((own) => {
     const beyond = (own.upper !== null && own.quantile > own.upper) || (own.lower !== null && own.quantile < own.lower);
     const end = (value, none) => (value === null ? none : number(value));
     return make("div", {}, make("dt", {}, `${own.name} kept by ${percent(own.share)}`), make("dd", { class: beyond ? "bad" : "" }, `${own.quantile === null ? "–" : number(Number(own.quantile.toPrecision(4)))} ${own.unit}`),
-      make("dd", { class: "small" }, `${end(own.interval[0], "?")} … ${end(own.interval[1], "more units needed")}`));
+      make("dd", { class: "small" }, `${end(own.interval[0], "?")} … ${end(own.interval[1], "more units needed")} (95 %)`));
   }));
   at("verdict").textContent = verdict(low, high);
   at("verdict").className = high < judged.target ? "bad" : "";
   judged.outputs.forEach((own, place) => {
-    const marks = [[own.upper, "limit"], [own.lower, "limit"]].filter(([value]) => value !== null);
+    const marks = [[own.upper, "limit"], [own.lower, "limit"], [own.quantile, `${percent(own.share)} quantile`]].filter(([value]) => value !== null);
     draw(`units ${place}`, at("histograms"), {
       title: `${own.name} of ${judged.units} random units`, x_label: own.output, y_label: "share of the units [%]", height: 210,
       series: [{ label: "random units", kind: "histogram", ...own.histogram }], vertical: marks.map(([value, name]) => [value, `${name} ${number(value)} ${own.unit}`]), horizontal: [],
     });
   });
   for (const button of document.querySelectorAll("[data-unit]")) button.disabled = button.dataset.unit === "reject" && judged.outputs[0].reject === null;
+  at("answer").dataset.judged = shown;
+  at("answer").dataset.units = judged.units;
 }
 
 function verdict(low, high) {
-  const jammed = judged.outputs.find((own) => own.output.startsWith("largest pin force without torque"));
-  const free = jammed ? ` ${percent(1 - jammed.inside[0])} of the units are jammed: their pins press without torque.` : "";
+  const free = Object.entries(judged.broken).map(([output, share]) => {
+    const units = share ? `${percent(share)} of the units are` : "No unit is";
+    return output.startsWith("largest pin force without torque") ? ` ${units} jammed${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
+  }).join("");
   if (low >= judged.target) return `The limits are kept: the yield is at least the ${percent(judged.target)} asked for.${free}`;
   if (high < judged.target) return `The limits are not kept: the yield is below the ${percent(judged.target)} asked for.${free}`;
   return `These units leave it open whether the yield is the ${percent(judged.target)} asked for; a run confirms it.${free}`;
 }
 
+// A page that is loaded again goes on with its design.
+const kept = () => `design of ${study.name}, ${study.model}`;
+
 function remember(design) {
+  sessionStorage.setItem(kept(), JSON.stringify(design));
   if (JSON.stringify(design) === JSON.stringify(history.now)) return;
   history.past.push(history.now);
   history.past = history.past.slice(-200);
@@ -206,17 +196,46 @@ function pin() {
   if (!drawn || !judged) return;
   const values = Object.fromEntries([...zones.groups].map(([group, members]) => [`${group} [µm]`, zones.zone(members[0].name)]));
   for (const own of study.settings) values[own.name] = zones.setting(own.name);
-  const [first] = drawn.figures[0]?.series ?? [];
-  designs.pin({ name: `design ${designs.pinned.length + 1}`, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values, curve: first ?? {} });
-  showDesign();
-  at("answer").classList.remove("stale");
+  const own = drawn.figures[0]?.series.at(-1);
+  designs.pin({ name: `design ${designs.pinned.length + 1}`, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values, curve: own ?? {} });
+  curves(drawn.figures);
 }
 
+// One error of the unit goes over its zone; curve and orders follow a slider.
 async function effect(source) {
-  const found = await ask("sweep", { design: zones.design, unit: Number(at("unit").value), source });
+  const record = { design: zones.design, unit: Number(at("unit").value), source };
+  const found = await refusable(ask("sweep", record));
+  if (!found) return;
+  swept = found;
   at("effect").hidden = false;
-  draw("effect", at("effect").querySelector("div"), { ...found.figure, height: 220 });
+  at("effect-source").textContent = source;
+  draw("effect", at("effect-chart"), { ...found.figure, height: 220 });
+  at("effect-share").value = 4;
+  follow();
   at("effect").scrollIntoView({ block: "nearest" });
+  at("effect-share").focus({ preventScroll: true });
+}
+
+function follow() {
+  const place = Number(at("effect-share").value), { x, y } = swept.figure.series[0];
+  at("effect-at").textContent = `at ${(100 * x[place]).toFixed(0)} % of its half zone: ${number(y[place])} ${judged?.outputs[0].unit ?? ""}`;
+  charts.get("effect").update({ ...swept.figure, height: 220, vertical: [[x[place], "here"]] });
+  curves(swept.curves[place]);
+}
+
+function unsweep() {
+  swept = null;
+  at("effect").hidden = true;
+}
+
+// What a request answers; nothing where it was refused, which the page has said.
+async function refusable(asked) {
+  try {
+    return await asked;
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    return null;
+  }
 }
 
 function unlocked(found) {
@@ -229,19 +248,22 @@ async function question(kind) {
   at("stop").hidden = false;
   at("found").replaceChildren();
   charts.delete("found");
-  let state = await ask("ask", { question: kind, design: zones.design, locked: held });
-  while (!state.answer && !state.error) {
+  const names = study.sources.filter((own) => held.includes(own.group)).map((own) => own.name);
+  let state = await refusable(ask("ask", { question: kind, design: zones.design, locked: names }));
+  while (state && !state.answer && !state.error) {
     said.textContent = `${kind}: ${state.stage}, ${state.units} units, ${state.seconds} s`;
     await new Promise((done) => setTimeout(done, 500));
     state = await ask("state");
+    if (!state.kind) state.error = "The server was started again: ask once more.";
   }
   at("stop").hidden = true;
+  if (!state) return;
   if (state.error) return void (said.textContent = state.error === "stopped" ? "Stopped." : state.error);
   said.textContent = `${kind}, asked at the quick effort, took ${state.seconds} s.`;
   at("found").replaceChildren(...state.answer.sentences.map((text) => make("p", {}, text)), ...state.answer.warnings.map((text) => make("p", { class: "warning" }, text)));
   if (state.answer.figure) draw("found", at("found"), state.answer.figure);
   if (state.answer.shares) {
-    zones.show(undefined, state.answer.shares);
+    zones.show(null, state.answer.shares);
     shade();
   }
   if (state.answer.zones) at("found").prepend(make("button", { onclick: () => take({ zones: unlocked(state.answer.zones), settings: { ...zones.design.settings, ...state.answer.settings } }) }, "Take this drawing"));
@@ -259,7 +281,7 @@ async function saved(event) {
   try {
     const found = await ask("save", { design: zones.design, name: at("saving-name").value });
     at("saving").close();
-    at("asked").textContent = `Saved as ${found.script} with ${found.table}. tolalloc run ${found.script} confirms it.`;
+    at("saved").textContent = `Saved as ${found.script} with ${found.table}. tolalloc run ${found.script} confirms it.`;
   } catch (error) {
     at("saving-error").hidden = false;
     at("saving-error").textContent = error.message;
@@ -270,7 +292,7 @@ async function begin() {
   study = await ask("study");
   document.title = `${study.name}, live`;
   at("name").textContent = `${study.model}: ${study.name}`;
-  at("conditions").textContent = [...study.conditions, `seed ${study.seed}`, ...study.limits].join(" · ");
+  at("conditions").textContent = [...study.conditions.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value).replace("-", "−")} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
   designs = new Designs(at("designs"), { take: (own) => take(own.design) });
   zones = new Zones(study, at("zones"), at("settings"), {
     changed: (design, settled) => {
@@ -298,7 +320,22 @@ async function begin() {
   at("ask-ranking").addEventListener("click", () => question("ranking"));
   at("ask-allocation").addEventListener("click", () => question("allocation"));
   at("stop").addEventListener("click", () => ask("stop"));
-  zones.show();
+  at("effect-share").addEventListener("input", follow);
+  at("effect-close").addEventListener("click", () => {
+    unsweep();
+    curves(drawn.figures);
+  });
+  document.addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range])")) return;
+    const key = event.key.toLowerCase(), forth = key === "y" || (key === "z" && event.shiftKey);
+    if (key !== "z" && key !== "y") return;
+    event.preventDefault();
+    step(...(forth ? ["future", "past"] : ["past", "future"]));
+  });
+  const last = JSON.parse(sessionStorage.getItem(kept()) ?? "null");
+  if (last && study.sources.length) history.now = last;
+  zones.take(history.now);
+  buttons();
   await look();
   document.body.dataset.ready = "yes";
 }

@@ -82,15 +82,21 @@ export class Zones {
       row.append(make("details", {}, make("summary", {}, "each"), ...fields.map(([own, input]) => make("label", {}, own.name, input))));
       row.fields = fields;
     }
-    Object.assign(row, { update: (costs, shares) => {
+    const made = first.processes.length > 1 ? make("select", { "aria-label": `process of ${name}`, onchange: (e) => {
+      const [, least, most] = first.processes[e.target.value];
+      set(rounded(Math.min(Math.max(this.zone(first.name), least * 1.0001), most * 0.9999)), true);
+    } }, ...first.processes.map(([process, least, most], place) => make("option", { value: place }, `${process}, ${rounded(least)} to ${rounded(most)} ${MICRO}`))) : null;
+    if (made) row.insertBefore(make("label", { class: "process" }, "cheapest by ", made), share);
+    Object.assign(row, { update: (costs, shares, by) => {
       const zone = this.zone(first.name);
       field.value = rounded(zone);
       slider.value = Math.round(place(zone));
       const held = this.locked.has(group);
       lock.textContent = held ? "locked" : "lock";
       lock.setAttribute("aria-pressed", held);
-      for (const input of [field, slider, ...(row.fields ?? []).map(([, own]) => own)]) input.disabled = held;
+      for (const input of [field, slider, ...(made ? [made] : []), ...(row.fields ?? []).map(([, own]) => own)]) input.disabled = held;
       (row.fields ?? []).forEach(([own, input]) => (input.value = rounded(this.zone(own.name))));
+      if (made && by) made.selectedIndex = first.processes.findIndex(([process]) => process === by[first.name]);
       if (costs) price.textContent = members.reduce((sum, own) => sum + costs[own.name], 0).toFixed(2);
       if (shares) {
         const own = members.reduce((sum, member) => sum + (shares[member.name] ?? 0), 0);
@@ -142,10 +148,11 @@ export class Zones {
     this.show();
   }
 
-  show(costs, shares) {
-    this.costs = costs ?? this.costs;
+  // drawn is what a design costs; shares are what a ranking said.
+  show(drawn = null, shares = null) {
+    this.drawnCosts = drawn ?? this.drawnCosts;
     this.shares = shares ?? this.shares;
-    for (const row of this.rows.values()) row.update(this.costs, this.shares);
+    for (const row of this.rows.values()) row.update(this.drawnCosts?.costs, this.shares, this.drawnCosts?.made);
   }
 
   find(text) {
