@@ -163,6 +163,17 @@ def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk)
     assert saved.read_bytes() == before
 
 
+def test_a_zone_beyond_its_range_is_saved_with_a_wider_one(script, desk):
+    found = ask(desk, "units", design={"zones": {"shaft": 150.0}}, units=256)
+    saved = script.parent / ask(desk, "save", design={"zones": {"shaft": 150.0}}, name="loose")["script"]
+    assert ask(desk_of(saved), "units", design={}, units=256) == found
+    assert load_study(saved).drawing.sources[1].maximum == pytest.approx(150e-6)
+    with pytest.raises(InputError, match="2000 µm"):
+        ask(desk, "save", design={"zones": {"housing": 3000.0}}, name="broken")
+    assert not (script.parent / "broken.py").exists()
+    assert not (script.parent / "broken.tolerances.csv").exists()
+
+
 @pytest.mark.slow
 def test_an_allocation_leaves_locked_sources_alone_and_can_be_stopped(desk):
     start = {"zones": {"housing": 16.0, "shaft": 16.0}}

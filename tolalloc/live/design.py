@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tolalloc.drawings.fields import LARGEST_ZONE
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.named_fields import is_number
 from tolalloc.settings import require_settings
@@ -14,10 +15,8 @@ from tolalloc.units import MICROMETRE
 
 _DECIMALS = 4
 """Decimals of a zone; a table writes one more, so that half a zone is written whole too [-]."""
-_SMALLEST = 1e-4
+_SMALLEST = 10.0**-_DECIMALS
 """Smallest zone with these decimals [µm]."""
-_LARGEST = 1e6
-"""Zone that is no slip of the hand any more [µm]."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +48,8 @@ class LiveDesign:
         for name, zone in zones.items():
             if name not in present:
                 raise UnknownNameError.among("page", "source", name, present)
-            if not _SMALLEST <= zone < _LARGEST:
-                raise InputError.at("page", name, zone, f"a zone of {_SMALLEST} µm or more and below 1 m, in µm")
+            if not _SMALLEST <= zone <= LARGEST_ZONE:
+                raise InputError.at("page", name, zone, f"a zone of {_SMALLEST:g} to {LARGEST_ZONE:g} µm")
         # A zone that the drawing has is said by the drawing, so that no bit of it depends on the way to the page.
         told = {
             name: round(zone, _DECIMALS) * MICROMETRE

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_text
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.files import write_new
 from tolalloc.live.design import LiveDesign
 from tolalloc.live.session import Session
+from tolalloc.study.prepared import Prepared
 from tolalloc.study.study import Study
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
@@ -62,14 +64,32 @@ class Saving:
             if path.exists():
                 raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
         drawing = self.study(design, name).drawing
-        write_new(table, table_text(drawing.sources if drawing else (), table.parent))
+        write_new(table, table_text(tuple(map(_with_range, drawing.sources if drawing else ())), table.parent))
+        self._require_readable(table, design)
         before = self.session.prepared.study.name
         values = self._settings(design)
         text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
         write_new(script, text)
         return {"table": table.name, "script": script.name, "folder": str(self.script.parent)}
 
+    def _require_readable(self, table: Path, design: LiveDesign) -> None:
+        """Take a table back that no study would read, such as one with a zone that the model does not believe."""
+        try:
+            changed = self.session.prepared.study.changed(table, self._settings(design))
+            _ = (prepared := Prepared(study=changed)).model, prepared.space
+        except TolallocError:
+            table.unlink()
+            raise
+
     def _settings(self, design: LiveDesign) -> dict[str, float]:
         """Return the settings that differ from the study's own."""
         known = zip(self.session.prepared.model.settings, design.settings, strict=True)
         return {own.name: value for own, value in known if value != own.value}
+
+
+def _with_range(source: Source) -> Source:
+    """Return a source whose smallest and largest zone take in the one that was tried."""
+    if source.zone <= 0:
+        return source
+    smallest, largest = min(source.minimum, source.zone), max(source.maximum, source.zone)
+    return replace(source, minimum=smallest, maximum=largest)

@@ -115,6 +115,7 @@ class _Handler(BaseHTTPRequestHandler):
     live: LiveServer
     free: BoundedSemaphore
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True  # an answer of two writes would else wait 40 ms for the first to be confirmed
     server_version, sys_version = "tolalloc", ""
 
     def do_GET(self) -> None:

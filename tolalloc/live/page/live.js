@@ -276,7 +276,6 @@ async function save() {
 }
 
 async function saved(event) {
-  if (event.submitter?.value !== "save") return;
   event.preventDefault();
   try {
     const found = await ask("save", { design: zones.design, name: at("saving-name").value });
@@ -317,10 +316,13 @@ async function begin() {
   at("pin").addEventListener("click", pin);
   at("save").addEventListener("click", save);
   at("saving").addEventListener("submit", saved);
+  at("saving-cancel").addEventListener("click", () => at("saving").close());
   at("ask-ranking").addEventListener("click", () => question("ranking"));
   at("ask-allocation").addEventListener("click", () => question("allocation"));
   at("stop").addEventListener("click", () => ask("stop"));
   at("effect-share").addEventListener("input", follow);
+  if (innerWidth <= 900) at("moving").open = false; // zones would stand far below it
+  at("moving").addEventListener("toggle", () => judged && picture());
   at("effect-close").addEventListener("click", () => {
     unsweep();
     curves(drawn.figures);
