@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,18 @@ def test_a_linear_models_change_lies_in_the_intervals():
     assert found.whole_cost == 4.0
     assert list(found.zones["source"]) == ["housing"]
     assert found.warnings == ()
+
+
+def test_two_limits_have_a_quantile_each():
+    limit = ta.Limit(lower=0.085, upper=0.115, show=ta.AtYield(target=0.96))
+    found = replace(fit(), limits={"gap [mm]": limit}).ask(ta.Difference(zones={"hous*": 20.0}, units=8192))
+    narrower = norm.ppf(0.98) * (np.hypot(0.01, 0.02) - np.hypot(0.02, 0.02)) / 3
+    above, below = found.quantile_changes  # 2 % of the units beyond either
+    assert above.low < narrower < above.high < 0.0
+    assert 0.0 < below.low < -narrower < below.high
+    assert list(found.changes["what"])[2:] == ["98% of gap", "2% of gap"]
+    assert "the 98% quantile of the gap by -" in found.sentences[1]
+    assert "and the 2% quantile of the gap by +" in found.sentences[1]
 
 
 def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():

@@ -71,21 +71,17 @@ class DifferenceAnswer(Answer):
     def _values(self, requirement: Requirement) -> Float[np.ndarray, "2 unit"]:
         return self.values[:, :, self.outputs.index(requirement.output)]
 
-    def _share(self, requirement: Requirement) -> float:
-        target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
-        return target if requirement.limits.upper is not None else 1 - target
+    @cached_property
+    def limited(self) -> tuple[tuple[Requirement, float], ...]:
+        """Every requirement with the share of a quantile that is limited, with both where it has two limits [-]."""
+        return tuple((own, share) for own in self.requirements for share in _limited_shares(own))
 
     @cached_property
     def quantile_changes(self) -> tuple[Change, ...]:
-        """Change of the limited quantile of every requirement [unit of the output]."""
+        """Change of every limited quantile, in the order of `limited` [unit of the output]."""
         return tuple(
-            quantile_change(
-                self._values(own)[0],
-                self._values(own)[1],
-                self._share(own),
-                self.seeds.child(own.output).generator(),
-            )
-            for own in self.requirements
+            quantile_change(*self._values(own), share, self.seeds.child(own.output).generator())
+            for own, share in self.limited
         )
 
     @cached_property
@@ -111,9 +107,9 @@ class DifferenceAnswer(Answer):
             row("cost", "cost units", self.whole_cost, self.whole_cost + self.cost_change, None),
             row("yield, all limits", "%", shares[0], shares[1], percent),
         ]
-        for own, change in zip(self.requirements, self.quantile_changes, strict=True):
-            before, after = (float(np.nanquantile(side, self._share(own))) for side in self._values(own))
-            what = f"{self._share(own):.2%} of {short(own.output)}"
+        for (own, share), change in zip(self.limited, self.quantile_changes, strict=True):
+            before, after = (float(np.nanquantile(side, share)) for side in self._values(own))
+            what = f"{_percent(share)} of {short(own.output)}"
             rows.append(row(what, unit_of(own.output), before, after, change))
         return pd.DataFrame(rows)
 
@@ -135,22 +131,26 @@ class DifferenceAnswer(Answer):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """The answer in a few sentences."""
-        leading, change, found = self.requirements[0], self.quantile_changes[0], self.yield_change
-        unit = unit_of(leading.output)
+        found, unit = self.yield_change, unit_of(self.requirements[0].output)
+        quantiles = " and ".join(
+            f"the {_percent(share)} quantile of the {short(own.output)} by {change.estimate:+.3g} {unit} "
+            f"({change.low:+.3g}…{change.high:+.3g})"
+            for (own, share), change in zip(self.limited, self.quantile_changes, strict=True)
+            if own is self.requirements[0]
+        )
         return (
             f"The drawing costs {self.whole_cost + self.cost_change:.2f} cost units instead of {self.whole_cost:.2f} "
             f"({self.cost_change:+.2f}).",
             f"On the same {self.values.shape[1]} random units the share that keeps all limits changes by "
-            f"{100 * found.estimate:+.2f} points (95 % interval {100 * found.low:+.2f}…{100 * found.high:+.2f}), the "
-            f"{self._share(leading):.2%} quantile of the {short(leading.output)} by {change.estimate:+.3g} {unit} "
-            f"({change.low:+.3g}…{change.high:+.3g}).",
+            f"{100 * found.estimate:+.2f} points (95 % interval {100 * found.low:+.2f}…{100 * found.high:+.2f}), "
+            f"{quantiles}.",
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
         found, units = [], self.values.shape[1]
-        if any(units * min(self._share(own), 1 - self._share(own)) < _BEYOND for own in self.requirements):
+        if any(units * min(share, 1 - share) < _BEYOND for _, share in self.limited):
             found.append(
                 f"Of {units} units fewer than {_BEYOND} lie beyond a quantile: its interval is too narrow. Take more."
             )
@@ -223,6 +223,22 @@ def difference(
         values=np.stack(found),
         seeds=seeds.child("resamples"),
     )
+
+
+def _limited_shares(requirement: Requirement) -> tuple[float, ...]:
+    """Return the share of the quantile that each limit must keep, the upper one's first [-].
+
+    Two limits leave half of the rejects beyond either of them.
+    """
+    target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
+    sides = requirement.limits.turned
+    beyond = (1 - target) / len(sides)
+    return tuple(1 - beyond if sign > 0 else beyond for sign, _ in sides)
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent, with as many digits as half of the usual rejects take."""
+    return f"{100 * share:.5g}%"
 
 
 def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
