@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from tolalloc.report.document import Section
     from tolalloc.report.figure import Figure
 
+Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
+"""Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
+
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
 """Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
 
@@ -297,14 +300,14 @@ class Model(ABC):
 
     def illustrated(
         self,
-        units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]],  # noqa: ARG002
+        units: Units,  # noqa: ARG002
     ) -> tuple[Section, ...]:
         """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
         return ()
 
     def pictured(
         self,
-        units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]],  # noqa: ARG002
+        units: Units,  # noqa: ARG002
     ) -> tuple[Figure, ...]:
         """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
         return ()

@@ -80,8 +80,9 @@ class DifferenceAnswer(Answer):
     def quantile_changes(self) -> tuple[Change, ...]:
         """Change of every limited quantile, in the order of `limited` [unit of the output]."""
         return tuple(
-            quantile_change(*self._values(own), share, self.seeds.child(own.output).generator())
+            quantile_change(before, after, share, self.seeds.child(own.output).generator())
             for own, share in self.limited
+            for before, after in (self._values(own),)
         )
 
     @cached_property

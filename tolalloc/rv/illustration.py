@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
+from tolalloc.models import Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.equivalent.answers import Equilibria
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 
 _ORDERS = 130
 """Orders of the output turn that a report lists [-]."""
-
-Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
-"""Label → clearances [µm] and deviations [m, angles rad] of one unit."""
 
 
 def illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.exceptions import SolveError, UnknownNameError
-from tolalloc.models import Model, Observer, Response, SettingDerivatives
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.models import Model, Observer, Response, SettingDerivatives, Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
@@ -235,9 +235,7 @@ class ReducerModel(Model):
         names = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
         return DrawnAmounts(names=names, by_setting=self._modification_by_clearance, steps=(0.5, 0.5))
 
-    def illustrated(
-        self, units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
-    ) -> tuple[Section, ...]:
+    def illustrated(self, units: Units) -> tuple[Section, ...]:
         """Return curves and orders of units, and how exact teeth carry the rated torque."""
         from tolalloc.rv.illustration import illustrated
 
@@ -251,9 +249,7 @@ class ReducerModel(Model):
         own = self.unit.errors(self.kernel.model.columns, self.reducer.modification.deviations)
         return self.kernel.model.equilibria(own, self.kernel.torque)
 
-    def pictured(
-        self, units: Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
-    ) -> tuple[Figure, ...]:
+    def pictured(self, units: Units) -> tuple[Figure, ...]:
         """Return curves and orders of units."""
         from tolalloc.rv.illustration import pictured
 
@@ -273,11 +269,9 @@ class ReducerModel(Model):
         SolveError
             An angle without equilibrium.
         """
-        from tolalloc.rv.scene.scene import scene_of
+        from tolalloc.rv.scene.section import scene_at
 
-        kernel = self.at(settings).kernel
-        errors = kernel.errors(x[np.newaxis])[0]
-        return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=sources).record(coarse=True)
+        return scene_at(self.at(settings), x, unit, sources).record(coarse=True)
 
     def moving(
         self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
@@ -285,10 +279,7 @@ class ReducerModel(Model):
         """Return the moving picture of a unit; nothing of one that has no equilibrium at some angle."""
         from tolalloc.rv.scene.section import moving
 
-        try:
-            return moving(self, errors, x, shares, unit)
-        except SolveError:
-            return ()
+        return moving(self, errors, x, shares, unit)
 
     @property
     def content(self) -> Any:

@@ -9,23 +9,48 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Section
 from tolalloc.report.picture.moving import MovingPicture, strongest
-from tolalloc.rv.scene.scene import scene_of
+from tolalloc.rv.scene.scene import PER_CRANK_TURN, Scene, scene_of
 
 if TYPE_CHECKING:
     from tolalloc.rv.model import ReducerModel
+
+_COARSE = 8
+"""Angles per turn of the cranks in a report, which stays small [-]."""
+
+
+def scene_at(
+    model: ReducerModel,
+    x: Float[np.ndarray, " column"],
+    unit: str,
+    sources: tuple[str, ...],
+    per_crank_turn: int = PER_CRANK_TURN,
+) -> Scene:
+    """Return the scene of one unit's deviations [m, angles rad], with so many angles per turn of the cranks [-].
+
+    Raises
+    ------
+    SolveError
+        An angle without equilibrium.
+    """
+    kernel = model.kernel
+    errors = kernel.errors(x[np.newaxis])[0]
+    return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=sources, per_crank_turn=per_crank_turn)
 
 
 def moving(
     model: ReducerModel, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
 ) -> tuple[Section, ...]:
-    """Return the section with the moving picture of one unit [m, angles rad], coloured by its sources' shares [-]."""
-    kernel = model.kernel
-    sources = tuple(source.name for source in errors.sources)
-    scene = scene_of(
-        kernel.model, kernel.errors(x[np.newaxis])[0], kernel.torque, unit=unit, sources=sources, per_crank_turn=8
-    )
+    """Return the section with the moving picture of one unit [m, angles rad], coloured by its sources' shares [-].
+
+    A unit that has no equilibrium at some angle has no picture.
+    """
+    try:
+        scene = scene_at(model, x, unit, tuple(source.name for source in errors.sources), per_crank_turn=_COARSE)
+    except SolveError:
+        return ()
     return (
         Section(
             heading="The reducer",
