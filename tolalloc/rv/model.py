@@ -262,13 +262,7 @@ class ReducerModel(Model):
         unit: str,
         sources: tuple[str, ...],
     ) -> dict[str, Any]:
-        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once.
-
-        Raises
-        ------
-        SolveError
-            An angle without equilibrium.
-        """
+        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once."""
         from tolalloc.rv.scene.section import scene_at
 
         return scene_at(self.at(settings), x, unit, sources).record(coarse=True)
@@ -351,9 +345,7 @@ class ReducerModel(Model):
         from tolalloc.rv.stand_ins import ContactCandidate, CurveCandidate
 
         contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
-        if len(self.columns) > _MOST_COLUMNS:
-            return contact
-        return (*contact, CurveCandidate(kernel=self.kernel))
+        return contact if len(self.columns) > _MOST_COLUMNS else (*contact, CurveCandidate(kernel=self.kernel))
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
