@@ -36,6 +36,7 @@ class Desk:
             "study": lambda _: self.session.described,
             "design": self._design,
             "units": self._units,
+            "examined": self._examined,
             "scene": self._scene,
             "sweep": self._sweep,
             "save": self._save,
@@ -73,6 +74,9 @@ class Desk:
     def _units(self, sent: dict[str, Any]) -> dict[str, Any]:
         wanted = self._newest(sent)
         return self.session.units(self._read(sent), sent.get("units", 256), wanted) or {"called off": True}
+
+    def _examined(self, sent: dict[str, Any]) -> dict[str, Any]:
+        return {"sentences": self.session.examined(self._read(sent))}
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
         return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0))

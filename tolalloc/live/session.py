@@ -90,7 +90,6 @@ class Session:
             "before": sum(own.cost for own in self.prepared.errors.active),
             "costs": {own.name: own.cost for own in sources},
             "made": {own.name: self._process(own) for own in sources if own.name in self.prepared.space.processes},
-            "cautions": list(self.prepared.model.cautions(np.array(design.settings))),
         }
 
     def _process(self, source: Source) -> str:
@@ -179,6 +178,11 @@ class Session:
             "median": int(order[len(order) // 2]) + 1,
             "reject": int(np.flatnonzero(~kept)[0]) + 1 if not kept.all() else None,
         }
+
+    def examined(self, design: LiveDesign) -> list[str]:
+        """Return what a check of the study says of the first random units, such as how many of them are jammed."""
+        model = self.prepared.model.at(np.array(design.settings))
+        return list(model.examined(self.deviations(design, slice(0, FIRST))))
 
     @property
     def described(self) -> dict[str, Any]:

@@ -25,7 +25,7 @@ export class Designs {
   draw() {
     this.element.hidden = !this.pinned.length;
     if (!this.pinned.length) return;
-    const heads = ["design", "cost", "yield [%]", ...this.pinned[0].outputs.map((own) => `${own.name} kept by ${(100 * own.share).toFixed(2)} % [${own.unit}]`), ""];
+    const heads = ["design", "cost [cost units]", "yield [%], 95 % interval", ...this.pinned[0].outputs.map((own) => `${own.name}, ${(100 * Math.max(own.share, 1 - own.share)).toFixed(2)} % of units ${own.share < 0.5 ? "above" : "below"} [${own.unit}]`), ""];
     const rows = this.pinned.map((own) => make("tr", {},
       make("td", {}, own.name), make("td", { class: "number" }, own.cost.toFixed(2)),
       make("td", { class: "number" }, `${(100 * own.yield[0]).toFixed(2)} (${(100 * own.yield[1]).toFixed(2)}…${(100 * own.yield[2]).toFixed(2)})`),

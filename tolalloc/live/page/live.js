@@ -64,6 +64,8 @@ async function count(units, record) {
 // More and more of the same units while the hand rests.
 async function more(record) {
   if (!(await count(Math.min(1024, study.most), record))) return;
+  const said = await refusable(ask("examined", record));
+  if (said && record.turn === turn) at("cautions").replaceChildren(...said.sentences.map((text) => make("p", {}, text)));
   await picture();
   await count(study.most, record);
 }
@@ -105,7 +107,6 @@ function showDesign(shown) {
   at("cost-change").textContent = Math.abs(change) < 5e-4 ? "cost units, as drawn" : `cost units, ${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
   at("answer").classList.add("stale");
   zones.show(drawn);
-  at("cautions").replaceChildren(...drawn.cautions.map((text) => make("p", { class: "warning" }, text)));
   at("values").textContent = drawn.values.map((own) => `${own.name} ${own.value === null ? "without an answer" : `${number(own.value)} ${own.unit}`}`).join(" · ");
   unsweep();
   curves(drawn.figures);
@@ -120,6 +121,8 @@ function curves(figures) {
   });
 }
 
+// What is named of an output: the value that so many units stay below, or above where only little is not allowed.
+const named = (own) => `${percent(Math.max(own.share, 1 - own.share))} of units ${own.share < 0.5 ? "above" : "below"}`;
 const percent = (share) => `${(100 * share).toFixed(2)} %`;
 
 function showUnits(shown) {
@@ -132,16 +135,16 @@ function showUnits(shown) {
   at("quantiles").replaceChildren(...judged.outputs.map((own) => {
     const beyond = (own.upper !== null && own.quantile > own.upper) || (own.lower !== null && own.quantile < own.lower);
     const end = (value, none) => (value === null ? none : number(value));
-    return make("div", {}, make("dt", {}, `${own.name} kept by ${percent(own.share)}`), make("dd", { class: beyond ? "bad" : "" }, `${own.quantile === null ? "–" : number(Number(own.quantile.toPrecision(4)))} ${own.unit}`),
+    return make("div", {}, make("dt", {}, `${own.name}, ${named(own)}`), make("dd", { class: beyond ? "bad" : "" }, `${own.quantile === null ? "–" : number(Number(own.quantile.toPrecision(4)))} ${own.unit}`),
       make("dd", { class: "small" }, `${end(own.interval[0], "?")} … ${end(own.interval[1], "more units needed")} (95 %)`));
   }));
   at("verdict").textContent = verdict(low, high);
   at("verdict").className = high < judged.target ? "bad" : "";
   judged.outputs.forEach((own, place) => {
-    const marks = [[own.upper, "limit"], [own.lower, "limit"], [own.quantile, `${percent(own.share)} quantile`]].filter(([value]) => value !== null);
+    const marks = [[own.upper, "limit"], [own.lower, "limit"], [own.quantile, named(own)]].filter(([value]) => value !== null);
     draw(`units ${place}`, at("histograms"), {
       title: `${own.name} of ${judged.units} random units`, x_label: own.output, y_label: "share of the units [%]", height: 210,
-      series: [{ label: "random units", kind: "histogram", ...own.histogram }], vertical: marks.map(([value, name]) => [value, `${name} ${number(value)} ${own.unit}`]), horizontal: [],
+      series: [{ label: "random units", kind: "histogram", ...own.histogram }], vertical: marks.map(([value, name]) => [value, `${name} ${number(Number(value.toPrecision(4)))} ${own.unit}`]), horizontal: [],
     });
   });
   for (const button of document.querySelectorAll("[data-unit]")) button.disabled = button.dataset.unit === "reject" && judged.outputs[0].reject === null;
