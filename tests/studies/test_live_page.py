@@ -64,7 +64,7 @@ def compared(answer, found) -> None:
     rows = answer.changes.set_index("what")
     assert found["yield"][0] == rows.loc["yield, all limits", "after [unit]"] / 100
     quantiles = rows.iloc[2:]["after [unit]"]
-    assert [own["quantile"] for own in found["outputs"]] == list(quantiles)
+    assert [item["value"] for own in found["outputs"] for item in own["quantiles"]] == list(quantiles)
 
 
 @pytest.mark.parametrize("units", [256, 1000, 1024])
@@ -134,7 +134,7 @@ def test_a_unit_comes_again_and_a_source_is_swept_over_its_zone(desk):
 
 def test_a_setting_moves_the_answer_and_keeps_its_bounds(desk):
     free, shimmed = (ask(desk, "units", design={"settings": {"shim [mm]": own}}, units=256) for own in (0.0, 0.05))
-    shift = free["outputs"][0]["quantile"] - shimmed["outputs"][0]["quantile"]
+    shift = free["outputs"][0]["quantiles"][0]["value"] - shimmed["outputs"][0]["quantiles"][0]["value"]
     assert shift == pytest.approx(0.05)
     with pytest.raises(InputError, match=r"0 to 0\.05"):
         ask(desk, "units", design={"settings": {"shim [mm]": 0.06}}, units=256)

@@ -74,7 +74,7 @@ class DifferenceAnswer(Answer):
     @cached_property
     def limited(self) -> tuple[tuple[Requirement, float], ...]:
         """Every requirement with the share of a quantile that is limited, with both where it has two limits [-]."""
-        return tuple((own, share) for own in self.requirements for share in _limited_shares(own))
+        return tuple((own, share) for own in self.requirements for share in limited_shares(own))
 
     @cached_property
     def quantile_changes(self) -> tuple[Change, ...]:
@@ -226,7 +226,7 @@ def difference(
     )
 
 
-def _limited_shares(requirement: Requirement) -> tuple[float, ...]:
+def limited_shares(requirement: Requirement) -> tuple[float, ...]:
     """Return the share of the quantile that each limit must keep, the upper one's first [-].
 
     Two limits leave half of the rejects beyond either of them.

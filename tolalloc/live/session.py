@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.difference import repriced
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.difference import limited_shares, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import quantile_interval
 from tolalloc.capability.monte_carlo import proportion
@@ -33,7 +32,6 @@ _LOOK = 128
 """Units that are solved between two looks whether somebody still wants them [-]."""
 MOST = 6144
 """Most units of one design [-]."""
-_USUAL = 0.9973
 _REMEMBERED = 24
 """Designs whose solved units are remembered [-]."""
 
@@ -157,11 +155,8 @@ class Session:
         self, requirement: Requirement, values: Float[np.ndarray, " unit"], kept: Bool[np.ndarray, " unit"]
     ) -> dict[str, Any]:
         limits, known = requirement.limits, values[np.isfinite(values)]
-        target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
-        share = target if limits.upper is not None else 1 - target
         inside = proportion(len(values), int(np.count_nonzero(~limits.kept_by(values))))
         low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
-        found = quantile_interval(known, share) if known.size else None
         order = np.argsort(np.where(np.isfinite(values), values, -np.inf))
         return {
             "name": short(requirement.output),
@@ -169,9 +164,7 @@ class Session:
             "unit": unit_of(requirement.output),
             "lower": limits.lower,
             "upper": limits.upper,
-            "share": share,
-            "quantile": float(np.quantile(known, share)) if known.size else None,
-            "interval": numbers([found.low, found.high]) if found else [None, None],
+            "quantiles": [_quantile(known, share) for share in limited_shares(requirement)],
             "inside": [inside.estimate, inside.low, inside.high],
             "histogram": shares(known, low, (high - low) / BINS or 1.0),
             "worst": int(order[-1]) + 1,
@@ -204,6 +197,14 @@ class Session:
             ],
             "limits": [own.sentence for own in self.requirements],
         }
+
+
+def _quantile(values: Float[np.ndarray, " known"], share: float) -> dict[str, Any]:
+    """Return a quantile with its 95 % interval, whose ends are unknown where the units are too few."""
+    if not values.size:
+        return {"share": share, "value": None, "interval": [None, None]}
+    found = quantile_interval(values, share)
+    return {"share": share, "value": found.estimate, "interval": numbers([found.low, found.high])}
 
 
 def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]:

@@ -122,8 +122,16 @@ function curves(figures) {
 }
 
 // What is named of an output: the value that so many units stay below, or above where only little is not allowed.
-const named = (own) => `${percent(Math.max(own.share, 1 - own.share))} of units ${own.share < 0.5 ? "above" : "below"}`;
+const named = (share) => `${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`;
 const percent = (share) => `${(100 * share).toFixed(2)} %`;
+
+function quantile(own, { share, value, interval }) {
+  const limit = share < 0.5 ? own.lower : own.upper, beyond = value !== null && (share < 0.5 ? value < limit : value > limit);
+  const end = (known) => (known === null ? "more units needed" : number(Number(known.toPrecision(4))));
+  return make("div", {}, make("dt", {}, `${own.name}, ${named(share)}`),
+    make("dd", { class: beyond ? "bad" : "" }, `${value === null ? "–" : number(Number(value.toPrecision(4)))} ${own.unit}`),
+    make("dd", { class: "small" }, `${end(interval[0])} … ${end(interval[1])} (95 %)`));
+}
 
 function showUnits(shown) {
   at("answer").classList.remove("stale");
@@ -132,16 +140,11 @@ function showUnits(shown) {
   at("yield").classList.toggle("bad", high < judged.target);
   at("yield-interval").textContent = `${percent(low)} … ${percent(high)} (95 %)`;
   at("counted").textContent = `${judged.units} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
-  at("quantiles").replaceChildren(...judged.outputs.map((own) => {
-    const beyond = (own.upper !== null && own.quantile > own.upper) || (own.lower !== null && own.quantile < own.lower);
-    const end = (value, none) => (value === null ? none : number(value));
-    return make("div", {}, make("dt", {}, `${own.name}, ${named(own)}`), make("dd", { class: beyond ? "bad" : "" }, `${own.quantile === null ? "–" : number(Number(own.quantile.toPrecision(4)))} ${own.unit}`),
-      make("dd", { class: "small" }, `${end(own.interval[0], "?")} … ${end(own.interval[1], "more units needed")} (95 %)`));
-  }));
+  at("quantiles").replaceChildren(...judged.outputs.flatMap((own) => own.quantiles.map((item) => quantile(own, item))));
   at("verdict").textContent = verdict(low, high);
   at("verdict").className = high < judged.target ? "bad" : "";
   judged.outputs.forEach((own, place) => {
-    const marks = [[own.upper, "limit"], [own.lower, "limit"], [own.quantile, named(own)]].filter(([value]) => value !== null);
+    const marks = [[own.upper, "limit"], [own.lower, "limit"], ...own.quantiles.map(({ share, value }) => [value, named(share)])].filter(([value]) => value !== null);
     draw(`units ${place}`, at("histograms"), {
       title: `${own.name} of ${judged.units} random units`, x_label: own.output, y_label: "share of the units [%]", height: 210,
       series: [{ label: "random units", kind: "histogram", ...own.histogram }], vertical: marks.map(([value, name]) => [value, `${name} ${number(Number(value.toPrecision(4)))} ${own.unit}`]), horizontal: [],
@@ -200,7 +203,7 @@ function pin() {
   const values = Object.fromEntries([...zones.groups].map(([group, members]) => [`${group} [µm]`, zones.zone(members[0].name)]));
   for (const own of study.settings) values[own.name] = zones.setting(own.name);
   const own = drawn.figures[0]?.series.at(-1);
-  designs.pin({ name: `design ${designs.pinned.length + 1}`, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values, curve: own ?? {} });
+  designs.pin({ units: judged.units, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values, curve: own ?? {} });
   curves(drawn.figures);
 }
 
