@@ -209,6 +209,7 @@ function pin() {
 
 // One error of the unit goes over its zone; curve and orders follow a slider.
 async function effect(source) {
+  while (busy) await new Promise((done) => setTimeout(done, 20)); // a design under way would end it at once
   const record = { design: zones.design, unit: Number(at("unit").value), source };
   const found = await refusable(ask("sweep", record));
   if (!found) return;
