@@ -38,10 +38,19 @@ class NamedFields:
             raise InputError(f"{cls._place(named)}: {given[cls.by_position]!r} stands without its name; write {first}.")
         return super().__new__(cls)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle a record by its fields, without which none is made."""
+        return _built, (type(self), {own.name: getattr(self, own.name) for own in fields(self)})  # type: ignore[arg-type]
+
     @classmethod
     def _place(cls, named: dict[str, Any]) -> str:
         """Return who is meant, for messages."""
         return f"{cls.called} {named['name']}" if "name" in named else cls.called
+
+
+def _built(kind: type[NamedFields], named: dict[str, Any]) -> NamedFields:
+    """Return the record of its fields."""
+    return kind(**named)
 
 
 def is_number(value: object) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import doctest
+import pickle
 import subprocess
 import sys
 from importlib import import_module
@@ -15,6 +17,7 @@ from tests.studies.command import ROOT, command, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.study.prepared import Prepared
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
 LATE = ("cvxpy", "sklearn", "pymoo", "pandas")
@@ -44,6 +47,14 @@ def test_a_field_that_no_question_reads_is_refused_by_name(field, value):
         ta.Study(questions=[ta.Calculation(nothing)], **{field: value})
     asked = ta.Study(questions=[ta.Calculation(nothing), ta.Ranking()], **{field: value})
     assert getattr(asked, field) == value
+
+
+def test_what_a_user_writes_can_be_copied_and_pickled():
+    limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.99))}
+    study = ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_baseline"), limits=limits, questions=[ta.Ranking()])
+    for found in (copy.copy(study), copy.deepcopy(study), pickle.loads(pickle.dumps(study))):
+        assert (found.limits, found.questions, found.seed) == (limits, (ta.Ranking(),), 1)
+        assert Prepared(study=found).digest == Prepared(study=study).digest
 
 
 @pytest.mark.parametrize(
