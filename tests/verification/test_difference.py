@@ -13,6 +13,8 @@ import tolalloc as ta
 from tests.studies.command import tolalloc
 from tolalloc.capability.paired import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.study.prepared import Prepared
 
 ZONE = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 2}
 
@@ -137,3 +139,19 @@ def test_the_command_says_what_python_says(tmp_path):
         refused = tolalloc("whatif", script, text)
         assert refused.returncode == 2
         assert "allowed is SOURCE=µm, such as pin.diameter=3" in refused.stderr
+
+
+def test_the_next_question_of_a_reducer_finds_its_tables():
+    """Condensing them takes longer than a fifth of a what-if."""
+
+    def asked(torque: float) -> EquivalentModel:
+        reducer = ta.reducer("rv20e_liu2020", torque=torque)
+        study = ta.Study(reducer, ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)})
+        return Prepared(study=study).model.kernel.model
+
+    assert asked(-2.0) is asked(-2.0)
+    believable = [
+        ta.reducer("rv20e", torque=torque).bound(ta.drawing("rv20e_baseline").errors, "test").kernel.model
+        for torque in (-2.0, -100.0)
+    ]
+    assert believable[0].reducer.stiffness != believable[1].reducer.stiffness  # that of the parts under each torque

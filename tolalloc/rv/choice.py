@@ -15,7 +15,8 @@ from tolalloc.named_fields import is_number
 from tolalloc.rv.clearance_settings import clearance_settings
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.model import EquivalentModel, remembered_model
+from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.rv.reducer.series import at_torque
@@ -67,7 +68,8 @@ def bind(
     require_small_zones(errors.sources, _LARGEST_ZONE, place)
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
     carried = reducer.torque_on_carrier(torque, place)
-    model = EquivalentModel(at_torque(reducer, carried), orders=orders or HARMONICS)
+    # The next question of the same reducer finds the tables as they are.
+    model = remembered_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed}
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
     fixed: Mapping[str, float] = {

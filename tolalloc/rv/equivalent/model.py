@@ -57,7 +57,7 @@ class EquivalentModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process without tables; there, every chunk of work finds the same model again."""
-        return _remembered, (self.reducer, self.search, self.orders)
+        return remembered_model, (self.reducer, self.search, self.orders)
 
     def at_torque(self, torque: float) -> EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
@@ -256,5 +256,6 @@ class EquivalentModel:
 
 
 @lru_cache(maxsize=2)
-def _remembered(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
+def remembered_model(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
+    """Return the model of one reducer that this process has made before, with its tables, or a new one."""
     return EquivalentModel(reducer, search, orders)
