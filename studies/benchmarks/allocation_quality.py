@@ -37,7 +37,6 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
 
-FRESH_UNITS = 2048
 TRIED = 10
 ROUNDING = 1e-9
 TOLD_APART = 1e-3
@@ -87,13 +86,13 @@ def rival(
     return {**best, "seconds": seconds, "calls": len(asked) * SEARCH_UNITS}
 
 
-def row(number: int, effort: str, factor: float, budget: float) -> dict[str, Any]:
+def row(number: int, asked: argparse.Namespace) -> dict[str, Any]:
     """Return what everybody found for one study."""
     study, start = random_study(number), time.process_time()
-    answer = study.ask("allocation", effort=effort)
+    answer = study.ask("allocation", effort=asked.effort)
     seconds, graded = time.process_time() - start, answer.graded is not None
     prepared = Prepared(study=study)
-    compared = Compared(prepared=prepared, seeds=SeedTree(study.seed).child("quality"), units=FRESH_UNITS)
+    compared = Compared(prepared=prepared, seeds=SeedTree(study.seed).child("quality"), units=asked.units)
     calls, chosen, free = sum(answer.header.statuses.values()), answer.chosen, answer.free
     found = {"package": judged(compared, chosen.space, chosen.design, graded)}
     found["package"] |= {"seconds": seconds, "calls": calls}
@@ -101,7 +100,7 @@ def row(number: int, effort: str, factor: float, budget: float) -> dict[str, Any
     found["table"] = judged(compared, table.space, table.design, graded=True)
     found["proportional"] = judged(compared, alike.space, alike.design, graded, bounded=False)
     for algorithm in ALGORITHMS:
-        found[algorithm] = rival(algorithm, prepared, compared, graded, int(factor * calls), budget)
+        found[algorithm] = rival(algorithm, prepared, compared, graded, int(asked.calls_factor * calls), asked.budget)
     return {
         "study": number,
         "cranks": study.model.reducer.crank_count,
@@ -155,11 +154,11 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 def measure(asked: argparse.Namespace) -> list[dict[str, Any]]:
     """Return the rows of all studies, those that are kept as they are."""
     asked.folder.mkdir(parents=True, exist_ok=True)
-    settings, rows = f"{asked.effort}-{asked.calls_factor:g}-{asked.budget:g}", []
+    settings, rows = f"{asked.effort}-{asked.calls_factor:g}-{asked.budget:g}-{asked.units}", []
     for number in range(asked.first, asked.first + asked.studies):
         kept = asked.folder / f"{settings}-{number}.json"
         if not kept.exists():
-            found = row(number, asked.effort, asked.calls_factor, asked.budget)
+            found = row(number, asked)
             beside = kept.with_suffix(".unfinished")
             beside.write_text(json.dumps(found, indent=2, ensure_ascii=False), encoding="utf-8")
             beside.replace(kept)
@@ -201,11 +200,12 @@ def main() -> int:
     parser.add_argument("--effort", choices=("quick", "full"), default="quick", help="effort of the package")
     parser.add_argument("--calls-factor", type=float, default=10.0, help="units of a rival over those of the package")
     parser.add_argument("--budget", type=float, default=60.0, help="processor time of a rival [s]")
+    parser.add_argument("--units", type=int, default=2048, help="fresh units on which all designs are compared")
     parser.add_argument("--folder", type=Path, default=Path("runs/allocation_quality"), help="where studies are kept")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     asked = parser.parse_args()
-    if min(asked.studies, asked.calls_factor, asked.budget) <= 0 or asked.first < 0:
-        parser.error("--studies, --calls-factor and --budget must be above 0, --first 0 or more.")
+    if min(asked.studies, asked.calls_factor, asked.budget) <= 0 or asked.first < 0 or asked.units < 500:
+        parser.error("--studies, --calls-factor and --budget must be above 0, --first 0 or more, --units 500 or more.")
     rows = measure(asked)
     found = summary(rows)
     if asked.json:

@@ -75,8 +75,8 @@ def test_random_tables_fit_their_reducers():
 @pytest.mark.slow
 def test_two_studies_are_solved_once(tmp_path):
     """Two of the studies, with small searches: nothing verified below a printed bound, and kept ones are read."""
-    words = ["--first", "3", "--studies", "2", "--calls-factor", "0.5", "--budget", "2", "--folder", str(tmp_path)]
-    command = [sys.executable, str(BENCHMARKS / "allocation_quality.py"), *words, "--json"]
+    words = ["--first", "3", "--studies", "2", "--calls-factor", "0.5", "--budget", "2", "--units", "512", "--json"]
+    command = [sys.executable, str(BENCHMARKS / "allocation_quality.py"), *words, "--folder", str(tmp_path)]
     first = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     found = json.loads(first.stdout)
     assert found["summary"]["studies"] == 2
