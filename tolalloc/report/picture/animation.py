@@ -31,7 +31,17 @@ def animate(record: Mapping[str, Any], shares: Mapping[str, float], path: Path, 
     angles = 2 * np.pi / record["outline"]["pin_count"] * np.arange(frames) / frames
     largest = max(float(Pose(record, angle).state("force")[0].max()) for angle in angles)
     pictures = [
-        _pixels(draw_still(record, shares, angle, title=title, turned=-angle, discs=(0,), largest=largest or None))
+        _pixels(
+            draw_still(
+                record,
+                shares,
+                angle,
+                title=f"{title}, seen from its output",
+                turned=-angle,
+                discs=(0,),
+                largest=largest or None,
+            )
+        )
         for angle in angles.tolist()
     ]
     palette = Image.new("P", (1, 1))
