@@ -9,6 +9,7 @@ import subprocess
 from dataclasses import replace
 from html import unescape
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -99,6 +100,17 @@ def test_the_ranking_of_a_reducer_pictures_its_drivers():
     assert {source for place in figure.record["places"] for source in place["sources"]} == {
         source.name for source in errors.sources
     }
+
+
+def test_the_python_on_the_page_about_the_picture_works():
+    page = (Path(__file__).parents[2] / "docs" / "picture.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    (block_of_code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(compile(block_of_code, "docs/picture.md", "exec"), names)
+    assert json.loads(str(names["text"]))["reducer"] == "RV-20E"
+    methods = re.findall(r"^mechanism\.(\w+)\(", page, re.MULTILINE)
+    assert len(methods) == 6
+    assert all(f"  {method}(" in page_file("mechanism.js") for method in methods)
 
 
 # In a browser ---------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import gcd
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from tests.random_reducers import random_case
 from tests.three_cranks import table_of_three_cranks
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.exceptions import SolveError, UnknownNameError
+from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.report.picture.pose import Pose
 from tolalloc.rv.cycloid.clearance import linear_clearance
 from tolalloc.rv.cycloid.solvers import LAWS
@@ -225,6 +226,12 @@ def test_a_scene_travels_as_json_to_the_last_digit(scene):
     assert again.places == scene.places
     for name in ("force", "gap", "displacement", "transmission_error"):
         assert np.array_equal(getattr(again.backward, name), getattr(scene.backward, name))
+
+
+def test_a_scene_of_another_version_is_refused(scene):
+    record = scene.record() | {"version": 0}
+    with pytest.raises(InputError, match=r"scene: version is 0; allowed is 1"):
+        Scene.from_json(json.dumps(record))
 
 
 def test_a_coarse_scene_is_small_and_keeps_which_pins_carry(scene):

@@ -443,7 +443,6 @@ export class Mechanism {
     const carrier = this.place("carrier", "path", { class: "carrier" }, view);
     carrier.setAttribute("d", ring([0, 0], outline.carrier_radius));
     const { pin_circle_radius: circle, pin_radius: pin, housing_radius: end } = outline, inner = circle + 1.6 * pin;
-    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
     const planetShape = gear(outline.planet_teeth, outline.module, outline.pressure_angle);
     const sunShape = gear(outline.sun_teeth, outline.module, outline.pressure_angle);
     const web = (teeth) => Math.max((outline.module * teeth) / 2 - 2 * outline.module, 0.35 * outline.module * teeth);
@@ -461,6 +460,7 @@ export class Mechanism {
     this.place("sun", "circle", { class: "gear sun", r: web(outline.sun_teeth) }, sun);
     made("path", { class: "mark", d: `M${0.3 * web(outline.sun_teeth)} 0L${0.9 * web(outline.sun_teeth)} 0` }, sun);
     const meshes = planets.map((_, crank) => this.place(`mesh${crank + 1}`, "circle", { class: "mesh", r: 1.1 * outline.module }, view));
+    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
     this.painters.push((pose) => {
       carrier.setAttribute("transform", moved(pose.carrierCentre));
       output.setAttribute("transform", moved([0, 0], pose.output));
@@ -484,6 +484,7 @@ export class Mechanism {
       ["key-force", "force of a pin on the disc"], ["key-other", "the other discs, modified teeth without errors"],
       ["key-output", "where the output stands, turned further by the magnified transmission error"], ["key-share", "share in what is asked"],
     ]) {
+      if (className === "key-other" && this.scene.outline.disc_count === 1) continue;
       const item = html("li", className, "", legend);
       html("span", "key", "", item);
       item.append(text);

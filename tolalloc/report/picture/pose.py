@@ -25,7 +25,7 @@ class Pose:
 
     def at(self, part: str) -> Float[np.ndarray, " number"]:
         """Return where the parts of a kind stand [rad]."""
-        return np.asarray(np.asarray(self.record["start"][part]) + self.record["turns"][part] * self.carrier_angle)
+        return np.asarray(np.array(self.record["start"][part]) + self.record["turns"][part] * self.carrier_angle)
 
     @cached_property
     def outline(self) -> Mapping[str, Any]:

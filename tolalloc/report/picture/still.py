@@ -18,7 +18,7 @@ from tolalloc.report.picture.blocks import values_of
 from tolalloc.report.picture.pose import Pose, gear
 
 _INK, _LINE, _ACCENT, _FORCE = "#1c2733", "#5b6876", "#d9822b", "#b00020"
-_HOUSING, _STEEL, _DISC, _GEAR, _PAPER = "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#ffffff"
+_GROOVE, _HOUSING, _STEEL, _DISC, _GEAR, _PAPER = "#c8cbce", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#ffffff"
 _LONGEST = 0.3
 """Length of the arrow of the largest force over the radius of the pin circle [-]."""
 
@@ -70,20 +70,30 @@ class _Pen:
         self.polygon(triangle * np.exp(1j * (pose.at("carrier")[0] + further)), _INK, _INK, 0.5)
 
 
+def _draw_pins(pen: _Pen, pose: Pose) -> None:
+    """Draw the housing with the pins in their grooves; the disc comes between the two."""
+    outline = pose.outline
+    pen.circle(0j, outline["housing_radius"], "housing.pins", _HOUSING)
+    for place, colour, edge, factor, level in (
+        ("housing.grooves", _GROOVE, "none", 1.45, 1.0),
+        ("pins", _STEEL, _LINE, 1.0, 1.5),
+    ):
+        drawn = PatchCollection(
+            [Circle((at.real, at.imag), factor * outline["pin_radius"]) for at in pose.pins],
+            facecolor=pen.colour(place, colour),
+            edgecolor=edge,
+            linewidth=0.7,
+            transform=pen.transform,
+        )
+        drawn.set_zorder(level)
+        pen.axes.add_collection(drawn)
+    pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
+
+
 def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
     """Draw a disc with its cranks against the pins."""
     outline, number = pose.outline, disc + 1
-    pen.circle(0j, outline["housing_radius"], "housing.pins", _HOUSING)
-    pen.circle(0j, outline["pin_circle_radius"], "", _PAPER)
-    for colour, place, radius in ((_STEEL, "housing.grooves", 1.45), (_STEEL, "pins", 1.0)):
-        discs = [Circle((at.real, at.imag), radius * outline["pin_radius"]) for at in pose.pins]
-        face = pen.colour(place, colour) if radius == 1.0 else mixed("#c8cbce", _ACCENT, pen.shares.get(place, 0.0))
-        edge = _LINE if radius == 1.0 else "none"
-        own = PatchCollection(discs, facecolor=face, edgecolor=edge, linewidth=0.7, transform=pen.transform)
-        own.set_zorder(1.0 if radius > 1.0 else 1.5)
-        pen.axes.add_collection(own)
-        if radius > 1.0:
-            pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
+    _draw_pins(pen, pose)
     teeth = pose.teeth(disc)
     edge_colour = pen.colour(f"disc{number}.teeth", _INK)
     wide = 1.2 * (1.0 + pen.shares.get(f"disc{number}.teeth", 0.0))
@@ -114,8 +124,8 @@ def _draw_forces(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
     tip, head = point + length * normal, np.minimum(0.35 * length, 0.028 * pose.outline["pin_circle_radius"])
     pen.lines(np.stack([point, tip], axis=-1), _FORCE, 1.2)
     barbs = np.stack([tip, tip - head * normal * (1 - 0.5j), tip - head * normal * (1 + 0.5j)], axis=-1)
-    corners = np.stack([barbs.real, barbs.imag], axis=-1)
-    pen.axes.add_collection(PolyCollection(list(corners), facecolor=_FORCE, edgecolor="none", transform=pen.transform))
+    corners = list(np.stack([barbs.real, barbs.imag], axis=-1))
+    pen.axes.add_collection(PolyCollection(corners, facecolor=_FORCE, edgecolor="none", transform=pen.transform))
 
 
 def _draw_first_stage(pen: _Pen, pose: Pose) -> None:

@@ -6,6 +6,7 @@ from math import pi, sin
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile, profile_points
 from tolalloc.rv.reducer.design import Reducer
@@ -50,12 +51,12 @@ def outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
         "disc_teeth": stage.disc_teeth,
         "sun_teeth": first.sun_teeth,
         "planet_teeth": first.planet_teeth,
-        "pressure_angle": first.pressure_angle,
+        "pressure_angle": float(first.pressure_angle),
     }
     stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
     open_names = [name for name, known in stated.items() if not known]
     assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
-    return {name: length / MILLIMETRE for name, length in lengths.items()} | counts, (assumed,)
+    return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
 
 
 def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[float, float]:
@@ -78,10 +79,9 @@ def tooth(reducer: Reducer) -> dict[str, list[Any]]:
     # Points stand dense where the tooth bends most; those of a space begin at the tip before it.
     flank = -profile_points(exact, _POINTS).angle[: _POINTS // 2 + 1][::-1]
 
-    def around(flank_values: np.ndarray) -> list[list[float]]:
+    def around(flank_values: Float[np.ndarray, "point 2"]) -> list[Any]:
         # The flank turns clockwise from the root; the other one is its mirror image.
-        found = np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1]
-        return [[float(x), float(y)] for x, y in found]
+        return list(np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1].tolist())
 
     return {
         "exact": around(exact.points(flank) / MILLIMETRE),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.exceptions import InputError
 from tolalloc.report.picture.blocks import block, coarse_block, values_of
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -81,14 +82,20 @@ class Scene:
 
     @classmethod
     def from_json(cls, text: str) -> Scene:
-        """Return the scene that a text holds."""
+        """Return the scene that a text holds.
+
+        Raises
+        ------
+        InputError
+            It is of another version.
+        """
         found = json.loads(text)
-        found.pop("version")
+        version = found.pop("version", None)
+        if version != VERSION:
+            raise InputError.at("scene", "version", version, str(VERSION))
         for name in ("forward", "backward"):
-            states: dict[str, Any] = {
-                key: values_of(value) if isinstance(value, dict) else value for key, value in found[name].items()
-            }
-            found[name] = States(**states)
+            torque = found[name].pop("torque")
+            found[name] = States(torque=torque, **{key: values_of(entry) for key, entry in found[name].items()})
         places = tuple(Place(**{**place, "sources": tuple(place["sources"])}) for place in found["places"])
         angles, assumptions = values_of(found["carrier_angle"]), tuple(found["assumptions"])
         return cls(**{**found, "places": places, "carrier_angle": angles, "assumptions": assumptions})
