@@ -19,7 +19,7 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.scene.outlines import outlines, tooth
 from tolalloc.rv.scene.places import Place, places_of
-from tolalloc.rv.scene.states import States, solved_states
+from tolalloc.rv.scene.states import States, solved_states, turn_of
 from tolalloc.units import MILLIMETRE
 
 VERSION = 1
@@ -136,10 +136,8 @@ def scene_of(
     """
     own = dict(zip(model.columns, (float(value) for value in errors), strict=True))
     reducer = _as_modified(model.reducer, own)
-    count = per_crank_turn * reducer.cycloid_stage.disc_teeth
-    angle = 2 * pi * np.arange(count) / count
-    loaded = model.at_torque(torque)
-    forward, backward = (solved_states(loaded, errors, sign * abs(torque), angle) for sign in (-1.0, 1.0))
+    turn = turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
+    forward, backward = (solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
     outline, assumptions = outlines(reducer)
     turns, start = _motion(reducer)
     return Scene(
@@ -152,7 +150,7 @@ def scene_of(
         coordinates=_coordinates(reducer),
         output_turns=reducer.first_stage.sun_teeth
         // gcd(reducer.first_stage.sun_teeth, reducer.first_stage.planet_teeth * reducer.cycloid_stage.pin_count),
-        carrier_angle=angle,
+        carrier_angle=turn.carrier_angle,
         forward=forward,
         backward=backward,
         offsets=_offsets(reducer, own),

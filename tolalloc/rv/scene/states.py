@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import pi
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from tolalloc.exceptions import SolveError
 from tolalloc.rv.equivalent.answers import Equilibria, Status
-from tolalloc.rv.equivalent.condensation import bilateral_groups, retained_coordinates, rotation_scale
+from tolalloc.rv.equivalent.condensation import (
+    CondensedAngles,
+    bilateral_groups,
+    retained_coordinates,
+    rotation_scale,
+)
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import Forces, forces
+from tolalloc.rv.equivalent.springs import SpringGroup
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,29 +34,62 @@ class States:
     transmission_error: Float[np.ndarray, " angle"]  # Carrier rotation beyond its nominal angle [rad]
 
 
-def solved_states(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, " column"],
-    torque: float,
-    carrier_angle: Float[np.ndarray, " angle"],
-) -> States:
-    """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m] at carrier angles [rad].
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """What all units of a reducer share at the angles of a picture."""
+
+    model: EquivalentModel  # The reducer, its parts as stiff as they are under the torque
+    carrier_angle: Float[np.ndarray, " angle"]  # θc, equally spaced over one output turn [rad]
+    tables: CondensedAngles  # Its condensed tables
+    # Coordinates that pins and play touch, the others, and the lever that makes each a length [-, -, m]
+    retained: Int[np.ndarray, " retained"]
+    rest: Int[np.ndarray, " rest"]
+    scale: Float[np.ndarray, " coordinate"]
+    groups: tuple[SpringGroup, ...]  # All spring rows but those of pins
+    way_by_coordinate: Float[np.ndarray, "angle row coordinate"]  # Of the bilateral rows [m/m or m/rad]
+    rest_by_way: Float[np.ndarray, "angle rest row"]  # The other coordinates that belong to the rows' ways [m/m, rad/m]
+
+
+@lru_cache(maxsize=4)
+def turn_of(model: EquivalentModel, count: int) -> Turn:
+    """Return what all units of a model share at equally spaced angles [-]; remembered for the next unit."""
+    angle = 2 * pi * np.arange(count) / count
+    at = Positions(model.reducer, angle, model.orders)
+    groups = bilateral_groups(at)
+    retained = retained_coordinates(model.reducer, at.coordinates, groups)
+    rest = np.setdiff1d(np.arange(at.coordinates.count), retained)
+    rows = np.concatenate([group.displacement for group in groups if group.contact == "bilateral"], axis=1)
+    return Turn(
+        model=model,
+        carrier_angle=angle,
+        tables=model.tables_at(angle),
+        retained=retained,
+        rest=rest,
+        scale=rotation_scale(model.reducer, at.coordinates),
+        groups=tuple(groups),
+        way_by_coordinate=rows,
+        rest_by_way=np.linalg.pinv(rows[:, :, rest]),
+    )
+
+
+def solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: float) -> States:
+    """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m].
 
     Raises
     ------
     SolveError
         An angle without equilibrium.
     """
-    equilibria = model.equilibria(errors[np.newaxis], torque, carrier_angle)
+    equilibria = turn.model.equilibria_of(turn.tables, errors[np.newaxis], torque, turn.carrier_angle)
     worst = Status(int(equilibria.status.max()))
     if worst is not Status.CONVERGED:
-        raise SolveError(f"picture of {model.reducer.name}: at some angle {worst.sentence}.")
+        raise SolveError(f"picture of {turn.model.reducer.name}: at some angle {worst.sentence}.")
     carried = forces(equilibria)
     return States(
         torque=torque,
         force=carried.pins[0],
         gap=-compressions(equilibria),
-        displacement=displacements(model, equilibria, carried),
+        displacement=displacements(turn, equilibria, carried),
         transmission_error=equilibria.transmission_error[0],
     )
 
@@ -85,32 +126,23 @@ def _values(equilibria: Equilibria) -> Float[np.ndarray, " value"]:
     return values
 
 
-def displacements(
-    model: EquivalentModel, equilibria: Equilibria, carried: Forces
-) -> Float[np.ndarray, "angle coordinate"]:
+def displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float[np.ndarray, "angle coordinate"]:
     """Return all coordinates of one unit, of which the equilibria hold those alone that pins and play touch [m, rad].
 
     The others follow from the ways of the springs, force over stiffness, theory page equation (5).
     """
-    reducer, at = model.reducer, Positions(model.reducer, equilibria.carrier_angle, model.orders)
-    groups = bilateral_groups(at)
-    retained = retained_coordinates(reducer, at.coordinates, groups)
-    found = np.zeros((equilibria.carrier_angle.size, at.coordinates.count))
-    found[:, retained] = equilibria.retained[0] * rotation_scale(reducer, at.coordinates)[retained]
-    rest = np.setdiff1d(np.arange(at.coordinates.count), retained)
+    found = np.zeros((equilibria.carrier_angle.size, turn.scale.size))
+    found[:, turn.retained] = equilibria.retained[0] * turn.scale[turn.retained]
     values = _values(equilibria)
     way = carried.rows[0] / equilibria.tables.row_stiffness
-    rows, first, row = [], 0, 0
-    for group in groups:
+    first, row = 0, 0
+    for group in turn.groups:
         last = first + len(group.columns)
         if group.contact == "bilateral":
             count = group.stiffness.shape[1]
             way[:, row : row + count] -= group.error @ values[first:last]
-            rows.append(group.displacement)
             row += count
         first = last
-    if rest.size:
-        by_coordinate = np.concatenate(rows, axis=1)
-        way -= np.einsum("arc,ac->ar", by_coordinate, found)
-        found[:, rest] = (np.linalg.pinv(by_coordinate[:, :, rest]) @ way[..., np.newaxis])[..., 0]
+    way -= np.einsum("arc,ac->ar", turn.way_by_coordinate, found)
+    found[:, turn.rest] = np.einsum("acr,ar->ac", turn.rest_by_way, way)
     return found
