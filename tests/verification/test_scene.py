@@ -24,7 +24,7 @@ from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.scene.places import place_of, places_of
+from tolalloc.rv.scene.places import is_placed, place_of, places_of
 from tolalloc.rv.scene.scene import Scene, scene_of
 from tolalloc.units import MILLIMETRE
 
@@ -218,6 +218,8 @@ def test_a_source_of_no_part_is_refused_by_name():
         places_of(load_reducer("rv20e"), ["disc3.pitch"])
     with pytest.raises(UnknownNameError, match=r"gearbox\.pitch"):
         place_of("gearbox.pitch")
+    assert is_placed("disc3.pitch")
+    assert not is_placed("flange.assembly")  # of a spring group that somebody added
 
 
 def test_a_scene_travels_as_json_to_the_last_digit(scene):

@@ -51,6 +51,11 @@ def place_of(source: str) -> str:
     raise UnknownNameError.among("places of a reducer", "source", source, [pattern for pattern, _ in _RULES])
 
 
+def is_placed(source: str) -> bool:
+    """Return whether the picture has a place for a source, as it has for all of this package."""
+    return any(re.fullmatch(pattern, source) for pattern, _ in _RULES)
+
+
 def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...]:
     """Return all places of a reducer with the sources of a drawing, from the inside of the housing to the input.
 

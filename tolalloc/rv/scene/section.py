@@ -12,6 +12,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
 from tolalloc.report.document import Section
 from tolalloc.report.picture.moving import MovingPicture, strongest
+from tolalloc.rv.scene.places import is_placed
 from tolalloc.rv.scene.scene import PER_CRANK_TURN, Scene, scene_of
 
 if TYPE_CHECKING:
@@ -47,8 +48,11 @@ def moving(
 
     A unit that has no equilibrium at some angle has no picture.
     """
+    named = tuple(source.name for source in errors.sources)
+    sources = tuple(filter(is_placed, named))
+    elsewhere = ", ".join(name for name in named if name not in sources)
     try:
-        scene = scene_at(model, x, unit, tuple(source.name for source in errors.sources), per_crank_turn=_COARSE)
+        scene = scene_at(model, x, unit, sources, per_crank_turn=_COARSE)
     except SolveError:
         return ()
     return (
@@ -58,6 +62,7 @@ def moving(
                 f"The {unit} in true proportion, errors and gaps drawn larger. The stronger a place is coloured, the "
                 "more the sources that sit there drive together, over the place that drives most. Point at a place to "
                 "see its sources, and at a source in a table to see its place.",
+                *((f"The picture has no place for {elsewhere}.",) if elsewhere else ()),
             ),
             figures=(
                 MovingPicture(
