@@ -37,14 +37,15 @@ def build(quick: bool) -> Document:
         record=scene.record(coarse=True),
         pictures=4 if quick else PICTURES,
     )
-    carrying = np.count_nonzero(scene.forward.force > 0.0, axis=2)
-    widest, strongest = 1e6 * float(scene.forward.gap.max()), float(scene.forward.force.max())
+    ways = (scene.forward, scene.backward)
+    carrying = np.concatenate([np.count_nonzero(states.force > 0.0, axis=2) for states in ways])
+    widest, strongest = 1e6 * max(states.gap.max() for states in ways), max(states.force.max() for states in ways)
     return Document(
         title=f"The {scene.reducer} moving",
-        subtitle=f"unit {scene.unit}, {scene.forward.torque:g} N·m on the carrier",
+        subtitle=f"unit {scene.unit}, {abs(scene.forward.torque):g} N·m against the rotation",
         answer=(
-            f"{carrying.min()} to {carrying.max()} pins carry a disc; the widest gap is {widest:.1f} µm and the "
-            f"largest force {strongest:,.0f} N.",
+            f"{carrying.min()} to {carrying.max()} pins carry a disc, either way round; the widest gap is {widest:.1f} µm "
+            f"and the largest force {strongest:,.0f} N.",
         ),
         warnings=(),
         sections=(Section(heading="The reducer", figures=(picture,)),),
@@ -52,8 +53,8 @@ def build(quick: bool) -> Document:
         summary={
             "output turns until the picture closes [-]": scene.output_turns,
             "magnification [-]": scene.magnification,
-            "widest gap [um]": widest,
-            "largest pin force [N]": strongest,
+            "widest gap [um]": float(widest),
+            "largest pin force [N]": float(strongest),
             "pins that carry a disc, fewest and most [-]": [int(carrying.min()), int(carrying.max())],
         },
     )

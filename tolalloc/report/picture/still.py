@@ -158,8 +158,9 @@ def _draw_first_stage(pen: _Pen, pose: Pose) -> None:
 
 
 def longest_arrow(record: Mapping[str, Any]) -> float:
-    """Return the force to which the longest arrow belongs, the largest of the turn [N]."""
-    return max(float(values_of(record["forward"]["force"]).max()), 1e-12)
+    """Return the force to which the longest arrow belongs, the largest of the turn either way round [N]."""
+    largest = max(float(values_of(record[direction]["force"]).max()) for direction in ("forward", "backward"))
+    return max(largest, 1e-12)
 
 
 def draw_still(
