@@ -44,8 +44,8 @@ def build(quick: bool) -> Document:
         title=f"The {scene.reducer} moving",
         subtitle=f"unit {scene.unit}, {abs(scene.forward.torque):g} N·m against the rotation",
         answer=(
-            f"{carrying.min()} to {carrying.max()} pins carry a disc, either way round; the widest gap is {widest:.1f} µm "
-            f"and the largest force {strongest:,.0f} N.",
+            f"{carrying.min()} to {carrying.max()} pins carry a disc, either way round; the widest gap is "
+            f"{widest:.1f} µm and the largest force {strongest:,.0f} N.",
         ),
         warnings=(),
         sections=(Section(heading="The reducer", figures=(picture,)),),
