@@ -62,8 +62,9 @@ def test_the_report_is_complete(ranked):
     names = {path.name for path in ranked.iterdir()}
     assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}
     figures = {path.stem for path in (ranked / "figures").iterdir()}
-    assert {"ranking", "requirements", "orders", "peak_to_peak", "rejects"} <= figures
+    assert {"ranking", "requirements", "orders", "peak_to_peak", "rejects", "reducer"} <= figures
     page = (ranked / "report.html").read_text(encoding="utf-8")
+    assert 'id="moving-reducer-scene"' in page
     for heading in (
         "Which error drives the peak-to-peak",
         "One ranking over all requirements",

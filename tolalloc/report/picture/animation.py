@@ -81,7 +81,6 @@ def _palette() -> list[int]:
     """Return the colours of the picture: its faces, and lines as they go over into them [0 to 255]."""
     colours = [mixed(face, face, 0.0) for face in _FACES]
     for edge, steps in _EDGES:
-        colours += [mixed(face, edge, step / steps) for face in _FACES for step in range(1, steps)] + [
-            mixed(edge, edge, 0)
-        ]
+        colours += [mixed(face, edge, step / steps) for face in _FACES for step in range(1, steps)]
+        colours.append(mixed(edge, edge, 0.0))
     return [round(255 * channel) for colour in colours for channel in colour]
