@@ -36,9 +36,9 @@ def scene_at(
     SolveError
         An angle without equilibrium.
     """
-    kernel = model.kernel
+    kernel, placed = model.kernel, tuple(filter(is_placed, sources))
     errors = kernel.errors(x[np.newaxis])[0]
-    return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=sources, per_crank_turn=per_crank_turn)
+    return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=placed, per_crank_turn=per_crank_turn)
 
 
 def moving(
@@ -49,10 +49,9 @@ def moving(
     A unit that has no equilibrium at some angle has no picture.
     """
     named = tuple(source.name for source in errors.sources)
-    sources = tuple(filter(is_placed, named))
-    elsewhere = ", ".join(name for name in named if name not in sources)
+    elsewhere = ", ".join(name for name in named if not is_placed(name))
     try:
-        scene = scene_at(model, x, unit, sources, per_crank_turn=_COARSE)
+        scene = scene_at(model, x, unit, named, per_crank_turn=_COARSE)
     except SolveError:
         return ()
     return (
