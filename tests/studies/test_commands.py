@@ -79,7 +79,7 @@ def test_te_of_table_4(tmp_path):
     answer = json.loads(result.stdout)
     assert result.returncode == 0
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer
-    assert {path.stem for path in (folder / "figures").iterdir()} == {"transmission_error", "orders"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"transmission_error", "orders", "forces"}
     assert len(pd.read_csv(folder / "tables" / "one turn.csv")) > 20
     assert answer["peak_to_peak_arcsec"] == pytest.approx(96.58, abs=0.05)
     assert [wave["order"] for wave in answer["main_orders"]][:6] == [1, 78, 80, 79, 39, 2]

@@ -31,6 +31,7 @@ from tolalloc.rv.equivalent.outputs import OUTPUTS, Orders, Solved, order_spectr
 from tolalloc.rv.equivalent.own_loads import own_load_loop
 from tolalloc.rv.equivalent.perfect import exact_unit
 from tolalloc.rv.equivalent.preload import PRELOAD_ASSUMPTION, Preload, preload
+from tolalloc.rv.force_figure import force_figure
 from tolalloc.rv.friction_report import friction_section, friction_sentence, friction_summary
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.friction import friction_assumptions
@@ -123,8 +124,9 @@ class TransmissionErrorAnswer(Answer):
         return (
             Section(
                 heading="One output turn",
-                figures=(self.curve_figure, self.order_figure),
+                figures=(self.curve_figure, self.order_figure, force_figure(self.equilibria)),
                 tables=(("one turn", self.turn_table),),
+                unfolded=True,
             ),
             Section(
                 heading="Which part yields",

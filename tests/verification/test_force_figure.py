@@ -1,0 +1,22 @@
+"""The forces over a turn that a report draws are those that the answer names."""
+
+from __future__ import annotations
+
+import pytest
+
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved
+from tolalloc.rv.force_figure import force_figure
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.rv.reducer.unit_file import load_unit
+
+
+def test_the_highest_points_of_the_force_figure_are_the_largest_forces():
+    reducer, unit = load_reducer("rv20e_liu2020"), load_unit("table4")
+    model = EquivalentModel(reducer, orders=unit.orders)
+    found = model.equilibria(unit.errors(model.columns, reducer.modification.deviations), -1.0)
+    drawn = {series.label: max(series.y) for series in force_figure(found).series}
+    solved = Solved.of(found)
+    for name, highest in drawn.items():
+        _, largest = OUTPUTS[f"largest {name} force"]
+        assert highest == pytest.approx(float(largest(solved)[0]))
