@@ -57,7 +57,7 @@ class FeatureFrame:
         return tuple(cell for cell in (self.symbol, self.zone, *self.datums) if cell)
 
     def __str__(self) -> str:
-        return " | ".join(self.cells)
+        return " ".join(self.cells)
 
     def _repr_html_(self) -> str:
         said = escape(f"{self.characteristic}: {self.exact or self.zone}")
@@ -68,7 +68,7 @@ class Frames(tuple[FeatureFrame, ...]):
     """The frames of one dimension: one, or several where its members keep different zones."""
 
     def __str__(self) -> str:
-        return "; ".join(map(str, self))
+        return ", ".join(map(str, self))
 
     def _repr_html_(self) -> str:
         return " ".join(frame._repr_html_() for frame in self)

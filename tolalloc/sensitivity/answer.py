@@ -46,6 +46,9 @@ class RankingAnswer(Answer):
     """What drives a model's outputs, and how sure that is."""
 
     kind: ClassVar[str] = "ranking"
+    shown: ClassVar[tuple[str, ...]] = (
+        *("source", "contribution [%]", "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"),
+    )
 
     model: Model  # What answered
     errors: ErrorModel  # Sources, their distributions and correlations

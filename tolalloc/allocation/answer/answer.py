@@ -69,8 +69,8 @@ class AllocationAnswer(Answer):
 
     kind: ClassVar[str] = "allocation"
     shown: ClassVar[tuple[str, ...]] = (
-        *("dimension", "write [mm]", "zone before [µm]", "zone [µm]", "grade", "process"),
-        *("part in the variance (total index) [%]", "cost [cost units]"),
+        *("dimension", "write [mm]", "part in the variance (total index) [%]", "cost [cost units]"),
+        *("grade", "process"),
     )
 
     model: Model
