@@ -18,6 +18,7 @@ from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.report.html_table import html_table
 from tolalloc.report.writer import write_document
 
+TITLE = "A title that is far longer than its picture is wide, as it has to say what an empty cell of it means"
 VOID = {"meta", "br", "wbr", "img", "link", "hr"}
 
 
@@ -67,7 +68,7 @@ def report(title: str, *, first: bool = False, rows: int = 60) -> Document:
     )
     bars = Series(label="index", kind="bars", x=[f"s{at}" for at in range(24)], y=list(numbers[:24]))
     cells = HeatMap(
-        name=f"{title} cells", title="Cells", columns=["1", "2"], rows=["a"], label="[-]", values=[[1.0, 0.2]]
+        name=f"{title} cells", title=TITLE, columns=["1", "2"], rows=["a"], label="[-]", values=[[1.0, 0.2]]
     )
     return Document(
         title=title,

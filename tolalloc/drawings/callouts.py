@@ -82,7 +82,6 @@ def _deviations(source: Source) -> str:
 def callout_assumptions(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return what the frames of some sources take for granted."""
     said = [assumed for _, assumed in map(_found, sources) if assumed]
-    return (
-        *dict.fromkeys(said),
-        "datum A of a frame is the axis that centres or turns its part; the tolerance table names no datum",
-    )
+    if any(callout(source).datums for source in sources):
+        said.append("datum A of a frame is the axis that centres or turns its part; the tolerance table names no datum")
+    return tuple(dict.fromkeys(said))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import singledispatch
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from matplotlib.figure import Figure as Canvas
@@ -55,6 +56,11 @@ def save_png(figure: Figure | HeatMap, path: Path) -> None:
     drawn(figure).savefig(path, dpi=130)
 
 
+def _title(canvas: Canvas, title: str) -> None:
+    """Put a title over the whole picture, on as many lines as its width asks for."""
+    canvas.suptitle(fill(title, int(_LETTERS * canvas.get_figwidth())), fontsize=12)
+
+
 @singledispatch
 def drawn(figure: object) -> Canvas:
     """Return a figure drawn by matplotlib."""
@@ -73,7 +79,8 @@ def _(figure: Figure) -> Canvas:
         axes.axhline(value, color="#b00020", linestyle="--", label=name)
     if figure.rows:
         axes.invert_yaxis()
-    axes.set(title=figure.title, xlabel=figure.x_label, ylabel=figure.y_label)
+    _title(canvas, figure.title)
+    axes.set(xlabel=figure.x_label, ylabel=figure.y_label)
     if figure.logarithmic:
         axes.set_yscale("log")
     if figure.logarithmic_x:
@@ -82,7 +89,8 @@ def _(figure: Figure) -> Canvas:
         axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
     axes.set_axisbelow(True)
-    axes.legend()
+    points = sum(len(item.x) for item in figure.series)
+    axes.legend(loc="best" if points <= _SEARCHED else "upper right")
     return canvas
 
 
