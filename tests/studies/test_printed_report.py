@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tests.studies.paper import MISSING, can_print, lost
+from tolalloc.exceptions import InputError
 from tolalloc.report import pdf
 from tolalloc.report.document import Document, Section, joined
 from tolalloc.report.feature_frame import FeatureFrame
@@ -19,6 +22,7 @@ from tolalloc.report.html_table import html_table
 from tolalloc.report.writer import write_document
 
 TITLE = "A title that is far longer than its picture is wide, as it has to say what an empty cell of it means"
+LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
 VOID = {"meta", "br", "wbr", "img", "link", "hr"}
 
 
@@ -166,3 +170,18 @@ def test_a_table_that_is_wider_than_the_paper_is_noticed(written, tmp_path):
     spoilt = "@media print { .wide { overflow: hidden; } table.data { width: 400mm; white-space: nowrap; } }</style>"
     page.write_text(written.read_text(encoding="utf-8").replace("</style>", spoilt, 1), encoding="utf-8")
     assert lost(page, tmp_path)
+
+
+def test_the_title_block_says_what_the_study_states_and_nothing_else(tmp_path):
+    stated = {"drawing number": "RVX-80-101", "author": "J. <Weiß>"}
+    write_document(replace(report("Ranking"), title_block=stated), tmp_path / "report")
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "<td><small>drawing number</small>RVX-80-101</td>" in page
+    assert "<td><small>author</small>J. &lt;Weiß&gt;</td>" in page
+    assert "<td><small>revision</small></td>" in page
+
+
+@pytest.mark.parametrize("block", [{"number": "1"}, {"revision": 2}, {"author": "x" * 61}, "B"])
+def test_a_title_block_that_cannot_be_meant_is_refused(block):
+    with pytest.raises(InputError, match="title_block"):
+        ta.Study(ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline"), limits=LIMITS, title_block=block)
