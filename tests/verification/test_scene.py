@@ -183,6 +183,28 @@ def test_the_gap_that_is_drawn_at_a_pin_is_the_magnified_one(scene, carrier_angl
         assert distance == pytest.approx(gap, abs=0.012)  # mm in the picture
 
 
+def test_bearings_are_drawn_open_by_their_magnified_ways(scene, rv20e, table4):
+    """A journal is off its bore, and a shaft off the carrier's, by the ways of the model's springs between them."""
+    groups = {group.name: group for group in spring_groups(rv20e.reducer, scene.carrier_angle, rv20e.orders)}
+    record = scene.record()
+
+    def ways(name):
+        group = groups[name]
+        own = table4[0, [rv20e.columns.index(column) for column in group.columns]]
+        found = np.einsum("arc,ac->ar", group.displacement, scene.forward.displacement) + group.error @ own
+        return (found[:, 0::2] + 1j * found[:, 1::2]) / MILLIMETRE
+
+    in_discs, in_carrier = ways("crank–disc bearing"), ways("crank–carrier bearing")
+    assert min(np.abs(in_discs).max(), np.abs(in_carrier).max()) > 1e-5
+    for at, angle in enumerate(scene.carrier_angle):
+        pose = Pose(record, float(angle))
+        pairs = [(crank, disc) for disc in range(2) for crank in range(2)]
+        drawn_open = np.array([pose.journal(*pair) - pose.bore(*pair) for pair in pairs])
+        assert drawn_open / scene.magnification == pytest.approx(in_discs[at], abs=1e-9)
+        drawn_open = np.array([pose.crank(crank) - pose.carrier_bore(crank) for crank in range(2)])
+        assert drawn_open / scene.magnification == pytest.approx(in_carrier[at], abs=1e-9)
+
+
 def test_teeth_are_those_of_the_modified_profile(scene, rv20e):
     reducer = rv20e.reducer
     modified = ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification)
