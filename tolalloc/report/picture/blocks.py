@@ -26,7 +26,7 @@ def block(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
 
 
 def coarse_block(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
-    """Return an array in 255 equal steps from its smallest to its largest number: an eighth of the size, for the eye.
+    """Return an array in 255 equal steps from its smallest to its largest number: exact enough for the eye.
 
     A number that is not finite becomes 0; one above the smallest stays above it, so that what carries goes on carrying.
     """
