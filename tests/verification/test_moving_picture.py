@@ -110,7 +110,7 @@ def test_the_python_on_the_page_about_the_picture_works():
     assert json.loads(str(names["text"]))["reducer"] == "RV-20E"
     methods = re.findall(r"^mechanism\.(\w+)\(", page, re.MULTILINE)
     assert len(methods) == 6
-    assert all(f"  {method}(" in page_file("mechanism.js") for method in methods)
+    assert all(f"  {method}(" in asset("mechanism.js") for method in methods)
 
 
 # In a browser ---------------------------------------------------------------------------------------------------------

@@ -11,6 +11,10 @@ from matplotlib.figure import Figure as Canvas
 
 from tolalloc.report.figure import BINS, Figure, HeatMap
 
+_SEARCHED = 4000
+"""Points up to which the emptiest corner is looked for, which takes long among many [-]."""
+_LETTERS = 10.5
+"""Letters of a title per width of a picture [1/inch]."""
 COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
 
 
@@ -109,6 +113,7 @@ def _(figure: HeatMap) -> Canvas:
             axes.text(column, row, text, ha="center", va="center", fontsize=7, color="white" if dark else "#222222")
     axes.set_xticks(range(len(figure.columns)), [str(name) for name in figure.columns])
     axes.set_yticks(range(len(figure.rows)), list(figure.rows))
-    axes.set(title=figure.title, xlabel=figure.x_label)
+    _title(canvas, figure.title)
+    axes.set(xlabel=figure.x_label)
     canvas.colorbar(image, label=figure.label)
     return canvas
