@@ -6,6 +6,7 @@ import csv
 
 import pandas as pd
 import pytest
+from openpyxl import Workbook
 
 from tolalloc.drawings.fields import COLUMNS, HEADERS
 from tolalloc.drawings.table_file import read_table_file, read_text_table
@@ -59,6 +60,44 @@ def test_a_table_is_the_same_in_a_workbook(sources, tmp_path):
     assert load_tolerance_table(tmp_path / "t.xlsx") == sources
     assert [source.note for source in sources[1:3]] == ['Ø 5"; "x", #2', "one\nor two"]
     assert sources[1].zone == pytest.approx(25e-6)
+
+
+TITLES = (("Tolerances of reducer 7; rev. B, 2026",), (), ("Drawing", "4711-02"))
+
+
+def shop_sheet(path, change=lambda sheet: None, cells=lambda value: value):
+    """Write the frame as a workbook with titles above it."""
+    book = Workbook()
+    for row in (*TITLES, FRAME.columns, *FRAME.astype(object).where(FRAME.notna(), None).values.tolist()):
+        book.active.append([cells(value) for value in row])
+    change(book.active)
+    book.save(path)
+    return path
+
+
+def test_titles_above_the_header_are_left_out(sources, tmp_path):
+    assert load_tolerance_table(shop_sheet(tmp_path / "t.xlsx")) == sources
+    for separator, title in ((";", "Reducer 7, rev. B;;"), (",", "Reducer 7; rev. B,,"), ("\t", "Reducer 7, rev. B")):
+        text = FRAME.to_csv(index=False, sep=separator)
+        assert load_tolerance_table(written(tmp_path, f"{title}\n\n{text}")) == sources
+    refused(written(tmp_path, f"Reducer 7\n\n{HEADER}\na,x,-0.1,mm,0.02,0.5,3\n"), r"row 4 \(a\): plus is 'x'")
+
+
+def test_a_workbook_may_hold_numbers_as_text_with_decimal_commas(sources, tmp_path):
+    def comma(value):
+        return str(value).replace(".", ",") if isinstance(value, float) else value
+
+    assert load_tolerance_table(shop_sheet(tmp_path / "t.xlsx", cells=comma)) == sources
+
+
+@pytest.mark.parametrize("text", ["1,234", "1.234"])
+def test_a_text_of_a_workbook_that_may_separate_thousands_is_refused(text, tmp_path):
+    def change(sheet):
+        sheet["F5"] = text
+
+    refused(
+        shop_sheet(tmp_path / "t.xlsx", change), f"row 5: cell F5 is '{text}'; allowed is a number as Excel keeps it"
+    )
 
 
 def test_comments_blank_rows_and_empty_cells_behind_the_last_column_are_left_out(sources, tmp_path):

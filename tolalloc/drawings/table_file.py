@@ -36,10 +36,11 @@ _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.files.no_formula` writes before a text."""
 
 
-def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
+def read_table_file(path: Path, header: Sequence[str] = ()) -> tuple[NumberedRow, ...]:
     """Return the cells of a CSV or XLSX file as text, the header first, blank rows left out.
 
-    Every row is filled up to the length of the first: Excel leaves out separators behind the last cell.
+    Every row is filled up to the length of the first: Excel leaves out separators behind the last cell. Where names are
+    given, the header is the first row that has them all, and rows above it are titles, which are left out.
 
     Raises
     ------
@@ -49,21 +50,33 @@ def read_table_file(path: Path) -> tuple[NumberedRow, ...]:
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         from tolalloc.drawings.workbook import first_sheet
 
-        texts = first_sheet(path)
-        rows = _under_headers(path, texts, "each needs one")
+        rows = _under_headers(path, _without_titles(first_sheet(path), header), "each needs one")
+        rows = rows[:1] + [(number, tuple(map(_with_point, cells))) for number, cells in rows[1:]]
     else:
-        rows = _records(path)
+        rows = _records(path, header)
     if not rows:
         raise InputError(f"{path}: the table is empty; a header and rows are needed.")
     width = len(rows[0][1])
     return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
 
 
-def _records(path: Path) -> list[NumberedRow]:
+def _without_titles(rows: Sequence[tuple[str, ...]], header: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return rows in which those above the first with all names are blank, so that the others keep their numbers."""
+    first = next((at for at, cells in enumerate(rows) if header and _names(cells).issuperset(header)), 0)
+    return [()] * first + list(rows[first:])
+
+
+def _names(cells: Sequence[str]) -> set[str]:
+    """Return the names that a row would give to columns."""
+    return {split_header(cell)[0] for cell in cells}
+
+
+def _records(path: Path, names: Sequence[str] = ()) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
     lines = ["" if line.startswith("#") else line for line in StringIO(text)]
-    header = next((line for line in lines if line.strip()), "")
+    header = next((line for line in lines if names and _names(re.split(r"[;,\t]", line.strip())).issuperset(names)), "")
+    header = header or next((line for line in lines if line.strip()), "")
     separator = next((mark for mark in ";\t" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
     try:
@@ -80,7 +93,7 @@ def _records(path: Path) -> list[NumberedRow]:
             f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
         ) from None
     hint = "numbers have a decimal point, and " if separator == "," else ""
-    kept = _under_headers(path, rows, f"{hint}cells are separated by {separator!r}")
+    kept = _under_headers(path, _without_titles(rows, names), f"{hint}cells are separated by {separator!r}")
     if kept and len(kept[-1][1]) < len(kept[0][1]) and not text.endswith("\n"):
         number, cells = kept[-1]
         raise InputError(
@@ -105,6 +118,11 @@ def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> li
                 f"{path}, row {number}: column {at + 1} has {cells[at]!r} under an empty header; allowed is a name."
             )
     return [(number, cells[:width]) for number, cells in kept]
+
+
+def _with_point(cell: str) -> str:
+    """Return a cell with a decimal point; one that may separate thousands was refused where its type was known."""
+    return cell.replace(",", ".") if _DECIMAL.fullmatch(cell) else cell
 
 
 def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[NumberedRow]:

@@ -42,7 +42,7 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    (_, first), *others = read_table_file(path)
+    (_, first), *others = read_table_file(path, header=("id",))
     stated = [split_header(header) for header in first]
     headers = tuple(name for name, _ in stated)
     require_columns(path, headers, ToleranceRow)

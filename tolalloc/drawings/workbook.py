@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +14,8 @@ from tolalloc.file_content import read_bytes, require_believable
 
 _LARGEST_CONTENT = 16 * 2**20
 """Largest content of a workbook when unpacked, all parts together [B]."""
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
+"""Text that is a thousand times as large where its sign separates thousands."""
 _MOST_CELLS = 100_000
 """Most cells of the rectangle from the first cell to the last one [-]."""
 
@@ -96,6 +99,9 @@ def _text(path: Path, cell: Any, written: Any) -> str:
     if value is None and written.data_type == "f":
         allowed = "a value, or a formula whose value was kept (open the workbook and save it)"
         raise InputError.at(f"{path}, row {cell.row}", f"cell {cell.coordinate}", written.value, allowed)
+    if isinstance(value, str) and _THOUSANDS.fullmatch(value.strip()):
+        allowed = "a number as Excel keeps it, since as text it may separate thousands"
+        raise InputError.at(f"{path}, row {cell.row}", f"cell {cell.coordinate}", value, allowed)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return "" if value is None else str(value).strip()
