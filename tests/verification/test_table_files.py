@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from openpyxl import Workbook
 
+from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, HEADERS
 from tolalloc.drawings.table_file import read_table_file, read_text_table
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
@@ -98,6 +99,19 @@ def test_a_text_of_a_workbook_that_may_separate_thousands_is_refused(text, tmp_p
     refused(
         shop_sheet(tmp_path / "t.xlsx", change), f"row 5: cell F5 is '{text}'; allowed is a number as Excel keeps it"
     )
+
+
+def test_hidden_rows_and_columns_are_read_and_said(sources, tmp_path):
+    def hide(sheet):
+        sheet.row_dimensions[6].hidden = True
+        sheet.column_dimensions["B"].hidden = True
+
+    drawing = load_drawing(shop_sheet(tmp_path / "t.xlsx", hide))
+    assert drawing.sources == sources
+    rows, columns = drawing.notes
+    assert rows.endswith("hidden rows of the sheet are read like the others: 6")
+    assert columns.endswith("hidden columns of the sheet are read like the others: B")
+    assert load_drawing(shop_sheet(tmp_path / "u.xlsx")).notes == ()
 
 
 def test_comments_blank_rows_and_empty_cells_behind_the_last_column_are_left_out(sources, tmp_path):

@@ -31,6 +31,7 @@ class Drawing:
     name: str  # Tolerance table as it was named, for reports
     errors: ErrorModel  # The sources of the table with their correlations
     costs: Costs = ""  # Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads
+    notes: tuple[str, ...] = ()  # What a reader of its table must know, such as which rows were hidden
 
     @classmethod
     def of_rows(
@@ -175,7 +176,17 @@ def load_drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
+        notes=_notes(Path(beside(folder, table))),
     )
+
+
+def _notes(table: Path) -> tuple[str, ...]:
+    """Return what a reader of a tolerance table must know."""
+    if table.suffix.lower() not in (".xlsx", ".xlsm"):
+        return ()
+    from tolalloc.drawings.workbook import hidden_cells
+
+    return hidden_cells(table)
 
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:

@@ -43,6 +43,18 @@ def first_sheet(path: Path) -> list[tuple[str, ...]]:
     return texts
 
 
+def hidden_cells(path: Path) -> tuple[str, ...]:
+    """Return a sentence for the hidden rows and one for the hidden columns of the first sheet, which are read too."""
+    sheet = _loaded(read_bytes(path, "a workbook (XLSX)"), data_only=True)
+    rows = [str(at) for at, row in sheet.row_dimensions.items() if row.hidden]
+    columns = [at for at, column in sheet.column_dimensions.items() if column.hidden]
+    return tuple(
+        f"{path}: hidden {what} of the sheet are read like the others: {', '.join(found)}"
+        for what, found in (("rows", rows), ("columns", columns))
+        if found
+    )
+
+
 def _require_small(path: Path, content: bytes) -> None:
     """Raise if a workbook unpacks to more than is believed; no part gives more than the archive says of it."""
     with ZipFile(BytesIO(content)) as archive:

@@ -148,5 +148,5 @@ class Prepared:
             quick=self.study.quick,
             digest=self.digest,
             conditions=self.model.conditions,
-            assumptions=self.model.assumptions,
+            assumptions=(*self.model.assumptions, *self.study.drawing.notes),
         )
