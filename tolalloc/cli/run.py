@@ -262,7 +262,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
     examined = model.examined(_random_units(prepared))
-    lines += study.drawing.notes
+    lines += study.drawing.notes if study.drawing else ()
     return {**summary, "examined": list(examined)}, [*lines, *examined]
 
 

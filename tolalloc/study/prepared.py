@@ -148,5 +148,5 @@ class Prepared:
             quick=self.study.quick,
             digest=self.digest,
             conditions=self.model.conditions,
-            assumptions=(*self.model.assumptions, *self.study.drawing.notes),
+            assumptions=(*self.model.assumptions, *(self.study.drawing.notes if self.study.drawing else ())),
         )
