@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import http.client
 import json
+import signal
 import socket
+import subprocess
 import threading
+import time
 from pathlib import Path
 
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import tolalloc
+from tests.studies.command import ROOT, command, tolalloc
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.live.address import Address
@@ -183,11 +186,17 @@ def test_an_allocation_leaves_locked_sources_alone_and_can_be_stopped(desk):
     assert state["error"] == ""
     assert state["answer"]["zones"].get("shaft", 16.0) == pytest.approx(16.0)
     assert state["answer"]["zones"]["housing"] != pytest.approx(16.0)
-    ask(desk, "ask", question="ranking", design=start)
-    ask(desk, "stop")
-    while not (state["answer"] or state["error"]) or state["kind"] != "ranking":
+    state = ask(desk, "ask", question="ranking", design=start)
+    while not (state["answer"] or state["error"]):
         state = ask(desk, "state")
-    assert state["error"] in ("stopped", "")
+    assert set(state["answer"]["shares"]) == {"housing", "shaft"}
+    assert sum(state["answer"]["shares"].values()) == pytest.approx(100.0, abs=5.0)
+    ask(desk, "ask", question="allocation", design={"zones": {"housing": 17.0}})
+    ask(desk, "stop")
+    state = ask(desk, "state")
+    while not (state["answer"] or state["error"]):
+        state = ask(desk, "state")
+    assert state["error"] == "stopped"
 
 
 @pytest.mark.parametrize(
@@ -346,6 +355,27 @@ def test_a_server_started_again_stands_where_it_was(script):
     for text in ("", "{", "[]", '{"port": 0, "token": "x"}', json.dumps({"port": 80, "token": "../x"})):
         kept.write_text(text)
         assert Address.of(script).port == 0
+
+
+def test_ctrl_c_ends_the_command_with_a_sentence(script):
+    kept = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command("open", script, "--no-browser"), **kept) as process:
+        assert process.stdout.readline().startswith("Open http://127.0.0.1:")
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert said.strip().endswith("The page is closed. What you saved stands beside the study.")
+    assert "Traceback" not in said
+
+
+def test_a_question_that_fails_says_so(desk, monkeypatch):
+    monkeypatch.setattr(threading, "excepthook", lambda *_: None)
+    monkeypatch.setattr(ta.Study, "ask", lambda *_: 1 / 0)
+    state = ask(desk, "ask", question="ranking", design={})
+    while not state["error"]:
+        state = ask(desk, "state")
+    assert "program failed" in state["error"]
 
 
 def test_bad_input_of_the_command_is_one_sentence(tmp_path, script):

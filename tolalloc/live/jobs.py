@@ -80,6 +80,9 @@ class Job:
             self.error = "stopped"
         except TolallocError as error:
             self.error = str(error)
+        except Exception:
+            self.error = "The program failed; the terminal says where."
+            raise
 
 
 @dataclass(frozen=True)
