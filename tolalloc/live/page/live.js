@@ -198,8 +198,10 @@ function take(design) {
   look();
 }
 
-function pin() {
-  if (!drawn || !judged) return;
+async function pin() {
+  const { dataset } = at("answer"); // cost and yield must be those of one design
+  for (let tries = 0; dataset.judged !== dataset.drawn && tries < 200; tries++) await new Promise((done) => setTimeout(done, 50));
+  if (!judged || dataset.judged !== dataset.drawn) return;
   const values = Object.fromEntries([...zones.groups].map(([group, members]) => [`${group} [µm]`, zones.zone(members[0].name)]));
   for (const own of study.settings) values[own.name] = zones.setting(own.name);
   const own = drawn.figures[0]?.series.at(-1);
@@ -346,6 +348,7 @@ async function begin() {
   zones.take(history.now);
   buttons();
   await look();
+  if (!drawn) take({ zones: {}, settings: {} }); // what was kept is of another drawing
   document.body.dataset.ready = "yes";
 }
 
