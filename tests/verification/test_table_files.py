@@ -97,7 +97,8 @@ def test_a_text_of_a_workbook_that_may_separate_thousands_is_refused(text, tmp_p
         sheet["F5"] = text
 
     refused(
-        shop_sheet(tmp_path / "t.xlsx", change), f"row 5: cell F5 is '{text}'; allowed is a number as Excel keeps it"
+        shop_sheet(tmp_path / "t.xlsx", change),
+        f"row 5: a number kept as text is '{text}'; allowed is a number as Excel keeps it",
     )
 
 

@@ -11,7 +11,7 @@ from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import ToleranceRow
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import require_columns
+from tolalloc.drawings.table_file import read_table_file, require_columns
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
 from tolalloc.exceptions import InputError
 from tolalloc.file_content import is_file
@@ -181,12 +181,17 @@ def load_drawing(
 
 
 def _notes(table: Path) -> tuple[str, ...]:
-    """Return what a reader of a tolerance table must know."""
+    """Return what a reader of a tolerance table must know: what of the file was left out, and what is hidden in it."""
+    if not table.suffix:
+        return ()  # a shipped one
+    header = read_table_file(table, header=("id",))[0][0]
+    titles = f"{table}: the header stands in row {header}; what stands above it was left out"
+    left_out = (titles,) if header > 1 else ()
     if table.suffix.lower() not in (".xlsx", ".xlsm"):
-        return ()
+        return left_out
     from tolalloc.drawings.workbook import hidden_cells
 
-    return hidden_cells(table)
+    return (*left_out, *hidden_cells(table))
 
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:

@@ -32,6 +32,8 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """Number that is a thousand times as large where the sign separates thousands."""
 
 
+_TEXTS = ("id", "part", "group", "process", "grade", "note", "sources", "label")
+"""Columns whose cells are no numbers, whatever they look like."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.files.no_formula` writes before a text."""
 
@@ -51,7 +53,8 @@ def read_table_file(path: Path, header: Sequence[str] = ()) -> tuple[NumberedRow
         from tolalloc.drawings.workbook import first_sheet
 
         rows = _under_headers(path, _without_titles(first_sheet(path), header), "each needs one")
-        rows = rows[:1] + [(number, tuple(map(_with_point, cells))) for number, cells in rows[1:]]
+        texts = [split_header(name)[0] in _TEXTS for name in rows[0][1]] if rows else []
+        rows = rows[:1] + [_with_points(path, number, cells, texts) for number, cells in rows[1:]]
     else:
         rows = _records(path, header)
     if not rows:
@@ -120,9 +123,23 @@ def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> li
     return [(number, cells[:width]) for number, cells in kept]
 
 
-def _with_point(cell: str) -> str:
-    """Return a cell with a decimal point; one that may separate thousands was refused where its type was known."""
-    return cell.replace(",", ".") if _DECIMAL.fullmatch(cell) else cell
+def _with_points(path: Path, number: int, cells: Sequence[str], texts: Sequence[bool]) -> NumberedRow:
+    """Return a row of a workbook whose numbers, where they were kept as text, have decimal points.
+
+    Raises
+    ------
+    InputError
+        A number kept as text whose sign may separate thousands.
+    """
+    from tolalloc.drawings.workbook import AmbiguousText
+
+    found = list[str]()
+    for cell, is_text in zip(cells, (*texts, *[False] * len(cells)), strict=False):
+        if isinstance(cell, AmbiguousText) and not is_text:
+            allowed = "a number as Excel keeps it, since as text it may separate thousands"
+            raise InputError.at(f"{path}, row {number}", "a number kept as text", cell, allowed)
+        found.append(cell.replace(",", ".") if _DECIMAL.fullmatch(cell) and not is_text else cell)
+    return number, tuple(found)
 
 
 def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[NumberedRow]:

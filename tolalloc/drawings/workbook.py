@@ -20,6 +20,12 @@ _MOST_CELLS = 100_000
 """Most cells of the rectangle from the first cell to the last one [-]."""
 
 
+class AmbiguousText(str):
+    """Text that is another number where its sign separates thousands: no matter in a note, refused as a number."""
+
+    __slots__ = ()
+
+
 def first_sheet(path: Path) -> list[tuple[str, ...]]:
     """Return the cells of the first sheet as text, whole numbers without decimals.
 
@@ -112,8 +118,7 @@ def _text(path: Path, cell: Any, written: Any) -> str:
         allowed = "a value, or a formula whose value was kept (open the workbook and save it)"
         raise InputError.at(f"{path}, row {cell.row}", f"cell {cell.coordinate}", written.value, allowed)
     if isinstance(value, str) and _THOUSANDS.fullmatch(value.strip()):
-        allowed = "a number as Excel keeps it, since as text it may separate thousands"
-        raise InputError.at(f"{path}, row {cell.row}", f"cell {cell.coordinate}", value, allowed)
+        return AmbiguousText(value.strip())
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return "" if value is None else str(value).strip()

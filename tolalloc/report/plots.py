@@ -13,6 +13,8 @@ from tolalloc.report.figure import BINS, Figure, HeatMap
 
 _SEARCHED = 4000
 """Points up to which the emptiest corner is looked for, which takes long among many [-]."""
+_UPRIGHT = 7
+"""Letters of a line that stand below a cell of a map without meeting those of the next one [-]."""
 _LETTERS = 10.5
 """Letters of a title per width of a picture [1/inch]."""
 COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
@@ -111,7 +113,9 @@ def _(figure: HeatMap) -> Canvas:
         for column, text in enumerate(texts):
             dark = figure.values[row][column] > 0.6 * top
             axes.text(column, row, text, ha="center", va="center", fontsize=7, color="white" if dark else "#222222")
-    axes.set_xticks(range(len(figure.columns)), [str(name) for name in figure.columns])
+    names = [str(name) for name in figure.columns]
+    longest = max((len(line) for name in names for line in name.splitlines()), default=0)
+    axes.set_xticks(range(len(names)), names, rotation=90 if longest > _UPRIGHT else 0)
     axes.set_yticks(range(len(figure.rows)), list(figure.rows))
     _title(canvas, figure.title)
     axes.set(xlabel=figure.x_label)

@@ -29,7 +29,7 @@ from tolalloc.report.plots import drawn, save_png
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
 _SENTENCES = 3
-"""Sentences of each answer on the first page of a report that joins several [-]."""
+"""Sentences of each answer on a first page that shows more than one answer [-]."""
 _MOVING = "moving"
 _LISTED = 6
 """Sections beyond which a page begins with a list of them [-]."""
@@ -82,11 +82,20 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     frame.rename(columns=no_formula).map(no_formula).to_csv(path, index=False, encoding="utf-8")
 
 
+def _answers(document: Document) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return title and sentences of every answer; a report alone has no title beside its own."""
+    return document.answers or (("", document.answer),)
+
+
+def _is_shortened(document: Document) -> bool:
+    """Return whether the first page has only the first sentences, as a drawing or another answer stands there too."""
+    return bool(document.answers) or any(section.first for section in document.sections)
+
+
 def _told(document: Document) -> list[tuple[str, tuple[str, ...]]]:
-    """Return what the box of the first page says: all that one report found, the first sentences of several."""
-    if not document.answers:
-        return [("", document.answer)]
-    return [(title, sentences[:_SENTENCES]) for title, sentences in document.answers]
+    """Return what the box of the first page says."""
+    most = _SENTENCES if _is_shortened(document) else None
+    return [(title, sentences[:most]) for title, sentences in _answers(document)]
 
 
 def _block(document: Document) -> list[tuple[str, str]]:
@@ -100,8 +109,8 @@ def _in_full(document: Document) -> list[dict[str, Any]]:
     """Return the answers in full where the first page has only their first sentences."""
     return [
         {"part": title, "heading": "The answer in full", "paragraphs": sentences, "figures": (), "tables": ()}
-        for title, sentences in document.answers
-        if len(sentences) > _SENTENCES
+        for title, sentences in _answers(document)
+        if _is_shortened(document) and len(sentences) > _SENTENCES
     ]
 
 
