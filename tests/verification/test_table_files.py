@@ -109,10 +109,11 @@ def test_hidden_rows_and_columns_are_read_and_said(sources, tmp_path):
 
     drawing = load_drawing(shop_sheet(tmp_path / "t.xlsx", hide))
     assert drawing.sources == sources
-    rows, columns = drawing.notes
+    titles, rows, columns = drawing.notes
+    assert "what stands above it was left out" in titles
     assert rows.endswith("hidden rows of the sheet are read like the others: 6")
     assert columns.endswith("hidden columns of the sheet are read like the others: B")
-    assert load_drawing(shop_sheet(tmp_path / "u.xlsx")).notes == ()
+    assert load_drawing(shop_sheet(tmp_path / "u.xlsx")).notes == (titles.replace("t.xlsx", "u.xlsx"),)
 
 
 def test_comments_blank_rows_and_empty_cells_behind_the_last_column_are_left_out(sources, tmp_path):
