@@ -269,7 +269,9 @@ async function question(kind) {
   if (!state) return;
   if (state.error) return void (said.textContent = state.error === "stopped" ? "Stopped." : state.error);
   said.textContent = `${kind}, asked at the quick effort, took ${state.seconds} s.`;
-  at("found").replaceChildren(...state.answer.sentences.map((text) => make("p", {}, text)), ...state.answer.warnings.map((text) => make("p", { class: "warning" }, text)));
+  const told = state.answer.sentences.map((text) => make("p", {}, text)), rest = told.splice(3);
+  at("found").replaceChildren(...told, ...(rest.length ? [make("details", {}, make("summary", {}, "what else it says"), ...rest)] : []),
+    ...state.answer.warnings.map((text) => make("p", { class: "warning" }, text)));
   if (state.answer.figure) draw("found", at("found"), state.answer.figure);
   if (state.answer.shares) {
     zones.show(null, state.answer.shares);
