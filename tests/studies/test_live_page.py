@@ -311,7 +311,7 @@ def test_a_hostile_request_is_refused_and_the_study_is_unharmed(server, script, 
     assert send(server)[0] == 200
 
 
-def test_two_hundred_connections_are_bounded_and_leave_room_again(server, monkeypatch):
+def test_two_hundred_connections_are_bounded_and_leave_room_again(server):
     before = threading.active_count()
     held = [socket.create_connection(("127.0.0.1", server.http.server_port), timeout=10) for _ in range(200)]
     closed = sum(_is_closed(own) for own in held)
@@ -338,7 +338,8 @@ def _is_closed(own: socket.socket) -> bool:
         return True
 
 
-def test_the_program_that_fails_says_so_and_goes_on(server, monkeypatch, capfd):
+def test_the_program_that_fails_says_so_and_goes_on(server, monkeypatch):
+    monkeypatch.setattr(server.http, "handle_error", lambda *_: None)
     monkeypatch.setattr(Session, "priced", lambda *_: 1 / 0)
     status, text = send(server, "/api/design", b'{"tab": "a", "turn": 1, "design": {}}')
     assert status == 500
