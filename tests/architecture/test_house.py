@@ -24,7 +24,7 @@ DOORS = {
     "sklearn": ("surrogate/", "rv/stand_ins.py"),
     "matplotlib": ("report/",),
     "jinja2": ("report/",),
-    "openpyxl": ("report/", "allocation/answer/", "drawings/workbook.py"),
+    "openpyxl": ("start/", "report/", "allocation/answer/", "drawings/workbook.py"),
     "distributed": ("workers.py",),
     "numba": ("compiled.py", "rv/equivalent/solvers/lanes.py"),
     "llvmlite": ("rv/equivalent/solvers/lanes.py",),

@@ -18,6 +18,7 @@ from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.identify import identify
 from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
+from tolalloc.cli.new import new
 from tolalloc.cli.open import open_page
 from tolalloc.cli.run import allocate, check, rank, run
 from tolalloc.cli.series import series
@@ -45,6 +46,7 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
 
 
 for command in (
+    new,
     run,
     check,
     rank,

@@ -176,7 +176,7 @@ def load_drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
-        notes=_notes(Path(beside(folder, table))),
+        notes=_notes(found_from_here(beside(folder, table))),
     )
 
 
@@ -185,7 +185,7 @@ def _notes(table: Path) -> tuple[str, ...]:
     if not table.suffix:
         return ()  # a shipped one
     header = read_table_file(table, header=("id",))[0][0]
-    titles = f"{table}: the header stands in row {header}; what stands above it was left out"
+    titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
     left_out = (titles,) if header > 1 else ()
     if table.suffix.lower() not in (".xlsx", ".xlsm"):
         return left_out

@@ -55,7 +55,7 @@ def hidden_cells(path: Path) -> tuple[str, ...]:
     rows = [str(at) for at, row in sheet.row_dimensions.items() if row.hidden]
     columns = [at for at, column in sheet.column_dimensions.items() if column.hidden]
     return tuple(
-        f"{path}: hidden {what} of the sheet are read like the others: {', '.join(found)}"
+        f"{path.name}: hidden {what} of the sheet are read like the others: {', '.join(found)}"
         for what, found in (("rows", rows), ("columns", columns))
         if found
     )

@@ -1,0 +1,108 @@
+"""``tolalloc new``: folders that run at once, for all counts of cranks and discs, and samples of other files."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from openpyxl import load_workbook
+
+from tests.studies.command import refused, tolalloc
+from tolalloc.drawings.drawing import load_drawing
+from tolalloc.rv.equivalent.columns import source_name
+from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.start.reducer_text import PRESETS
+
+
+@pytest.mark.parametrize(("preset", "cranks", "discs"), [("rv20e", 2, 1), ("rv40e", 3, 2), ("rv160e", 4, 3)])
+def test_a_new_folder_is_in_order_and_has_every_source(tmp_path, preset, cranks, discs):
+    place = tmp_path / "mine"
+    made = tolalloc("new", place, "--like", preset, "--cranks", cranks, "--discs", discs)
+    assert made.returncode == 0, made.stderr
+    reducer = load_reducer(place / "reducer.toml")
+    assert (reducer.name, reducer.crank_count, reducer.disc_count) == ("mine", cranks, discs)
+    drawing = load_drawing(place / "zones.xlsx")
+    assert drawing.sources == load_drawing(place / "zones.csv").sources
+    columns = {source_name(name) for name in EquivalentModel(reducer).columns}
+    modification = {name for name in columns if name.startswith("modification")}
+    assert {own.name for own in drawing.sources} == columns - modification - {
+        name for name in columns if name.endswith(".clearance")
+    }
+    for own in drawing.sources:
+        first_stage = own.name.startswith(("sun.", "planet", "mesh"))
+        assert own.locked == (first_stage or own.zone == 0.0)
+    checked = tolalloc("check", place / "study.py", "--json")
+    assert checked.returncode == 0, checked.stderr
+    assert json.loads(checked.stdout)["sources"] == len(drawing.sources)
+
+
+def test_three_cells_may_be_changed_in_excel(tmp_path):
+    tolalloc("new", tmp_path / "mine")
+    book = load_workbook(tmp_path / "mine" / "zones.xlsx")
+    sheet = book.active
+    head = {cell.value: cell.column for cell in sheet[1]}
+    rows = {sheet.cell(row=row, column=head["id"]).value: row for row in range(2, sheet.max_row + 1)}
+    for name, column, value in (
+        ("pin.diameter", "cost [cost units]", 7.5),
+        ("disc1.pitch", "plus [unit]", 11),
+        ("housing.runout", "locked", "yes"),
+    ):
+        sheet.cell(row=rows[name], column=head[column]).value = value
+    assert len(sheet.data_validations.dataValidation) == 5
+    assert all(cell.comment and cell.comment.text for cell in sheet[1])
+    book.save(tmp_path / "mine" / "zones.xlsx")
+    known = {own.name: own for own in load_drawing(tmp_path / "mine" / "zones.xlsx").sources}
+    assert known["pin.diameter"].cost == 7.5
+    assert known["disc1.pitch"].zone == pytest.approx(11e-6)
+    assert known["housing.runout"].locked
+
+
+@pytest.mark.slow
+def test_every_sample_is_read_by_its_command(tmp_path):
+    place = tmp_path / "mine"
+    assert tolalloc("new", place, "--like", "rv40e", "--cranks", "3", "--with", "all").returncode == 0
+    assert tolalloc("costs", place / "shop.csv").returncode == 0
+    mounted = tolalloc("mount", place / "parts.csv", "--reducer", place / "reducer.toml", "--starts", "1")
+    assert mounted.returncode == 0, mounted.stderr
+    table = (place / "zones.csv").read_text(encoding="utf-8").splitlines()
+    head, pins = table[0].split(","), next(at for at, row in enumerate(table) if row.startswith("pin.diameter,"))
+    cells = table[pins].split(",")
+    cells[head.index("distribution")], cells[head.index("measured")] = "empirical", "pin_diameters.csv"
+    table[pins] = ",".join(cells)
+    (place / "zones.csv").write_text("\n".join(table) + "\n", encoding="utf-8")
+    measured = {own.name: own for own in load_drawing(place / "zones.csv").sources}["pin.diameter"].measured
+    assert measured is not None
+    curve = tolalloc("te", "--reducer", place / "reducer.toml", "--unit", "exact", "--json")
+    assert curve.returncode == 0, curve.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cranks", [2, 3, 4])
+def test_a_newcomer_asks_what_a_zone_does(tmp_path, cranks):
+    place = tmp_path / "mine"
+    tolalloc("new", place, "--cranks", cranks)
+    result = tolalloc("whatif", place / "study.py", "disc*.pitch=10", "--units", "256", "--out", tmp_path / "report")
+    assert result.returncode == 0, result.stderr
+    assert "The drawing costs" in result.stdout
+    assert (tmp_path / "report" / "report.html").is_file()
+
+
+def test_nothing_is_overwritten_and_wrong_words_are_sentences(tmp_path):
+    tolalloc("new", tmp_path / "mine")
+    before = {path: path.read_bytes() for path in (tmp_path / "mine").iterdir()}
+    refused(tolalloc("new", tmp_path / "mine"), "is there already", "nothing is overwritten")
+    assert before == {path: path.read_bytes() for path in (tmp_path / "mine").iterdir()}
+    refused(tolalloc("new", tmp_path / "b", "--like", "rv21e"), "rv20e")
+    refused(tolalloc("new", tmp_path / "b", "--cranks", "5"), "--cranks", "2 to 4")
+    refused(tolalloc("new", tmp_path / "b", "--with", "cost"), "costs")
+    refused(tolalloc("new", tmp_path / "1 b"), "NAME", "a letter first")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_preset_that_is_not_changed_is_the_preset_under_another_name(tmp_path, preset):
+    from dataclasses import replace
+
+    tolalloc("new", tmp_path / "mine", "--like", preset)
+    assert replace(load_reducer(tmp_path / "mine" / "reducer.toml"), name="") == replace(load_reducer(preset), name="")

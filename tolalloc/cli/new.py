@@ -1,0 +1,42 @@
+"""The command ``tolalloc new``: a folder that runs at once."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolalloc.cli.console import note
+from tolalloc.exceptions import InputError
+
+
+def new(
+    name: Annotated[Path | None, typer.Argument(help="The new folder, whose name becomes that of the study.")] = None,
+    like: Annotated[str, typer.Option(help="Preset that it is like: rv20e, rv40e, rv80e, rv110e or rv160e.")] = "",
+    cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
+    discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
+    samples: Annotated[
+        str, typer.Option("--with", help="Samples for the other commands: costs,cmm,curve,parts or all.")
+    ] = "",
+) -> None:
+    """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
+    from tolalloc.start.folder import SAMPLES, NewFolder
+    from tolalloc.start.reducer_text import PRESETS, Likeness
+
+    if name is None:
+        if not sys.stdin.isatty():
+            raise InputError("tolalloc new: NAME is missing; give the folder to make, such as mine.")
+        name = Path(typer.prompt("Name of the folder", default="mine"))
+        like = like or typer.prompt(f"Like which preset ({', '.join(PRESETS)})", default="rv20e")
+    chosen = Likeness(preset=like or "rv20e", cranks=cranks, discs=discs)
+    kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
+    reducer, sources = NewFolder(place=name, like=chosen, samples=kinds).write()
+    varied = sum(own.zone > 0 and not own.locked for own in sources)
+    typer.echo(
+        f"{name}: {reducer.name} with {reducer.crank_count} cranks and {reducer.disc_count} discs, like "
+        f"{chosen.preset}; {len(sources)} sources, of which {varied} may change."
+    )
+    typer.echo("Every zone and cost is assumed: open zones.xlsx and write your own.")
+    note(f"Next: cd {name} && tolalloc check study.py && tolalloc open study.py", dim=True)

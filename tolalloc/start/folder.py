@@ -1,0 +1,144 @@
+"""A new folder that runs at once: reducer, tolerance table, study, samples, and what to do next."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import table_text
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.start.reducer_text import Likeness
+from tolalloc.start.samples import Samples
+from tolalloc.start.table import sources_of
+from tolalloc.start.workbook import table_workbook
+from tolalloc.units import ARCSECOND
+
+SAMPLES = ("costs", "cmm", "curve", "parts")
+"""Kinds of samples that a folder may have."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
+_USUAL = 60.0
+"""Limit of the peak-to-peak where no catalogue value is stated [arcsec]."""
+_STUDY = '''"""{name}: which error drives it, and which zones are cheapest."""
+
+import tolalloc as ta
+
+study = ta.Study(
+    # Smallest and largest nominal clearance [µm] that the tooth modification may leave on the flank, at tip and root.
+    ta.reducer("reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
+    ta.drawing("zones.xlsx"),
+    limits={{
+        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
+        ta.LOST_MOTION: ta.Limit(upper=1.0),
+    }},
+    questions=[ta.Ranking(), ta.Allocation()],
+    name="{name}",
+    seed=1,
+)
+
+if __name__ == "__main__":
+    ta.run_script()
+'''
+_READ_ME = """# {name}
+
+Made by `tolalloc new`. In this folder, one after the other:
+
+```sh
+tolalloc check study.py
+tolalloc open study.py
+tolalloc run study.py --quick
+```
+
+`check` says what the study reads, and how many random units are jammed. `open` shows what each zone does, live.
+`run` writes `runs/{name}/report.html`: what drives the error, and the cheapest zones. Leave `--quick` out before you
+set a drawing.
+
+| file | is |
+|---|---|
+| `reducer.toml` | the reducer; `assumptions` lists what nobody measured |
+| `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
+| `zones.csv` | the same as text |
+| `study.py` | limits and questions |
+{samples}
+Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
+"""
+_SAID = {
+    "costs": ("shop.csv", "prices of a shop: `tolalloc costs shop.csv`"),
+    "cmm": ("pin_diameters.csv", "measured parts, for the column `measured` (with `distribution` = `empirical`)"),
+    "curve": ("unit7.csv", "a bad unit: `tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv`"),
+    "parts": ("parts.csv", "measured parts of two units: `tolalloc mount parts.csv --reducer reducer.toml`"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewFolder:
+    """A folder to be made.
+
+    Parameters
+    ----------
+    place
+        Where it will be; its last part names reducer and study.
+    like
+        What the reducer is like.
+    samples
+        Kinds of samples, of `SAMPLES`.
+    """
+
+    place: Path
+    like: Likeness
+    samples: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.place.name):
+            raise InputError.at("tolalloc new", "NAME", self.place.name, "60 letters, digits, - and _, a letter first")
+        for kind in self.samples:
+            if kind not in SAMPLES:
+                raise UnknownNameError.among("tolalloc new", "--with", kind, (*SAMPLES, "all"))
+
+    def write(self) -> tuple[Reducer, tuple[Source, ...]]:
+        """Write the folder, whole or not at all, and return its reducer and its sources.
+
+        Raises
+        ------
+        InputError
+            Something is there already, or the folder cannot be made.
+        """
+        if self.place.exists():
+            raise InputError(f"{self.place}: is there already; choose another name, nothing is overwritten.")
+        above = self.place.absolute().parent
+        try:
+            above.mkdir(parents=True, exist_ok=True)
+            beside = Path(mkdtemp(prefix=f".{self.place.name}-", suffix=".unfinished", dir=above))
+        except OSError as error:
+            raise InputError(f"{self.place}: the folder cannot be made ({error.strerror}).") from None
+        try:
+            found = self._fill(beside)
+            beside.chmod(0o755)
+            os.rename(beside, self.place)
+        except BaseException:
+            rmtree(beside, ignore_errors=True)
+            raise
+        return found
+
+    def _fill(self, folder: Path) -> tuple[Reducer, tuple[Source, ...]]:
+        name = self.place.name
+        (folder / "reducer.toml").write_text(self.like.text(name), encoding="utf-8")
+        reducer = load_reducer(folder / "reducer.toml")
+        sources = sources_of(reducer)
+        (folder / "zones.csv").write_text(table_text(sources, folder), encoding="utf-8")
+        (folder / "zones.xlsx").write_bytes(table_workbook(sources))
+        limit = reducer.catalogue.transmission_error / ARCSECOND if reducer.catalogue else _USUAL
+        (folder / "study.py").write_text(_STUDY.format(name=name, limit=round(limit, 6)), encoding="utf-8")
+        rows = "".join(f"| `{file}` | {what} |\n" for file, what in (_SAID[kind] for kind in self.samples))
+        (folder / "README.md").write_text(_READ_ME.format(name=name, samples=rows), encoding="utf-8")
+        makers = Samples(reducer=reducer, sources=sources).makers if self.samples else {}
+        for kind in self.samples:
+            for file, text in makers[kind]().items():
+                (folder / file).write_text(text, encoding="utf-8")
+        return reducer, sources
