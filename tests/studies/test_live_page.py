@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import tolalloc as ta
+from tests.live_page import STUDY
 from tests.studies.command import ROOT, command, tolalloc
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -24,28 +25,11 @@ from tolalloc.live.server import LARGEST, MOST_CONNECTIONS, LiveServer
 from tolalloc.live.session import Session
 from tolalloc.study.prepared import Prepared
 
-SCRIPT = """
-import tolalloc as ta
-
-def gap(housing, shaft, shim):
-    return housing - shaft - shim
-
-SHIM = ta.Setting(name="shim [mm]", value=0.01, lower=0.0, upper=0.05, step=0.001)
-ZONE = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 2}
-study = ta.Study(
-    ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",), settings=(SHIM,)),
-    ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]),
-    limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.11, show=ta.AtYield(target=0.98))},
-    name="fit",
-    seed=3,
-)
-"""
-
 
 @pytest.fixture
 def script(tmp_path) -> Path:
     path = tmp_path / "fit.py"
-    path.write_text(SCRIPT, encoding="utf-8")
+    path.write_text(STUDY, encoding="utf-8")
     return path
 
 

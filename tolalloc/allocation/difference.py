@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,12 +12,11 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.repricing import named_zones, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.tolerance_table import with_zones
-from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
@@ -240,49 +238,3 @@ def limited_shares(requirement: Requirement) -> tuple[float, ...]:
 def _percent(share: float) -> str:
     """Return a share in percent, with as many digits as half of the usual rejects take."""
     return f"{100 * share:.5g}%"
-
-
-def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
-    """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        No zone, a pattern that fits no source, a zone that is not above 0.
-    """
-    names = [own.name for own in sources]
-    found: dict[str, float] = {}
-    if not zones:
-        raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
-    for pattern, zone in zones.items():
-        own = [name for name in names if fnmatchcase(name, pattern)]
-        if not own:
-            raise UnknownNameError.among("difference", "source", pattern, names)
-        if not (isinstance(zone, int | float) and 0 < zone < 1e6):
-            raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
-        found |= dict.fromkeys(own, zone * MICROMETRE)
-    return found
-
-
-def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:
-    """Return the sources that vary, some at other zones [m] and what these cost by the cheapest process.
-
-    Raises
-    ------
-    InputError
-        A zone that no process holds.
-    """
-    sources = space.errors.active
-    costs = {name: _cheapest(space, name, zone) for name, zone in zones.items() if name in space.processes}
-    return with_zones(sources, [zones.get(own.name, own.zone) for own in sources], costs)
-
-
-def _cheapest(space: DesignSpace, name: str, zone: float) -> float:
-    """Return the cost of a zone by the cheapest process that holds it [cost units]."""
-    made = [float(own.total(np.array(zone))) for own in space.processes[name] if own.minimum <= zone <= own.maximum]
-    if not made:
-        held = f"{min(own.minimum for own in space.processes[name]) / MICROMETRE:.3g} to " + (
-            f"{max(own.maximum for own in space.processes[name]) / MICROMETRE:.3g} µm, what its processes hold"
-        )
-        raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
-    return min(made)

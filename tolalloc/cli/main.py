@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from tolalloc.cli.assemble import assemble
+from tolalloc.cli.check import check
 from tolalloc.cli.compare import compare
 from tolalloc.cli.console import note
 from tolalloc.cli.contact import contact
@@ -20,7 +21,7 @@ from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new
 from tolalloc.cli.open import open_page
-from tolalloc.cli.run import allocate, check, rank, run
+from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.series import series
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te

@@ -1,11 +1,11 @@
-"""The commands on studies: ``run`` and its short names ``rank`` and ``allocate``, and ``check``."""
+"""The commands that ask a study: ``run`` and its short names ``rank`` and ``allocate``."""
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,15 +13,10 @@ from tolalloc.cli.console import AsJson, announce_compilation, note, print_json,
 from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
-from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
-    import numpy as np
-    from jaxtyping import Float
-
     from tolalloc.chunks import Mapper
     from tolalloc.report.answer import Answer
-    from tolalloc.study.prepared import Prepared
     from tolalloc.study.study import Study
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
@@ -217,65 +212,3 @@ def _show(answer: Answer) -> None:
         part = f", first {_ROWS} of {len(frame)} rows" if len(frame) > _ROWS else ""
         tables = [(frame[columns].head(_ROWS), f"{answer.header.name}: {answer.kind}{part}")]
     tell(answer, False, *tables)
-
-
-def check(script: Script, as_json: AsJson = False) -> None:
-    """Check a study's names, units and bounds; no question is asked, but the script, a program, is run."""
-    from tolalloc.study.prepared import Prepared
-
-    study = load_study(script)
-    if any(question.reads for question in study.questions):
-        summary, lines = _checked(Prepared(study=study), script)
-    else:
-        kinds = ", ".join(question.kind for question in study.questions)
-        summary = {"study": study.name, "questions": kinds}
-        lines = [f"{script}: study {study.name} is in order; it asks: {kinds}."]
-    if as_json:
-        print_json(summary)
-    else:
-        lines.append(f"A study is a Python program: {script} was run to read it.")
-        typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
-
-
-def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return what a check found, for a program and in lines for a person."""
-    study, model = prepared.study, prepared.model
-    errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
-    kinds = [question.kind for question in study.questions]
-    summary = {
-        "study": study.name,
-        "model": model.name,
-        "sources": len(errors.sources),
-        "varying": len(errors.active),
-        "groups": list(space.groups),
-        "limits": {own.output: [own.limits.lower, own.limits.upper] for own in requirements},
-        "questions": kinds,
-    }
-    lines = [
-        f"{script}: study {study.name} is in order.",
-        f"{model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} groups; "
-        f"it asks: {', '.join(kinds)}.",
-        *(f"  limit: {requirement.sentence}" for requirement in requirements),
-    ]
-    for source in errors.active:
-        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
-        lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
-    lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
-    examined = model.examined(_random_units(prepared))
-    lines += study.drawing.notes if study.drawing else ()
-    return {**summary, "examined": list(examined)}, [*lines, *examined]
-
-
-_CHECKED = 1000
-"""Random units that a check solves [-]."""
-
-
-def _random_units(prepared: Prepared) -> Float[np.ndarray, "unit column"]:
-    """Return the deviations of random units at the zones of the drawing."""
-    import numpy as np
-
-    from tolalloc.drawings.seeds import SeedTree
-
-    errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
-    chunks = seeds.uniform_chunks(_CHECKED, len(errors.columns))
-    return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])

@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.difference import limited_shares, repriced
+from tolalloc.allocation.difference import limited_shares
+from tolalloc.allocation.repricing import repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import quantile_interval
 from tolalloc.capability.monte_carlo import proportion

@@ -1,0 +1,60 @@
+"""What a drawing costs at other zones: each by the cheapest process that holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_zones
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.units import MICROMETRE
+
+
+def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
+    """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        No zone, a pattern that fits no source, a zone that is not above 0.
+    """
+    names = [own.name for own in sources]
+    found: dict[str, float] = {}
+    if not zones:
+        raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
+    for pattern, zone in zones.items():
+        own = [name for name in names if fnmatchcase(name, pattern)]
+        if not own:
+            raise UnknownNameError.among("difference", "source", pattern, names)
+        if not (isinstance(zone, int | float) and 0 < zone < 1e6):
+            raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
+        found |= dict.fromkeys(own, zone * MICROMETRE)
+    return found
+
+
+def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:
+    """Return the sources that vary, some at other zones [m] and what these cost by the cheapest process.
+
+    Raises
+    ------
+    InputError
+        A zone that no process holds.
+    """
+    sources = space.errors.active
+    costs = {name: _cheapest(space, name, zone) for name, zone in zones.items() if name in space.processes}
+    return with_zones(sources, [zones.get(own.name, own.zone) for own in sources], costs)
+
+
+def _cheapest(space: DesignSpace, name: str, zone: float) -> float:
+    """Return the cost of a zone by the cheapest process that holds it [cost units]."""
+    made = [float(own.total(np.array(zone))) for own in space.processes[name] if own.minimum <= zone <= own.maximum]
+    if not made:
+        held = f"{min(own.minimum for own in space.processes[name]) / MICROMETRE:.3g} to " + (
+            f"{max(own.maximum for own in space.processes[name]) / MICROMETRE:.3g} µm, what its processes hold"
+        )
+        raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
+    return min(made)

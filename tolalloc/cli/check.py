@@ -1,0 +1,82 @@
+"""The command ``tolalloc check``: what a study reads, before anything long runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from tolalloc.cli.console import AsJson, print_json
+from tolalloc.cli.run import Script
+from tolalloc.cli.study_script import load_study
+from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy as np
+    from jaxtyping import Float
+
+    from tolalloc.study.prepared import Prepared
+
+
+def check(script: Script, as_json: AsJson = False) -> None:
+    """Check a study's names, units and bounds; no question is asked, but the script, a program, is run."""
+    from tolalloc.study.prepared import Prepared
+
+    study = load_study(script)
+    if any(question.reads for question in study.questions):
+        summary, lines = _checked(Prepared(study=study), script)
+    else:
+        kinds = ", ".join(question.kind for question in study.questions)
+        summary = {"study": study.name, "questions": kinds}
+        lines = [f"{script}: study {study.name} is in order; it asks: {kinds}."]
+    if as_json:
+        print_json(summary)
+    else:
+        lines.append(f"A study is a Python program: {script} was run to read it.")
+        typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
+
+
+def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return what a check found, for a program and in lines for a person."""
+    study, model = prepared.study, prepared.model
+    errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
+    kinds = [question.kind for question in study.questions]
+    summary = {
+        "study": study.name,
+        "model": model.name,
+        "sources": len(errors.sources),
+        "varying": len(errors.active),
+        "groups": list(space.groups),
+        "limits": {own.output: [own.limits.lower, own.limits.upper] for own in requirements},
+        "questions": kinds,
+    }
+    lines = [
+        f"{script}: study {study.name} is in order.",
+        f"{model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} groups; "
+        f"it asks: {', '.join(kinds)}.",
+        *(f"  limit: {requirement.sentence}" for requirement in requirements),
+    ]
+    for source in errors.active:
+        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
+        lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
+    lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
+    examined = model.examined(_random_units(prepared))
+    lines += study.drawing.notes if study.drawing else ()
+    return {**summary, "examined": list(examined)}, [*lines, *examined]
+
+
+_CHECKED = 1000
+"""Random units that a check solves [-]."""
+
+
+def _random_units(prepared: Prepared) -> Float[np.ndarray, "unit column"]:
+    """Return the deviations of random units at the zones of the drawing."""
+    import numpy as np
+
+    from tolalloc.drawings.seeds import SeedTree
+
+    errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
+    chunks = seeds.uniform_chunks(_CHECKED, len(errors.columns))
+    return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
