@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import pytest
 from openpyxl import load_workbook
 
 from tests.studies.command import refused, tolalloc
+from tolalloc.cli.examples import EXAMPLES
+from tolalloc.cli.main import app
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -106,3 +109,17 @@ def test_a_preset_that_is_not_changed_is_the_preset_under_another_name(tmp_path,
 
     tolalloc("new", tmp_path / "mine", "--like", preset)
     assert replace(load_reducer(tmp_path / "mine" / "reducer.toml"), name="") == replace(load_reducer(preset), name="")
+
+
+@pytest.mark.slow
+def test_the_example_in_the_help_of_every_command_is_accepted(tmp_path):
+    """Those that take minutes are asked for their help instead, with the words of the example before it."""
+    assert set(EXAMPLES) == {str(own.name) for own in app.registered_commands}
+    assert tolalloc("new", tmp_path / "mine", "--with", "all").returncode == 0
+    long = {"run", "rank", "allocate", "series", "open", "diagnose", "simulate", "assemble", "compare"}
+    for name, example in EXAMPLES.items():
+        words = [word.replace("mine/", f"{tmp_path}/mine/") for word in shlex.split(example)[1:]]
+        if name == "new":
+            words[1] = str(tmp_path / "other")
+        result = tolalloc(*words, *(["--help"] if name in long else []))
+        assert result.returncode == 0, (example, result.stderr)

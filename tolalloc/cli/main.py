@@ -16,6 +16,8 @@ from tolalloc.cli.console import note
 from tolalloc.cli.contact import contact
 from tolalloc.cli.costs import costs
 from tolalloc.cli.diagnose import diagnose
+from tolalloc.cli.doctor import doctor
+from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.identify import identify
 from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
@@ -32,7 +34,7 @@ app = typer.Typer(
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
     no_args_is_help=True,
     rich_markup_mode="markdown",  # rich's own markup would swallow [mm]
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
 )
 
@@ -46,14 +48,16 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
         raise typer.Exit
 
 
-for command in (
+_COMMANDS = (
     new,
-    run,
     check,
+    open_page,
+    run,
     rank,
     allocate,
     whatif,
     series,
+    compare,
     costs,
     te,
     contact,
@@ -63,10 +67,13 @@ for command in (
     assemble,
     mount,
     simulate,
-    compare,
-):
-    app.command()(command)
-app.command("open")(open_page)
+    doctor,
+)
+"""In the order in which a newcomer meets them."""
+
+for command in _COMMANDS:
+    word = command.__name__.removesuffix("_page")
+    app.command(word, epilog=f"Example: `{EXAMPLES[word]}`")(command)
 
 
 def main() -> None:

@@ -1,0 +1,23 @@
+"""``tolalloc doctor``: what it runs on, and a self-test that would notice wrong numbers."""
+
+from __future__ import annotations
+
+import json
+
+from tests.studies.command import refused, tolalloc
+from tolalloc.cli import doctor
+
+
+def test_the_doctor_tells_what_it_runs_on_and_solves_a_published_unit():
+    found = json.loads(tolalloc("doctor", "--json").stdout)
+    assert abs(found["self-test [arcsec]"] - 96.629) < 1e-3
+    assert {"tolalloc", "numpy", "python"} <= set(found["versions"])
+    assert found["threads"] >= 1
+    said = tolalloc("doctor")
+    assert said.returncode == 0
+    assert said.stdout.splitlines()[-1].startswith("All is well")
+
+
+def test_wrong_numbers_are_noticed(monkeypatch):
+    monkeypatch.setattr(doctor, "_KNOWN", 96.7)
+    refused(tolalloc("doctor"), "trust no answer of this installation")

@@ -1,0 +1,64 @@
+"""The command ``tolalloc doctor``: what the program runs on, and whether it computes what it should."""
+
+from __future__ import annotations
+
+import platform
+import time
+from pathlib import Path
+
+import typer
+
+from tolalloc.cli.console import AsJson, announce_compilation, print_json
+from tolalloc.exceptions import SolveError
+
+_KNOWN = 96.629
+"""Peak-to-peak of liu2020's Table 4 unit at −1 N·m, extremes refined: row 3 of the validation page [arcsec]."""
+_AGREES = 0.001
+"""Difference from it that is rounding [arcsec]."""
+
+
+def doctor(as_json: AsJson = False) -> None:
+    """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
+    from tolalloc.compiled import is_kept, processor, thread_count
+    from tolalloc.report.writer import versions
+
+    kept = [path.stat().st_size for path in Path("runs/.tolalloc-units").glob("*.units")]
+    found = {
+        "versions": versions(),
+        "platform": platform.platform(),
+        "processor": " ".join(processor()[:2]),
+        "threads": thread_count(),
+        "kernel compiled before": is_kept("turn"),
+        "kept units in runs": f"{len(kept)} files, {sum(kept) / 2**20:.1f} MiB",
+    }
+    announce_compilation()
+    start = time.perf_counter()
+    value = _peak_to_peak()
+    found |= {"self-test [arcsec]": value, "known [arcsec]": _KNOWN, "seconds": round(time.perf_counter() - start, 1)}
+    if as_json:
+        print_json(found)
+    else:
+        for name, said in found.items():
+            if isinstance(said, dict):
+                said = ", ".join(f"{library} {number}" for library, number in said.items())
+            typer.echo(f"{name}: {said}")
+    if not abs(value - _KNOWN) <= _AGREES:
+        raise SolveError(
+            f"self-test: the peak-to-peak of liu2020's Table 4 unit is {value:.4f}″ here and must be {_KNOWN}″; "
+            "trust no answer of this installation."
+        )
+    if not as_json:
+        typer.echo("All is well: a published unit has the answer that it should have.")
+
+
+def _peak_to_peak() -> float:
+    """Return the peak-to-peak of liu2020's Table 4 unit [arcsec]."""
+    from tolalloc.rv.equivalent.model import EquivalentModel
+    from tolalloc.rv.reducer.files import load_reducer
+    from tolalloc.rv.reducer.unit_file import load_unit
+    from tolalloc.units import ARCSECOND
+
+    reducer, unit = load_reducer("rv20e_liu2020"), load_unit("table4")
+    model = EquivalentModel(reducer, orders=unit.orders)
+    errors = unit.errors(model.columns, reducer.modification.deviations)
+    return float(model.extremes(errors, -1.0).peak_to_peak[0] / ARCSECOND)
