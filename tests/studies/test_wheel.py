@@ -1,0 +1,84 @@
+"""The wheel alone, without the checkout: presets, templates and pages are inside, and an own folder runs from it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from zipfile import ZipFile
+
+import pytest
+
+from tests.studies.command import ROOT
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Return the folder that holds the content of the wheel, and nothing of the checkout."""
+    place = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", place, ROOT]
+    subprocess.run(build, check=True, capture_output=True)
+    (wheel,) = place.glob("*.whl")
+    with ZipFile(wheel) as content:
+        content.extractall(place / "installed")
+    return place / "installed"
+
+
+PROGRAM = """
+import sys
+import tolalloc
+from tolalloc.cli.main import main
+
+print(tolalloc.__file__, file=sys.stderr)
+main()
+"""
+STUDY = """
+import tolalloc as ta
+
+
+def gap(housing, shaft):
+    return housing - shaft
+
+
+zone = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
+study = ta.Study(
+    ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+    ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **zone}, {"id": "shaft", "nominal": 30.0, **zone}]),
+    limits={"gap [mm]": ta.Limit(lower=0.06, upper=0.14)},
+    questions=[ta.Allocation(front=False, what_if=False)],
+)
+"""
+
+
+def of_the_wheel(installed, folder, *words):
+    """Run a command of the wheel in another folder."""
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    program = [sys.executable, "-c", PROGRAM, *words]
+    result = subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert str(installed) in result.stderr.splitlines()[0]
+    return result.stdout
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_what_it_needs_and_no_more(installed):
+    names = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
+    needed = {
+        "tolalloc/report/page/chart.js",
+        "tolalloc/report/page/mechanism.js",
+        "tolalloc/report/templates/document.html.j2",
+        "tolalloc/live/page/live.html",
+        "tolalloc/rv/reducer/presets/rv20e.reducer.toml",
+        "tolalloc/drawings/data/rv20e_all_sources.tolerances.csv",
+    }
+    assert needed <= names
+    assert not [name for name in names if name.startswith(("tests", "studies", "docs")) or "__pycache__" in name]
+
+
+@pytest.mark.slow
+def test_a_folder_and_a_study_of_one_s_own_run_from_the_wheel(installed, tmp_path):
+    """A study that needs no kernel, which every installation compiles anew for two minutes."""
+    assert "mine with 3 cranks" in of_the_wheel(installed, tmp_path, "new", "mine", "--cranks", "3")
+    (tmp_path / "gap.py").write_text(STUDY, encoding="utf-8")
+    assert "Met: " in of_the_wheel(installed, tmp_path, "run", "gap.py", "--quick", "--out", "run")
+    assert (tmp_path / "run" / "report.html").stat().st_size > 10_000
