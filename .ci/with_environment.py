@@ -26,7 +26,7 @@ def stop(sentence: str) -> NoReturn:
 
 def environment() -> Path:
     """Return the folder of the environment, made and filled if its stamp does not match."""
-    folder = Path(os.environ.get("TOLALLOC_ENVIRONMENT", ROOT / ".venv"))
+    folder = Path(os.environ.get("TOLALLOC_ENVIRONMENT") or ROOT / ".venv")  # empty is not the current folder
     python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
     wanted = hashlib.sha256(CONSTRAINTS.read_bytes() + (ROOT / "pyproject.toml").read_bytes()).hexdigest()
     stamp = folder / "tolalloc.stamp"
