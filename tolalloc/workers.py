@@ -93,7 +93,7 @@ def workers_at(address: str) -> Iterator[Workers]:
         with client:
             yield _prepared(client, address)
         return
-    cluster = LocalCluster(n_workers=thread_count(), threads_per_worker=1, dashboard_address=None, silence_logs=40)
+    cluster = LocalCluster(n_workers=thread_count(), threads_per_worker=1, dashboard_address=":0", silence_logs=40)
     with cluster, Client(cluster, set_as_default=False) as client:
         yield _prepared(client, address)
 

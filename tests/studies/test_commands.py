@@ -134,7 +134,7 @@ def test_run_folder_is_complete(run_folder):
 def test_report_works_offline(run_folder):
     page = (run_folder / "report.html").read_text(encoding="utf-8")
     assert page.count("class Chart") == 1
-    assert page.count('class="figure"') == page.count("<figure>") > 0
+    assert page.count('class="figure"') + page.count('class="moving"') == page.count("<figure>") > 0
     for outside in ('src="http', "src='http", 'href="http', "cdn."):
         assert outside not in page
     assert ">nan<" not in page.lower()

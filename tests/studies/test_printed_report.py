@@ -66,7 +66,7 @@ def report(title: str, *, first: bool = False, rows: int = 60) -> Document:
     long = pd.DataFrame(
         {"source": [f"{title}.part{at}.position" for at in range(rows)], "zone [µm]": numbers + 0.123456}
     )
-    wide = pd.DataFrame({f"a long header of column {at} [arcsec]": numbers[:3] * 1234.5678 for at in range(12)})
+    wide = pd.DataFrame({f"a long header of column {at} [arcsec]": numbers[:3] * 1234.5678 for at in range(15)})
     framed = pd.DataFrame(
         {"dimension": ["bores"], "write [mm]": [FeatureFrame("position", "⌀0.0047", ("A",), "4.75 µm")]}
     )
