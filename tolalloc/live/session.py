@@ -96,7 +96,7 @@ class Session:
         ways = [own for own in self.prepared.space.processes[source.name] if own.minimum <= source.zone <= own.maximum]
         return min(ways, key=lambda own: float(own.total(np.array(source.zone)))).name if ways else "as drawn"
 
-    def units(self, design: LiveDesign, count: int, wanted: Callable[[], bool]) -> dict[str, Any] | None:
+    def units(self, design: LiveDesign, count: object, wanted: Callable[[], bool]) -> dict[str, Any] | None:
         """Return what random units of a design say; nothing if they are not wanted any more.
 
         Raises
