@@ -343,12 +343,18 @@ def test_a_server_started_again_stands_where_it_was(script):
 
 
 def test_ctrl_c_ends_the_command_with_a_sentence(script):
+    def heeds_ctrl_c():  # which what is started in the background of a script does not
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     kept = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command("open", script, "--no-browser"), **kept) as process:
-        assert process.stdout.readline().startswith("Open http://127.0.0.1:")
-        time.sleep(0.1)
-        process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=20)
+    with subprocess.Popen(command("open", script, "--no-browser"), preexec_fn=heeds_ctrl_c, **kept) as process:
+        try:
+            assert process.stdout.readline().startswith("Open http://127.0.0.1:")
+            time.sleep(0.1)
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == 0
     assert said.strip().endswith("The page is closed. What you saved stands beside the study.")
     assert "Traceback" not in said
