@@ -78,7 +78,8 @@ class KeptUnits:
                 continue
             start = time.perf_counter()
             answer = next(answers)
-            if digest and time.perf_counter() - start >= _WORTH:
+            # What workers solved may have lain ready, however long it took them.
+            if digest and (self.solved_by is not map or time.perf_counter() - start >= _WORTH):
                 self._keep(answer, digest)
             yield answer
 

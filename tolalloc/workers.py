@@ -55,7 +55,7 @@ class Workers:
         """
         under_way: deque[Any] = deque()
         for chunk in chunks:
-            if len(under_way) >= _AHEAD * max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1):
+            if len(under_way) >= _AHEAD * max(len(self.client.nthreads()), 1):
                 yield self._taken(under_way.popleft())
             under_way.append(self.client.submit(solve, chunk, pure=False))
         while under_way:
