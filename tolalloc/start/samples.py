@@ -21,8 +21,8 @@ from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 _ANGLES, _PARTS, _UNITS = 720, 60, 2
 _NOISE = 0.5
 """Standard deviation of a simulated reading [arcsec]."""
-_BAD = 4.0
-"""How much larger the housing's pitch of the bad unit is than its own random one [-]."""
+_BAD, _OTHERS = 6 * MICROMETRE, 0.2
+"""Wave of order 2 of the housing's pitch in the bad unit [m]; its other errors over random ones [-]."""
 _SHOP = """# Invented prices, for trying: replace them by what your shop quotes.
 process,tolerance,unit,cost
 pin turned,40,µm,4
@@ -88,8 +88,8 @@ class Samples:
     @property
     def curve(self) -> str:
         """Transmission error of a unit whose housing has a bad pitch, for ``tolalloc diagnose``."""
-        x, columns = self._units(1), self._errors.columns
-        x[0, [at for at, name in enumerate(columns) if name.startswith("housing.pitch.")]] *= _BAD
+        x = _OTHERS * self._units(1)
+        x[0, self._errors.columns.index("housing.pitch.cos2")] = _BAD
         angle = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
         kernel = self._kernel
         found = kernel.model.equilibria(kernel.errors(x), kernel.torque, angle).transmission_error[0] / ARCSECOND
