@@ -150,6 +150,12 @@ def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk)
     assert saved.read_bytes() == before
 
 
+def test_a_study_is_saved_beside_a_script_of_any_name(script):
+    named = script.rename(script.with_name("my-fit 2.py"))
+    said = ask(desk_of(named), "save", design={"zones": {"shaft": 41.7}}, name="tighter")
+    assert load_study(script.parent / said["script"]).drawing.sources[1].zone == pytest.approx(41.7e-6)
+
+
 def test_a_zone_beyond_its_range_is_saved_with_a_wider_one(script, desk):
     found = ask(desk, "units", design={"zones": {"shaft": 150.0}}, units=256)
     saved = script.parent / ask(desk, "save", design={"zones": {"shaft": 150.0}}, name="loose")["script"]

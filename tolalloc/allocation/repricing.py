@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_zones
@@ -45,16 +46,22 @@ def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ..
         A zone that no process holds.
     """
     sources = space.errors.active
-    costs = {name: _cheapest(space, name, zone) for name, zone in zones.items() if name in space.processes}
+    costs = {name: _price(space, name, zone) for name, zone in zones.items() if name in space.processes}
     return with_zones(sources, [zones.get(own.name, own.zone) for own in sources], costs)
 
 
-def _cheapest(space: DesignSpace, name: str, zone: float) -> float:
+def cheapest(space: DesignSpace, name: str, zone: float) -> Process | None:
+    """Return the cheapest process of a source that holds a zone [m], none where none does."""
+    holding = [own for own in space.processes[name] if own.minimum <= zone <= own.maximum]
+    return min(holding, key=lambda own: float(own.total(np.array(zone))), default=None)
+
+
+def _price(space: DesignSpace, name: str, zone: float) -> float:
     """Return the cost of a zone by the cheapest process that holds it [cost units]."""
-    made = [float(own.total(np.array(zone))) for own in space.processes[name] if own.minimum <= zone <= own.maximum]
-    if not made:
+    made = cheapest(space, name, zone)
+    if made is None:
         held = f"{min(own.minimum for own in space.processes[name]) / MICROMETRE:.3g} to " + (
             f"{max(own.maximum for own in space.processes[name]) / MICROMETRE:.3g} µm, what its processes hold"
         )
         raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
-    return min(made)
+    return float(made.total(np.array(zone)))

@@ -95,7 +95,7 @@ class Desk:
         with self._lock:
             if tab in self._jobs:
                 self._jobs[tab].stop()
-            self._jobs[tab] = Job.begin(str(sent.get("question")), study, names)
+            self._jobs[tab] = Job.asked(str(sent.get("question")), study, names)
         return self._jobs[tab].state
 
     def _state(self, sent: dict[str, Any]) -> dict[str, Any]:

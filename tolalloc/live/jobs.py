@@ -19,7 +19,7 @@ class _StoppedError(Exception):
 
 @dataclass
 class Job:
-    """One question in the background; what it is told of its progress can be read at any time."""
+    """One question in the background, and its own progress, which can be read at any time."""
 
     kind: str
     study: Study
@@ -32,7 +32,7 @@ class Job:
     _stop: Event = field(default_factory=Event)
 
     @classmethod
-    def begin(cls, kind: str, study: Study, settings: tuple[str, ...] = ()) -> Job:
+    def asked(cls, kind: str, study: Study, settings: tuple[str, ...] = ()) -> Job:
         """Ask a question of a study, at the quick effort.
 
         Raises
@@ -50,7 +50,7 @@ class Job:
         """Stop it as soon as the next units are solved."""
         self._stop.set()
 
-    def begin_stage(self, stage: str) -> None:
+    def begin(self, stage: str) -> None:
         """Begin a stage."""
         self._look()
         self.stage, self.units = stage, 0
@@ -73,7 +73,7 @@ class Job:
 
     def _run(self) -> None:
         try:
-            answer = self.study.ask(self.kind, "quick", _Told(self))
+            answer = self.study.ask(self.kind, "quick", self)
             said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
             self.answer = said | _found(answer, self.settings)
         except _StoppedError:
@@ -83,19 +83,6 @@ class Job:
         except Exception:
             self.error = "The program failed; the terminal says where."
             raise
-
-
-@dataclass(frozen=True)
-class _Told:
-    """The progress of a job."""
-
-    job: Job
-
-    def begin(self, stage: str) -> None:
-        self.job.begin_stage(stage)
-
-    def advance(self, units: int) -> None:
-        self.job.advance(units)
 
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:

@@ -19,10 +19,11 @@ from tolalloc.study.study import Study
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
 _SCRIPT = '''"""{before} at other zones, saved from the live page."""
 
-import tolalloc as ta
-from {module} import study as before
+from importlib import import_module
 
-study = before.changed(
+import tolalloc as ta
+
+study = import_module("{module}").study.changed(
     "{table}",
     settings={settings!r},
     name="{name}",

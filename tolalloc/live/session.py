@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.difference import limited_shares
-from tolalloc.allocation.repricing import repriced
+from tolalloc.allocation.repricing import cheapest, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.indices import quantile_interval
 from tolalloc.capability.monte_carlo import proportion
@@ -50,7 +50,7 @@ class Session:
     _lock: Lock = field(default_factory=Lock)
 
     @cached_property
-    def _standard(self) -> Float[np.ndarray, "unit column"]:
+    def standard(self) -> Float[np.ndarray, "unit column"]:
         """Random units per unit of their zones."""
         errors = self.prepared.errors
         seeds = SeedTree(self.prepared.study.seed).child("difference")
@@ -79,7 +79,7 @@ class Session:
     def deviations(self, design: LiveDesign, units: slice) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units [m, angles rad]."""
         zones = np.array([own.zone for own in self.sources(design)])
-        return self.prepared.errors.deviations(self._standard[units], zones)
+        return self.prepared.errors.deviations(self.standard[units], zones)
 
     def priced(self, design: LiveDesign) -> dict[str, Any]:
         """Return the cost of a design and of each of its sources [cost units]."""
@@ -93,8 +93,8 @@ class Session:
 
     def _process(self, source: Source) -> str:
         """Return the cheapest process that holds a source's zone, the one that prices it."""
-        ways = [own for own in self.prepared.space.processes[source.name] if own.minimum <= source.zone <= own.maximum]
-        return min(ways, key=lambda own: float(own.total(np.array(source.zone)))).name if ways else "as drawn"
+        made = cheapest(self.prepared.space, source.name, source.zone)
+        return made.name if made else "as drawn"
 
     def units(self, design: LiveDesign, count: object, wanted: Callable[[], bool]) -> dict[str, Any] | None:
         """Return what random units of a design say; nothing if they are not wanted any more.

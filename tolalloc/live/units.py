@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.sources import Source, limited_measure
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.live.design import LiveDesign
 from tolalloc.live.session import MOST, Session
@@ -111,10 +112,10 @@ class LiveUnits:
         """Return the deviations with which the source fills its zone, in the direction of the unit [m, angles rad]."""
         session = self.session
         zones = np.ones(len(session.prepared.errors.active))
-        own = session.prepared.errors.deviations(session._standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
+        own = session.prepared.errors.deviations(session.standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
         centred = own - _middle(source)
         measure = float(limited_measure(source, own[np.newaxis])[0]) or 1.0
-        half = source.zone / 2 if source.feature.value == "size" else source.zone
+        half = source.zone / 2 if source.feature is Feature.SIZE else source.zone
         return np.asarray(centred * half / measure)
 
     def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
