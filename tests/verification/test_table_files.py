@@ -113,6 +113,7 @@ def test_hidden_rows_and_columns_are_read_and_said(sources, tmp_path):
     assert "what stands above it was left out" in titles
     assert rows.endswith("hidden rows of the sheet are read like the others: 6")
     assert columns.endswith("hidden columns of the sheet are read like the others: B")
+    assert drawing.with_table(tmp_path / "comma.csv").notes == ()  # its own, not those of the table before
     assert load_drawing(shop_sheet(tmp_path / "u.xlsx")).notes == (titles.replace("t.xlsx", "u.xlsx"),)
 
 

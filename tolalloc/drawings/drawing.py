@@ -102,7 +102,8 @@ class Drawing:
         InputError, UnknownNameError
             The file, row, field and value that are not allowed.
         """
-        return self.with_sources(load_tolerance_table(found_from_here(table)), str(table))
+        path = found_from_here(table)
+        return replace(self.with_sources(load_tolerance_table(path), str(table)), notes=_notes(path))
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
         """Return the drawing with some of its sources changed, with the same correlations and process costs."""
