@@ -11,10 +11,15 @@ from types import ModuleType
 import pytest
 
 import tolalloc as ta
+from tolalloc.study.prepared import Prepared
 
 ROOT = Path(__file__).parents[2]
 RUN = ("docs/own-model.md", "docs/extending.md")
-LIKE_THE_NOTEBOOK = ("README.md", "docs/first-study.md")  # the six lines that `tests/studies/test_notebook.py` runs
+ASKS = ("many-studies", "notebook", "two-limits")
+LIKE_THE_NOTEBOOK = (  # the six lines that `tests/studies/test_notebook.py` runs, and studies that are made like it
+    *("README.md", "docs/first-study.md"),
+    *(f"docs/how-to/{name}.md" for name in ASKS),
+)
 PAGES = (*RUN, *LIKE_THE_NOTEBOOK)
 
 
@@ -42,6 +47,14 @@ def test_a_page_like_the_notebook_names_what_there_is(page):
         compile(block, page, "exec")
         for name in re.findall(r"\bta\.(\w+)", block):
             assert name in dir(ta)
+
+
+@pytest.mark.parametrize("name", [name for name in ASKS if name != "notebook"])
+def test_the_study_on_a_page_of_an_everyday_ask_can_be_asked(name):
+    page = ModuleType("page_of_an_everyday_ask")
+    for block in blocks(f"docs/how-to/{name}.md"):
+        exec(compile(block, name, "exec", dont_inherit=True), vars(page))
+    assert Prepared(study=page.study).requirements
 
 
 @pytest.mark.parametrize("page", PAGES)
