@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
-_EVERY = 5.0
-"""Time between two lines of progress in a log [s]."""
 _FRAME, _BETWEEN = 4, 3
 """What the frame takes around the first column, and around every other one [characters]."""
 

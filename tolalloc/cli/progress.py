@@ -25,7 +25,7 @@ def shown_progress(counted: str = "units") -> AbstractContextManager[Progress]:
 
 
 class Lines:
-    """A line when a stage begins, every few seconds while it works, and when it ends."""
+    """A line every few seconds while a stage works, and one when it ends."""
 
     def __init__(self, counted: str) -> None:
         self._counted, self._stage = counted, ""
