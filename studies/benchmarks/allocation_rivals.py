@@ -20,6 +20,7 @@ from pymoo.core.termination import NoTermination
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import group_options, with_shared_zones
 from tolalloc.allocation.guarantee import Sampled
+from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
 
@@ -56,12 +57,13 @@ class Compared:
         outputs = tuple(dict.fromkeys(own.output for own in requirements))
         response = self.prepared.model.at(space.settings_of(design)).reading(outputs)
         found = response(errors.deviations(self._standard, space.zones(design)))
-        values, excess = found.values[found.good], -np.inf
+        values, excess = np.where(found.good[:, np.newaxis], found.values, np.nan), -np.inf
+        units = SolvedUnits.all_of(self.units)
         for own in requirements:
             if not isinstance(own.guarantee, Sampled):
                 raise TypeError(f"{own.output}: units do not show {own.guarantee.words}")
             of_output = values[:, outputs.index(own.output)]
-            for level in own.guarantee.levels(of_output, self.units - len(values), own.limits, _EVEN_ODDS):
+            for level in own.guarantee.levels(of_output, units, own.limits, _EVEN_ODDS):
                 excess = max(excess, level.excess / abs(level.limit))
         return float(excess)
 

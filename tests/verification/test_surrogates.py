@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from sklearn.linear_model import Ridge
 
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -16,8 +17,10 @@ from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
 from tolalloc.surrogate.choice import ENOUGH_Q2, choose, shortfalls
+from tolalloc.surrogate.quadratic_form import fit_quadratic_form
 from tolalloc.surrogate.regression import (
     RegressionCandidate,
+    on_products_of_two,
     quadratic_regression,
     sparse_quadratic_regression,
 )
@@ -333,3 +336,12 @@ def test_the_regression_of_curves_follows_them_where_few_columns_vary(kernel, un
     linear = np.column_stack([np.ones(100), x])
     weights = np.linalg.lstsq(linear[:80], y[:80], rcond=None)[0]
     assert ((linear[80:] @ weights - y[80:]) ** 2).sum() > 2 * (error**2).sum()
+
+
+def test_a_quadratic_form_is_the_ridge_on_all_products_of_two(generator):
+    x = generator.standard_normal((500, 4)) * [1.0, 1e-6, 3.0, 0.0]
+    y = np.stack([x[:, 0] - x[:, 1] * x[:, 2] * 1e6 + x[:, 0] ** 2, x[:, 2]], axis=1)
+    form = fit_quadratic_form(x, y, 50.0)
+    library = on_products_of_two(Ridge(50.0)).fit(x, y)
+    np.testing.assert_allclose(form(x), library.predict(x), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(fit_quadratic_form(x, y, 1e-9)(x), y, atol=1e-6)

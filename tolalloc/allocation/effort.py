@@ -106,7 +106,8 @@ class AllocationEffort:
     verification_units
         Fresh units per design of a search [-].
     confirmation_units
-        Largest number of fresh units that confirm a design in the end; the more, the nearer it lies to its limits [-].
+        Largest number of fresh units that are solved to confirm a design in the end; the more, the nearer it lies to
+        its limits [-].
     shared_units
         Common random units of the quantile surrogate [-].
     search
@@ -138,7 +139,7 @@ class AllocationEffort:
     """
 
     verification_units: int = 6144
-    confirmation_units: int = 24_576
+    confirmation_units: int = 32_768
     shared_units: int = 256
     search: SearchEffort = field(default_factory=SearchEffort)
     graded_steps: int = 8

@@ -13,6 +13,7 @@ from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
+from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields, is_number
 
@@ -58,16 +59,16 @@ class Sampled(Guarantee, Protocol):
     """A guarantee that random units show, with an error."""
 
     def levels(
-        self, values: Float[np.ndarray, " good"], failed: int, limits: Limits, confidence: float
+        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
     ) -> tuple[Level, ...]:
         """Return what units show of every limited side with one-sided confidence, the upper one first.
 
         Parameters
         ----------
         values
-            The output of the units that have one [unit of the output].
-        failed
-            Number of units that have none [-].
+            The output of every solved unit, not a number where it has none [unit of the output].
+        units
+            Which of the drawn units they are.
         """
         ...
 
@@ -83,9 +84,9 @@ class AtYield(NamedFields):
 
     Notes
     -----
-    The values are order statistics: so many of the outermost units are left out as the sample may reject. Two limits
-    share them in the way that leaves the smaller excess, so both values are inside exactly where the Clopper–Pearson
-    bound of the yield reaches the target.
+    The values are order statistics: of the units furthest beyond a limit, either one, so many are left out as the
+    sample may reject. So they are inside exactly where the bound of the yield reaches the target, Clopper–Pearson's
+    where all units were solved.
     """
 
     called: ClassVar[str] = "guarantee AtYield"
@@ -117,15 +118,15 @@ class AtYield(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(trial.values, trial.failed, limits, trial.confidence))
+        return _spread_sides(trial, self.levels(*_solved(trial), limits, trial.confidence))
 
     def levels(
-        self, values: Float[np.ndarray, " good"], failed: int, limits: Limits, confidence: float
+        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
     ) -> tuple[Level, ...]:
         """Return what units show of every limited side."""
-        allowed = allowed_rejections(values.size + failed, self.target, confidence) - failed
-        left_out = _shared_out(np.sort(values), limits, max(allowed, 0))
-        return tuple(_order_statistic(values, sign, limit, left_out[sign], allowed) for sign, limit in limits.turned)
+        excess = np.max([sign * (values - limit) for sign, limit in limits.turned], axis=0)
+        beyond = units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), self.target, confidence)
+        return tuple(_order_statistic(values, units, sign, limit, beyond) for sign, limit in limits.turned)
 
 
 @dataclass(frozen=True)
@@ -176,17 +177,14 @@ class AtCpk(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(trial.values, trial.failed, limits, trial.confidence))
+        return _spread_sides(trial, self.levels(*_solved(trial), limits, trial.confidence))
 
     def levels(
-        self,
-        values: Float[np.ndarray, " good"],
-        failed: int,  # noqa: ARG002
-        limits: Limits,
-        confidence: float,
+        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
     ) -> tuple[Level, ...]:
         """Return what units show of every limited side."""
-        return tuple(self._level(values, sign, limit, confidence) for sign, limit in limits.turned)
+        good = values[units.whatever & np.isfinite(values)]
+        return tuple(self._level(good, sign, limit, confidence) for sign, limit in limits.turned)
 
     def _level(
         self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
@@ -307,37 +305,44 @@ def _name(trial: OutputTrial, sign: int) -> str:
     return f"{trial.output}, {'upper' if sign > 0 else 'lower'} limit"
 
 
-def _shared_out(ordered: Float[np.ndarray, " unit"], limits: Limits, allowed: int) -> dict[int, int]:
-    """Return how many units are left out above and below [-], so that the larger excess of both sides is smallest."""
-    if limits.lower is None or limits.upper is None:
-        return {1: allowed, -1: allowed}
-    above = np.arange(allowed + 1)
-    excess = np.maximum(ordered[-1 - above] - limits.upper, limits.lower - ordered[allowed - above])
-    return {1: int(excess.argmin()), -1: allowed - int(excess.argmin())}
+def _solved(trial: OutputTrial) -> tuple[Float[np.ndarray, " solved"], SolvedUnits]:
+    """Return the output of the units of a search, which solves all of them, not a number where one has none."""
+    values = np.append(trial.values, np.full(trial.failed, np.nan))
+    return values, SolvedUnits.all_of(values.size)
 
 
 def _order_statistic(
-    values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, left_out: int, allowed: int
+    values: Float[np.ndarray, " solved"], units: SolvedUnits, sign: Literal[1, -1], limit: float, beyond: float
 ) -> Level:
-    """Return the outermost value but so many; beyond every limit where not even that many failures are allowed."""
-    turned = np.sort(sign * values)
+    """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown."""
+    turned = np.where(np.isfinite(values), sign * values, np.inf)
+    order = np.argsort(turned, kind="stable")
+    inside = max(int(np.count_nonzero(turned - sign * limit <= beyond)), 1)
     return Level(
         sign=sign,
         limit=limit,
-        value=sign * (float(turned[-1 - left_out]) if allowed >= 0 else np.inf),
-        standard_error=_order_statistic_error(turned, turned.size - left_out),
+        value=sign * (float(turned[order[inside - 1]]) if np.isfinite(beyond) else np.inf),
+        standard_error=_order_statistic_error(turned[order], units.stand_for[order], inside),
     )
 
 
-def _order_statistic_error(ordered: Float[np.ndarray, " unit"], rank: int) -> float:
+def _order_statistic_error(
+    ordered: Float[np.ndarray, " unit"], stand_for: Float[np.ndarray, " unit"], rank: int
+) -> float:
     """Return the standard error of the value at a rank, counted from 1 [unit of the output].
 
     Exact bootstrap: the rank's value of a resample is that of unit i with a probability of the incomplete beta function
-    (Maritz & Jarrett 1978).
+    (Maritz & Jarrett 1978). Where units stand for different numbers of others, it is that of as many equal units as
+    have the variance of those above the rank.
     """
     from scipy.stats import beta
 
-    weights = np.diff(beta.cdf(np.linspace(0, 1, ordered.size + 1), rank, ordered.size - rank + 1))
+    above = stand_for[rank:] if rank < ordered.size else stand_for[-1:]
+    equal = stand_for.sum() * above.sum() / (above @ above)
+    places = np.append(0.0, np.cumsum(stand_for)) / stand_for.sum()
+    at = equal * places[rank]
+    weights, finite = np.diff(beta.cdf(places, at, equal - at + 1)), np.isfinite(ordered)
+    weights, ordered = weights[finite], ordered[finite]
     return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
 
 

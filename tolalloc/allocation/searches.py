@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.candidates import ALIKE, ALONE, FREE, GRADES, TABLE, Candidates
-from tolalloc.allocation.confirmation import Judge, confidence_of_fewer, confirm, error_of
+from tolalloc.allocation.confirmation import ATTEMPTS, confirm
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
@@ -23,6 +23,7 @@ from tolalloc.allocation.graded import (
     group_options,
     with_shared_zones,
 )
+from tolalloc.allocation.judging import AS_GOOD_AS, Judge, confidence_of_fewer, error_of
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
@@ -44,11 +45,11 @@ from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
-_REACH = 1.25
+_REACH = 1.1
 """Factor by which a variable may change from a judged design to the next one [-]."""
-_MARGIN = 1.0
-"""How far inside the limits a cheaper design is aimed after a confirmed one, half as far as a safer one after a miss
-[standard errors of all units]."""
+_MARGIN, _LAST_MARGIN = 1.0, 2.0
+"""How far inside what must be shown the next design is aimed, and the last that may be judged [standard errors of what
+its units and those of the judged one say]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -82,7 +83,7 @@ class DrawingQuestion:
     def search_confidence(self) -> float:
         """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
         shown, units = 1 - error_of(self.effort.error, 1), self.effort.verification_units
-        return confidence_of_fewer(shown, units, self.effort.confirmation_units)
+        return confidence_of_fewer(shown, units, AS_GOOD_AS * self.effort.confirmation_units)
 
     def seeds(self, name: str) -> SeedTree:
         """Return the node of the seed tree of a stage."""
@@ -184,11 +185,11 @@ class DrawingQuestion:
             largest_failed_share=self.largest_failed_share,
         )
         promising = {name: own for name, own in found.admitted().items() if own.met}
-        result = confirm(judge, promising, partial(self._following, found))
+        result = confirm(judge, promising, partial(self._following, found, judge))
         return found.with_confirmed(result, self.model.drawn_amounts)
 
     def _following(
-        self, found: Candidates, kind: str, judged: VerifiedDesign, attempt: int
+        self, found: Candidates, judge: Judge, kind: str, judged: VerifiedDesign, attempt: int
     ) -> tuple[str, VerifiedDesign] | None:
         """Return the design that the search of a judged one would try next, none where it would try no other.
 
@@ -197,13 +198,12 @@ class DrawingQuestion:
         searches = {ALONE: found.fixed, FREE: found.free}
         if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
             kind = FREE
-        errors = _MARGIN if judged.confirmed else 2 * _MARGIN
-        # The next design is judged by all units, where this one may have been given up by few of them.
-        margin = errors * np.sqrt(judged.achieved.units / self.effort.confirmation_units)
+        margin = judge.margin(judged, _LAST_MARGIN if attempt + 1 == ATTEMPTS and not judged.confirmed else _MARGIN)
+        seen = judge.foreseen(judged, attempt + 1)
         if kind == GRADES and found.graded:
-            design = choice_beside(self.model.drawn_amounts, judged, found.graded.tried[1:], margin)
+            design = choice_beside(self.model.drawn_amounts, seen, found.graded.tried[1:], margin)
         elif search := searches.get(kind):
-            design = step_from(judged, search.tried, margin, _REACH)
+            design = step_from(seen, search.tried, margin, _REACH)
         else:
             return None
         worth = (1 - self.effort.gain) * judged.cost if judged.confirmed else np.inf

@@ -13,8 +13,17 @@ from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confirming:
+    """Fresh units that no search has seen, most of them near a limit."""
+
+    units: SolvedUnits  # Which of the drawn units they are
+    outputs: dict[str, Float[np.ndarray, " solved"]]  # Outputs of all requirements, NaN where a unit has none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +45,7 @@ class VerifiedDesign:
     # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
+    confirming: Confirming | None = None  # What judged it last, none if that were the units of its search
     confirmed: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
 
     @property
@@ -67,6 +77,17 @@ class VerifiedDesign:
     def quantile_bound(self) -> float:
         """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
         return self.checks[0].sides[0].value
+
+    def shown_at(self, target: float) -> float:
+        """Return the smallest upper limit of the leading output that the units show kept at another yield.
+
+        With the same confidence; infinite where they are too few [unit of the output].
+        """
+        if self.confirming is None:
+            return self.sample.quantile_bound(target, self.confidence)
+        values = self.checks[0].requirement.read(self.confirming.outputs)
+        finite = np.where(np.isfinite(values), values, np.inf)
+        return self.confirming.units.kept_excess(finite, target, self.confidence)
 
     @property
     def spread(self) -> float:

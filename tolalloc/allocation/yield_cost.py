@@ -36,7 +36,7 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
     proportion to it, so the weights of the model are, too. Other requirements stay.
     """
     chosen, (first, *others) = allocation.chosen, allocation.asked_stacks
-    shown = chosen.sample.quantile_bound(target, chosen.confidence)
+    shown = chosen.shown_at(target)
     if not np.isfinite(shown):
         return np.nan
     spread = float(first.load(chosen.scales, np.zeros(chosen.settings.size)))

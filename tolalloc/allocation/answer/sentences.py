@@ -28,6 +28,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     ]
     if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
+    found += _solved(chosen)
     if answer.met and not answer.header.quick:
         found.append(
             "No search has seen these units; over all designs that were tried on such units, the probability that a "
@@ -44,6 +45,18 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         *_settled(answer),
         *answer.model.remarks,
     )
+
+
+def _solved(design: VerifiedDesign) -> list[str]:
+    """Return which of the fresh units were solved, where that were not all of them."""
+    units = design.confirming.units if design.confirming else None
+    if units is None or units.near.all():
+        return []
+    return [
+        f"Of these units {units.near.size:,} were solved: all that a regression through other units calls near a "
+        f"limit, and {units.drawn.whatever:,} whatever it says of them, so that the interval holds even where it is "
+        "wrong."
+    ]
 
 
 def missed(design: VerifiedDesign) -> str:

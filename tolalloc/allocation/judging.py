@@ -1,0 +1,265 @@
+"""What fresh units that no search has seen say of a design, drawn where its limits are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.allocation.guarantee import Level, Sampled, reached
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.screen import Screen
+from tolalloc.allocation.verification import Confirming, VerifiedDesign
+from tolalloc.blas import one_blas_thread
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
+from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.capability.near_limit import Drawn, SolvedUnits
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models import Evaluation, Model, Response
+
+AS_GOOD_AS = 4.0
+"""Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""
+_SPENT = 0.75
+"""Share of the error left that a design may spend [-]."""
+_LOOKS = (0.25, 0.5, 1.0)
+"""Shares of the units after which a design may be given up; it is confirmed after the last one alone [-]."""
+_WHATEVER = 0.6
+"""Share of the solved units that are solved whatever is predicted of them, to protect from a wrong prediction [-]."""
+_MOST_DRAWN = 8
+"""Drawn units for each solved one, at most; more would hardly place the limit better [-]."""
+_EVEN_ODDS = 0.5
+
+
+def error_of(error: float, attempt: int) -> float:
+    """Return the error that one design may spend [-].
+
+    Parameters
+    ----------
+    error
+        Probability with which an answer may be wrong [-].
+    attempt
+        Number of the design, from 1; each may spend three quarters of what those before it left [-].
+    """
+    return error * _SPENT * (1 - _SPENT) ** (attempt - 1)
+
+
+def confidence_of_fewer(confidence: float, units: float, final: float) -> float:
+    """Return the confidence with which fewer units find what the final ones are expected to find [-].
+
+    Notes
+    -----
+    What a guarantee takes beyond the middle of the units falls with the root of their number.
+    """
+    from scipy.stats import norm
+
+    return float(norm.cdf(norm.ppf(confidence) * np.sqrt(units / final))) if units != final else confidence
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judge:
+    """Confirms designs on fresh units.
+
+    Notes
+    -----
+    Every design has fresh units, their number fixed beforehand, and an error of its own; the errors add up to less than
+    the one stated (Bonferroni), however the designs were found and whichever is taken in the end. All requirements must
+    be shown, each with the whole error of the design: one that misses a requirement is wrongly confirmed only if that
+    one is wrongly shown.
+
+    Where yields are asked for, many more units are drawn than solved: what lies near a limit is solved, of the others
+    only some (`tolalloc.capability.near_limit`).
+    """
+
+    model: Model  # The real model
+    seeds: SeedTree  # Node of the seed tree; every attempt takes its own child
+    units: int  # Units that are solved to confirm a design; fewer may give it up [-]
+    error: float  # Probability with which the answer may be wrong [-]
+    largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
+
+    def judge(self, design: VerifiedDesign, attempt: int) -> VerifiedDesign:
+        """Return a design with what its fresh units say of it.
+
+        Parameters
+        ----------
+        design
+            A design with the local models of its search.
+        attempt
+            Number of designs judged for this answer, with this one [-].
+
+        Raises
+        ------
+        SolveError
+            More units failed.
+
+        Notes
+        -----
+        Units that find the design beyond a limit by more than a standard error before all are solved end the attempt:
+        giving up spends no error.
+        """
+        with one_blas_thread():  # the same units are near for any number of threads
+            screen = Screen.of(design)
+        final, seeds, found = self._drawn(screen), self.seeds.child(f"attempt {attempt}"), design
+        solved: list[_Solved] = []
+        for look, share in enumerate(_LOOKS, start=1):
+            wanted = Drawn(units=int(np.ceil(share * final.units)), whatever=int(np.ceil(share * final.whatever)))
+            solved.append(self._solved(design, screen, seeds.child(f"look {look}"), _more(wanted, solved)))
+            together = _joined(solved)
+            require_few_failures(together.plain, f"{design.name}, confirmation", self.largest_failed_share)
+            confidence = confidence_of_fewer(1 - error_of(self.error, attempt), wanted.whatever, final.whatever)
+            found = _judged(design, together, confidence)
+            if _is_hopeless(found):
+                break
+        return replace(found, confirmed=found.met and wanted == final)
+
+    def foreseen(self, judged: VerifiedDesign, attempt: int) -> VerifiedDesign:
+        """Return a judged design as its units stand against the limits at the error of another attempt."""
+        if judged.confirming is None:
+            return judged
+        return replace(judged, checks=_checks(judged, judged.confirming, 1 - error_of(self.error, attempt)))
+
+    def margin(self, judged: VerifiedDesign, errors: float) -> float:
+        """Return how far inside a limit the next design must be aimed [standard errors of the judged one].
+
+        Parameters
+        ----------
+        errors
+            The same in standard errors of what both say: the next one has all units, this one may have been given up.
+        """
+        solved = judged.confirming.units.drawn if judged.confirming else Drawn(units=self.units, whatever=self.units)
+        final = self.units if solved.whatever == solved.units else np.ceil(_WHATEVER * self.units)
+        return float(errors * np.sqrt(1.0 + solved.whatever / final))
+
+    def _drawn(self, screen: Screen | None) -> Drawn:
+        """Return how many units are drawn for a design, and how many of them are solved whatever is predicted."""
+        if screen is None:
+            return Drawn(units=self.units, whatever=self.units)
+        whatever = int(np.ceil(_WHATEVER * self.units))
+        near = int((self.units - whatever) / max(screen.share, 1 / self.units))
+        return Drawn(units=min(whatever + near, _MOST_DRAWN * self.units), whatever=whatever)
+
+    def _solved(self, design: VerifiedDesign, screen: Screen | None, seeds: SeedTree, drawn: Drawn) -> _Solved:
+        """Return fresh units with all outputs that are limited, the leading one first."""
+        space, response = design.space, self.model.at(design.settings).reading(tuple(design.outputs))
+        experiment = Experiment(response, space.errors, space.zones(design.design), seeds)
+        rows, near, first = list[Float[np.ndarray, "unit column"]](), list[Bool[np.ndarray, " unit"]](), 0
+        for uniform in seeds.uniform_chunks(drawn.units, len(space.errors.columns)):
+            x = experiment.deviations(space.errors.standard_values(uniform))
+            is_near = screen(x) if screen else np.ones(len(x), bool)
+            kept = is_near | (first + np.arange(len(x)) < drawn.whatever)
+            rows.append(x[kept])
+            near.append(is_near[kept])
+            first += len(x)
+        x = np.concatenate(rows)
+        return _Solved.of(response, x, drawn, np.concatenate(near))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Solved:
+    """Fresh units that were solved."""
+
+    sample: MonteCarlo
+    units: SolvedUnits
+
+    @classmethod
+    def of(
+        cls, response: Response, x: Float[np.ndarray, "unit column"], drawn: Drawn, near: Bool[np.ndarray, " unit"]
+    ) -> _Solved:
+        """Return units with their answers; those solved whatever was predicted come first."""
+        whatever = np.arange(len(x)) < drawn.whatever
+        units = SolvedUnits(drawn=drawn, near=near, whatever=whatever)
+        return cls(sample=MonteCarlo(x=x, evaluation=response(x)), units=units)
+
+    @property
+    def plain(self) -> MonteCarlo:
+        """Those that were solved whatever was predicted: a random sample like any other."""
+        own, kept = self.sample, self.units.whatever
+        evaluation = Evaluation(values=own.evaluation.values[kept], status=own.evaluation.status[kept])
+        return MonteCarlo(x=own.x[kept], evaluation=evaluation)
+
+
+def _more(wanted: Drawn, before: list[_Solved]) -> Drawn:
+    """Return how many units are missing."""
+    drawn = [own.units.drawn for own in before]
+    return Drawn(
+        units=wanted.units - sum(own.units for own in drawn),
+        whatever=wanted.whatever - sum(own.whatever for own in drawn),
+    )
+
+
+def _joined(solved: list[_Solved]) -> _Solved:
+    """Return all units of several looks."""
+    drawn, samples = [own.units.drawn for own in solved], [own.sample for own in solved]
+    return _Solved(
+        sample=MonteCarlo(
+            x=np.concatenate([own.x for own in samples]),
+            evaluation=Evaluation(
+                values=np.concatenate([own.evaluation.values for own in samples]),
+                status=np.concatenate([own.evaluation.status for own in samples]),
+            ),
+        ),
+        units=SolvedUnits(
+            drawn=Drawn(units=sum(own.units for own in drawn), whatever=sum(own.whatever for own in drawn)),
+            near=np.concatenate([own.units.near for own in solved]),
+            whatever=np.concatenate([own.units.whatever for own in solved]),
+        ),
+    )
+
+
+def _judged(design: VerifiedDesign, solved: _Solved, confidence: float) -> VerifiedDesign:
+    """Return a design with what other units say of it; its derivatives stay those of its search."""
+    evaluation, units = solved.sample.evaluation, solved.units
+    found = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
+    values = dict(zip(design.outputs, found.T, strict=True))
+    confirming = Confirming(units=units, outputs=values)
+    checks = _checks(design, confirming, confidence)
+    kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
+    return replace(
+        design,
+        sample=solved.plain,
+        achieved=units.yield_of(np.logical_not(kept[0])),
+        checks=checks,
+        joint=units.yield_of(np.logical_not(kept.all(axis=0))),
+        outputs={name: own[units.whatever] for name, own in values.items()},
+        confirming=confirming,
+        confidence=confidence,
+    )
+
+
+def _checks(design: VerifiedDesign, confirming: Confirming, confidence: float) -> tuple[Check, ...]:
+    """Return how a design stands against its requirements; what needs no units stands as it was."""
+    found = []
+    for check in design.checks:
+        levels = _levels(check, confirming, confidence)
+        values = check.requirement.read(confirming.outputs)
+        good = values[np.isfinite(values)]
+        sides = zip(check.sides, levels, strict=True) if levels else ()
+        moved = tuple(_moved(side, level, design, reached(level, good)) for side, level in sides)
+        found.append(replace(check, sides=moved) if levels else check)
+    return tuple(found)
+
+
+def _levels(check: Check, confirming: Confirming, confidence: float) -> tuple[Level, ...]:
+    """Return what units say of a guarantee, nothing where units are not what shows it."""
+    requirement = check.requirement
+    if not isinstance(requirement.guarantee, Sampled):
+        return ()
+    values = requirement.read(confirming.outputs)
+    return requirement.guarantee.levels(values, confirming.units, requirement.limits, confidence)
+
+
+def _moved(side: Side, level: Level, design: VerifiedDesign, value: float) -> Side:
+    """Return a side at another value, its model with the same slopes through it."""
+    load = float(side.stack.load(design.scales, design.settings))
+    stack = replace(side.stack, budget=load - (value - level.sign * level.limit))
+    return replace(side, value=level.value, standard_error=level.standard_error, stack=stack)
+
+
+def _is_hopeless(design: VerifiedDesign) -> bool:
+    """Return whether even the middle of what the units say lies beyond a limit, by more than a standard error."""
+    confirming = design.confirming
+    if confirming is None:
+        return False
+    levels = [level for check in design.checks for level in _levels(check, confirming, _EVEN_ODDS)]
+    return any(np.isfinite(level.value) and level.excess > level.standard_error for level in levels)

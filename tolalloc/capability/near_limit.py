@@ -1,0 +1,203 @@
+"""Shares of units beyond a limit, from those solved near it and some of all others, whatever predicts which are near.
+
+N units are drawn. A prediction, made before, calls each of them near a limit or far from it. The first M are solved
+whatever it says, of the others the near ones alone. With the shares p_n and p_f of units that are near or far and lie
+beyond the limit, as many near ones as K_n ~ B(N, p_n) and as many far ones as K_f ~ B(M, p_f) are found there.
+
+Nothing is believed of the prediction: what is said of p = p_n + p_f holds however p is parted. A bad prediction only
+leaves more units to solve, or far ones beyond the limit, each of which weighs more than N/M near ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tolalloc.capability.monte_carlo import CONFIDENCE, Yield, allowed_rejections, proportion
+
+_CAUTION = 2.0
+"""What a far unit beyond a limit weighs over the N/M units that it stands for. With 1, units of which the prediction
+knows nothing would be judged by M of them; from 2 to 16 the same is shown within a percent [-]."""
+_PARTS = 60
+"""Ways to part a share into near and far ones that are tried [-]."""
+_LEAST_PART = 1e-3
+"""The smallest of them that is not zero, over the share [-]."""
+_ROUNDING = 1e-6
+_EVEN_ODDS = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """How many units were drawn, and how many of them were solved whatever was predicted."""
+
+    # Numbers of units [-]
+    units: int
+    whatever: int
+
+    @property
+    def stands_for(self) -> float:
+        """Number of drawn units for each of those that were solved whatever was predicted, N/M [-]."""
+        return self.units / self.whatever
+
+    @property
+    def weight(self) -> float:
+        """What a far unit beyond a limit weighs where a near one weighs one [-]."""
+        return _CAUTION * self.stands_for if self.whatever < self.units else 1.0
+
+    def allowed(self, target: float, confidence: float) -> float:
+        """Return what may lie beyond a limit for a yield to be shown with one-sided confidence, −1 if nothing may [-].
+
+        Parameters
+        ----------
+        target
+            The yield [-].
+        confidence
+            One-sided [-].
+
+        Notes
+        -----
+        The largest weight at which a design just at the target is called good with no more than the error that is left,
+        however its share is parted.
+        """
+        if self.whatever == self.units:
+            return allowed_rejections(self.units, target, confidence)
+        if confidence <= _EVEN_ODDS:
+            return self.units * (1.0 - target)
+        return _allowed(self, target, confidence)
+
+    def interval(self, weight: float, near: int, far: int) -> Yield:
+        """Return the yield with its intervals.
+
+        Parameters
+        ----------
+        weight
+            Of what lies beyond the limit [-].
+        near, far
+            How many near and far units that are [-].
+
+        Notes
+        -----
+        Far units may only lower the yield, so the near ones alone bound it from above.
+        """
+        if self.whatever == self.units:
+            return proportion(self.units, near + far)
+        tail = (1 - CONFIDENCE) / 2
+        return Yield(
+            estimate=1.0 - near / self.units - far / self.whatever,
+            low=1.0 - self._largest(weight, tail),
+            high=proportion(self.units, near).high,
+            bound=1.0 - self._largest(weight, 1 - CONFIDENCE),
+            units=self.units,
+            rejected=near + far,
+        )
+
+    def _largest(self, weight: float, error: float) -> float:
+        """Return the largest share at which so little weight has a probability above the error [-]."""
+        return _crossing(lambda share: self.probability_of_no_more(weight, share) <= error)
+
+    def probability_of_no_more(self, weight: float, share: float) -> float:
+        """Return the largest probability, over all parts of a share, that no more weight lies beyond the limit [-].
+
+        Notes
+        -----
+        With K_f = j the near units are among N − j others, M − j of them with a probability of p_n/(1 − p_f), the rest
+        with p_n; p_n for all of them makes the probability larger.
+        """
+        far, near = _parts(share)
+        return float(self._at_most(weight, far, near).max())
+
+    def _at_most(
+        self, weight: float, far: Float[np.ndarray, "part 1"], near: Float[np.ndarray, "part 1"]
+    ) -> Float[np.ndarray, " part"]:
+        from scipy.stats import binom
+
+        many = np.arange(int(weight // self.weight) + 1)
+        left = np.floor(weight - self.weight * many + _ROUNDING / 2)
+        return np.asarray((binom.pmf(many, self.whatever, far) * binom.cdf(left, self.units - many, near)).sum(axis=1))
+
+
+def _parts(share: float) -> tuple[Float[np.ndarray, "part 1"], Float[np.ndarray, "part 1"]]:
+    """Return shares of far and of near units that add up to a share [-]."""
+    far = np.append(0.0, np.geomspace(_LEAST_PART * share, share, _PARTS))[:, np.newaxis]
+    return far, np.maximum(share - far, 0.0)
+
+
+@lru_cache(maxsize=256)
+def _allowed(drawn: Drawn, target: float, confidence: float) -> float:
+    share = 1.0 - target
+    allowed, too_much = -1, int(np.ceil(drawn.units * share)) + 1
+    while too_much - allowed > 1:
+        tried = (allowed + too_much) // 2
+        if drawn.probability_of_no_more(tried, share) <= 1 - confidence:
+            allowed = tried
+        else:
+            too_much = tried
+    return float(allowed)
+
+
+def _crossing(is_beyond: Callable[[float], bool]) -> float:
+    """Return the share at which a statement on shares turns true, by halving [-]."""
+    low, high = 0.0, 1.0
+    while high - low > 1e-4 * high:
+        middle = (low + high) / 2
+        low, high = (low, middle) if is_beyond(middle) else (middle, high)
+    return high
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolvedUnits:
+    """Which of the solved units were predicted to be near a limit, and which were solved whatever was predicted."""
+
+    drawn: Drawn  # Of how many they were
+    near: Bool[np.ndarray, " solved"]
+    whatever: Bool[np.ndarray, " solved"]
+
+    @classmethod
+    def all_of(cls, units: int) -> SolvedUnits:
+        """Return units of which all were solved and nothing was predicted."""
+        every = np.ones(units, bool)
+        return cls(drawn=Drawn(units=units, whatever=units), near=every, whatever=every)
+
+    @cached_property
+    def stand_for(self) -> Float[np.ndarray, " solved"]:
+        """How many drawn units each of them stands for [-]."""
+        return np.where(self.near, 1.0, self.drawn.stands_for)
+
+    @cached_property
+    def weights(self) -> Float[np.ndarray, " solved"]:
+        """What each of them weighs beyond a limit [-]."""
+        return np.where(self.near, 1.0, self.drawn.weight)
+
+    def kept_excess(self, excess: Float[np.ndarray, " solved"], target: float, confidence: float) -> float:
+        """Return how far units lie beyond a limit if those furthest beyond it are left out [unit of the excess].
+
+        Parameters
+        ----------
+        excess
+            How far every unit lies beyond it, infinite where it has no answer [unit of the excess].
+        target
+            The yield, which says how many are left out [-].
+        confidence
+            With which it is shown, one-sided; at one half the estimate itself counts [-].
+
+        Returns
+        -------
+        float
+            Infinite where even a sample with nothing beyond the limit shows nothing.
+        """
+        allowed = self.drawn.allowed(target, confidence)
+        if allowed < 0:
+            return np.inf
+        furthest = np.argsort(-excess, kind="stable")
+        weights = self.weights if confidence > _EVEN_ODDS else self.stand_for
+        left_out = int(np.searchsorted(np.cumsum(weights[furthest]), allowed, side="right"))
+        return float(excess[furthest[min(left_out, excess.size - 1)]])
+
+    def yield_of(self, is_beyond: Bool[np.ndarray, " solved"]) -> Yield:
+        """Return the yield if these units lie beyond the limits."""
+        near, far = int(np.count_nonzero(is_beyond & self.near)), int(np.count_nonzero(is_beyond & ~self.near))
+        return self.drawn.interval(float(self.weights[is_beyond].sum()), near, far)
