@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.guarantee import Level, Sampled, reached
+from tolalloc.allocation.guarantee import AtYield, Level, Sampled, reached
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.screen import Screen
@@ -100,7 +100,9 @@ class Judge:
         """
         with one_blas_thread():  # the same units are near for any number of threads
             screen = Screen.of(design)
-        final, seeds, found = self._drawn(screen), self.seeds.child(f"attempt {attempt}"), design
+        final, seeds, found = self._drawn(design, screen, attempt), self.seeds.child(f"attempt {attempt}"), design
+        if final.whatever == final.units:
+            screen = None
         solved: list[_Solved] = []
         for look, share in enumerate(_LOOKS, start=1):
             wanted = Drawn(units=int(np.ceil(share * final.units)), whatever=int(np.ceil(share * final.whatever)))
@@ -131,13 +133,22 @@ class Judge:
         final = self.units if solved.whatever == solved.units else np.ceil(_WHATEVER * self.units)
         return float(errors * np.sqrt(1.0 + solved.whatever / final))
 
-    def _drawn(self, screen: Screen | None) -> Drawn:
-        """Return how many units are drawn for a design, and how many of them are solved whatever is predicted."""
+    def _drawn(self, design: VerifiedDesign, screen: Screen | None, attempt: int) -> Drawn:
+        """Return how many units are drawn for a design, and how many of them are solved whatever is predicted.
+
+        All, where so many plain units show as much: few units leave little to protect from a wrong prediction.
+        """
+        plain = Drawn(units=self.units, whatever=self.units)
         if screen is None:
-            return Drawn(units=self.units, whatever=self.units)
+            return plain
         whatever = int(np.ceil(_WHATEVER * self.units))
         near = int((self.units - whatever) / max(screen.share, 1 / self.units))
-        return Drawn(units=min(whatever + near, _MOST_DRAWN * self.units), whatever=whatever)
+        many = Drawn(units=min(whatever + near, _MOST_DRAWN * self.units), whatever=whatever)
+        confidence = 1 - error_of(self.error, attempt)
+        guarantees = (check.requirement.guarantee for check in design.checks)
+        strictest = max(own.target for own in guarantees if isinstance(own, AtYield))
+        shares = [own.allowed(strictest, confidence) / own.units for own in (many, plain)]
+        return many if shares[0] > shares[1] else plain
 
     def _solved(self, design: VerifiedDesign, screen: Screen | None, seeds: SeedTree, drawn: Drawn) -> _Solved:
         """Return fresh units with all outputs that are limited, the leading one first."""

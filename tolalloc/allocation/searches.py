@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.candidates import ALIKE, ALONE, FREE, GRADES, TABLE, Candidates
-from tolalloc.allocation.confirmation import ATTEMPTS, confirm
+from tolalloc.allocation.confirmation import confirm
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
@@ -47,9 +47,9 @@ from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 _REACH = 1.1
 """Factor by which a variable may change from a judged design to the next one [-]."""
-_MARGIN, _LAST_MARGIN = 1.0, 2.0
-"""How far inside what must be shown the next design is aimed, and the last that may be judged [standard errors of what
-its units and those of the judged one say]."""
+_MARGIN = 1.0
+"""How far inside what must be shown the next design is aimed, half as far again after each miss but the first [standard
+errors of what its units and those of the judged one say]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -184,7 +184,11 @@ class DrawingQuestion:
             error=self.effort.error,
             largest_failed_share=self.largest_failed_share,
         )
-        promising = {name: own for name, own in found.admitted().items() if own.met}
+        admitted = found.admitted()
+        # Where no search ended inside all limits, what fresh units say of its best design leads to a safer one.
+        promising = {name: own for name, own in admitted.items() if own.met} or {
+            name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
+        }
         result = confirm(judge, promising, partial(self._following, found, judge))
         return found.with_confirmed(result, self.model.drawn_amounts)
 
@@ -198,7 +202,7 @@ class DrawingQuestion:
         searches = {ALONE: found.fixed, FREE: found.free}
         if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
             kind = FREE
-        margin = judge.margin(judged, _LAST_MARGIN if attempt + 1 == ATTEMPTS and not judged.confirmed else _MARGIN)
+        margin = judge.margin(judged, _MARGIN * (1.0 if judged.confirmed else (1 + attempt) / 2))
         seen = judge.foreseen(judged, attempt + 1)
         if kind == GRADES and found.graded:
             design = choice_beside(self.model.drawn_amounts, seen, found.graded.tried[1:], margin)
