@@ -116,7 +116,14 @@ def test_nothing_is_overwritten(tmp_path):
     refused(tolalloc("modify", "li2018", "--reducer", "rv40e_xi2015", "--profile", file), "exists")
 
 
-@pytest.mark.parametrize("written", [("contact", "--out", "report"), ("modify", "li2018", "--profile", "disc.csv")])
+@pytest.mark.parametrize(
+    "written",
+    [
+        ("contact", "--out", "report"),
+        ("modify", "li2018", "--profile", "disc.csv"),
+        ("modify", "li2018", "--write", "new.reducer.toml"),
+    ],
+)
 def test_no_file_is_written_about_a_reducer_that_nobody_named(written):
     refused(tolalloc(*written), "--reducer is missing", "rv40e, rv40e_xi2015, rv80e")
 

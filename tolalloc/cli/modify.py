@@ -46,7 +46,7 @@ def modify(
         shift_sign=-1 if negative else 1,
         require_gap=require_gap,
     )
-    named = named_reducer(reducer, out, profile)
+    named = named_reducer(reducer, out, profile, write)
     require_writable(out, profile, points)
     if write:
         require_new(write)
