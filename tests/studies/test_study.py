@@ -234,6 +234,14 @@ def test_numbers_of_numpy_are_numbers_and_one_question_needs_no_list():
     assert not ta.Study(effort="full").quick
 
 
+def test_full_is_full_whatever_effort_a_study_has():
+    own = ta.Effort(ranking=ta.RankingEffort(units=4000))
+    for study in (ta.Study(effort="quick"), ta.Study(effort=own)):
+        assert study.with_effort("full").effort == ta.Effort()
+        assert study.with_effort("quick").quick
+        assert study.with_effort(None) is study
+
+
 def test_a_question_of_ones_own_and_a_model_without_a_name_are_shown():
     class Source:
         def bound(self, errors, place):

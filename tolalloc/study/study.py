@@ -36,15 +36,13 @@ def _full() -> Effort:
     return Effort()
 
 
-def _effort(name: str, own: Effort | str, place: str) -> Effort:
-    """Return the effort of a name: ``quick``, or the study's own where that is one, else the full one."""
+def _effort(name: str, place: str) -> Effort:
+    """Return the effort of a name, ``quick`` or ``full``."""
     from tolalloc.study.effort import QUICK
 
     if name not in ("quick", "full"):
         raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
-    if name == "quick":
-        return QUICK
-    return _full() if isinstance(own, str) else own
+    return QUICK if name == "quick" else _full()
 
 
 def _is_source(model: object) -> bool:
@@ -137,7 +135,7 @@ class Study(NamedFields):
         if isinstance(self.questions, Question):
             object.__setattr__(self, "questions", (self.questions,))
         if isinstance(self.effort, str):
-            object.__setattr__(self, "effort", _effort(self.effort, self.effort, place))
+            object.__setattr__(self, "effort", _effort(self.effort, place))
         for name, good, allowed in (
             ("name", is_name, "100 letters, digits, '_', '-', '.' and blanks, or less"),
             ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
@@ -198,10 +196,11 @@ class Study(NamedFields):
         """Whether the effort is the small one."""
         return self.effort.is_quick
 
-    def with_effort(self, effort: Literal["quick", "full"] | Effort) -> Study:
-        """Return the study at another effort."""
-        chosen = _effort(effort, self.effort, f"study {self.name}") if isinstance(effort, str) else effort
-        return replace(self, effort=chosen)
+    def with_effort(self, effort: Literal["quick", "full"] | Effort | None) -> Study:
+        """Return the study at another effort, as it is where none is given."""
+        if effort is None:
+            return self
+        return replace(self, effort=_effort(effort, f"study {self.name}") if isinstance(effort, str) else effort)
 
     def changed(
         self, drawing: Drawing | str | Path, settings: Mapping[str, float] | None = None, name: str = ""
@@ -232,7 +231,7 @@ class Study(NamedFields):
     def ask(
         self,
         question: Question | str,
-        effort: Literal["quick", "full"] | Effort = "full",
+        effort: Literal["quick", "full"] | Effort | None = None,
         progress: Progress | None = None,
         checkpoint: Path | None = None,
     ) -> Answer:
@@ -243,7 +242,7 @@ class Study(NamedFields):
         question
             A question, or the kind of one of the study's.
         effort
-            The study's own effort, or a quick one.
+            ``quick``, ``full`` or numbers; the study's own if none is given.
         progress
             Told how far the work has come; silent unless given.
         checkpoint
@@ -256,13 +255,13 @@ class Study(NamedFields):
         return answered(self.with_effort(effort), question, progress, checkpoint)
 
     def rank(
-        self, effort: Literal["quick", "full"] | Effort = "full", progress: Progress | None = None
+        self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
     ) -> RankingAnswer:
         """Return which error drives which output."""
         return cast("RankingAnswer", self.ask("ranking", effort, progress))
 
     def allocate(
-        self, effort: Literal["quick", "full"] | Effort = "full", progress: Progress | None = None
+        self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
     ) -> AllocationAnswer:
         """Return the cheapest drawing that keeps every limit."""
         return cast("AllocationAnswer", self.ask("allocation", effort, progress))
@@ -270,7 +269,7 @@ class Study(NamedFields):
     def run(
         self,
         folder: str | Path | None = None,
-        effort: Literal["quick", "full"] | Effort = "full",
+        effort: Literal["quick", "full"] | Effort | None = None,
         progress: Progress | None = None,
         *,
         fresh: bool = False,
