@@ -298,11 +298,11 @@ def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
         ({"others": f", {LOST}: ta.Limit(lower=2.0, upper=1.0)"}, ["upper limit is 1.0", "above the lower one"]),
         (
             {"others": f", {LOST}: ta.Limit(upper=1.0, show=ta.AtYield(target=0.999))"},
-            ["effort.confirmation_units for lost motion", "512", "3282 or more"],
+            ["effort.allocation.confirmation_units for lost motion", "512", "3282 or more"],
         ),
         (
             {"first": "upper=50.0, show=ta.AtYield(target=0.999)"},
-            ["effort.confirmation_units for peak-to-peak", "512", "3282 or more"],
+            ["effort.allocation.confirmation_units for peak-to-peak", "512", "3282 or more"],
         ),
         ({"asked": "unit_price=ta.UnitPrice(inspection=-1.0)"}, ["inspection is -1.0", "0 or above"]),
         ({"asked": "unit_price=5.0"}, ["unit_price is 5.0", "UnitPrice"]),

@@ -108,13 +108,14 @@ class DrawingQuestion:
             "verification_units": (self.effort.verification_units, self.search_confidence),
         }
         if self.what_if and self.model.uncertain:
-            asked["allocation.stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
+            asked["stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
         for requirement in self.requirements:
             for name, (units, confidence) in asked.items():
                 try:
                     requirement.guarantee.require_enough(units, confidence)
                 except InputError as error:
-                    raise InputError(f"{self.place}, effort.{name} for {requirement.output}, {error}") from None
+                    said = f"{self.place}, effort.allocation.{name} for {requirement.output}, {error}"
+                    raise InputError(said) from None
 
     def verifier(self, search: str, space: DesignSpace) -> Verifier:
         """Return what judges the designs of one search on fresh units, other ones than those of any other search."""

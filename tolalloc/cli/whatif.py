@@ -25,8 +25,10 @@ def whatif(
 ) -> None:
     """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units."""
     from tolalloc.function_model import FunctionModel
+    from tolalloc.report.folder import require_usable
     from tolalloc.study.questions import Difference
 
+    require_usable(out)
     study = load_study(script)
     if not isinstance(study.model, FunctionModel):
         announce_compilation()
