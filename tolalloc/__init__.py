@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
     from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
     from tolalloc.allocation.effort import AllocationEffort as AllocationEffort
+    from tolalloc.allocation.effort import FrontEffort as FrontEffort
+    from tolalloc.allocation.effort import SearchEffort as SearchEffort
     from tolalloc.allocation.guarantee import AtCpk as AtCpk
     from tolalloc.allocation.guarantee import AtYield as AtYield
     from tolalloc.allocation.guarantee import RootSumSquare as RootSumSquare
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
+    from tolalloc.drawings.seeds import SamplingDesign as SamplingDesign
     from tolalloc.drawings.seeds import SeedTree as SeedTree
     from tolalloc.exceptions import InputError as InputError
     from tolalloc.exceptions import RunFolderError as RunFolderError
@@ -34,7 +37,10 @@ if TYPE_CHECKING:
     from tolalloc.models import Evaluation as Evaluation
     from tolalloc.models import Model as Model
     from tolalloc.report.answer import Answer as Answer
+    from tolalloc.report.document import Document as Document
     from tolalloc.report.document import Section as Section
+    from tolalloc.report.figure import Figure as Figure
+    from tolalloc.report.figure import Series as Series
     from tolalloc.rv import BACKLASH as BACKLASH
     from tolalloc.rv import EFFICIENCY as EFFICIENCY
     from tolalloc.rv import FRICTION_TORQUE as FRICTION_TORQUE
@@ -47,6 +53,7 @@ if TYPE_CHECKING:
     from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.rv.choice import reducer as reducer
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
+    from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
     from tolalloc.settings import Setting as Setting
     from tolalloc.study.effort import Effort as Effort
     from tolalloc.study.limit import Limit as Limit
@@ -66,17 +73,20 @@ _WHERE = {
     "BACKLASH": "rv",
     "Calculation": "study.questions",
     "Difference": "study.questions",
+    "Document": "report.document",
     "Drawing": "drawings.drawing",
     "EFFICIENCY": "rv",
     "Effort": "study.effort",
     "Evaluation": "models",
+    "FRICTION_TORQUE": "rv",
+    "Figure": "report.figure",
+    "FrontEffort": "allocation.effort",
     "HYSTERESIS_LOSS": "rv",
     "InputError": "exceptions",
     "LOST_MOTION": "rv",
     "LOST_MOTION_WITH_FRICTION": "rv",
     "Limit": "study.limit",
     "Model": "models",
-    "FRICTION_TORQUE": "rv",
     "PEAK_TO_PEAK": "rv",
     "PRELOAD": "rv",
     "QualityLoss": "allocation.cost.unit_price",
@@ -86,9 +96,13 @@ _WHERE = {
     "RankingEffort": "sensitivity.effort",
     "RootSumSquare": "allocation.guarantee",
     "RunFolderError": "exceptions",
+    "SamplingDesign": "drawings.seeds",
+    "SearchEffort": "allocation.effort",
     "Section": "report.document",
     "SeedTree": "drawings.seeds",
+    "Series": "report.figure",
     "Setting": "settings",
+    "SobolEffort": "sensitivity.effort",
     "SolveError": "exceptions",
     "Study": "study.study",
     "TORSIONAL_STIFFNESS": "rv",
