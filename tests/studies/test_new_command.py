@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import shlex
+from types import SimpleNamespace
 
 import pytest
 from openpyxl import load_workbook
 
 from tests.studies.command import refused, tolalloc
+from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.assembly.files import load_errors, load_plan
+from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.main import app
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.start.bench_files import FACTOR, STIFFER
 from tolalloc.start.reducer_text import PRESETS
 
 
@@ -52,13 +57,47 @@ def test_three_cells_may_be_changed_in_excel(tmp_path):
         ("housing.runout", "locked", "yes"),
     ):
         sheet.cell(row=rows[name], column=head[column]).value = value
-    assert len(sheet.data_validations.dataValidation) == 5
+    choices = {own.errorTitle: own for own in sheet.data_validations.dataValidation}
+    assert set(choices) == {"feature", "distribution", "unit", "locked", "sorted", "grade"}
+    assert choices["distribution"].showErrorMessage
+    assert not choices["grade"].showErrorMessage  # any text is carried through
     assert all(cell.comment and cell.comment.text for cell in sheet[1])
     book.save(tmp_path / "mine" / "zones.xlsx")
     known = {own.name: own for own in load_drawing(tmp_path / "mine" / "zones.xlsx").sources}
     assert known["pin.diameter"].cost == 7.5
     assert known["disc1.pitch"].zone == pytest.approx(11e-6)
     assert known["housing.runout"].locked
+
+
+@pytest.mark.parametrize(("cranks", "discs"), [(2, 1), (3, 2), (4, 3)])
+def test_samples_fit_every_reducer(tmp_path, cranks, discs):
+    place = tmp_path / "mine"
+    made = tolalloc("new", place, "--cranks", cranks, "--discs", discs, "--with", "all")
+    assert made.returncode == 0, made.stderr
+    page = (place / "README.md").read_text(encoding="utf-8")
+    for path in place.iterdir():
+        assert path.name == "README.md" or f"`{path.name}`" in page or path.name.startswith("bench_")
+    measured = load_measurements(place / "bench.toml")
+    assert (len(measured.curves), len(measured.loops), measured.repairs) == (2, 2, ())
+    plan = load_plan(place / "chain.toml")
+    assert len(load_errors(place / "angles.csv", plan)) == len(plan.chain.names)
+    drawing = load_drawing("zones.csv", processes="processes.csv", costs="process_costs.csv", folder=place)
+    ways = load_process_costs(place / "process_costs.csv", drawing.sources)
+    assert {len(ways[name]) for name in ("pin.diameter", "crank2.journal1.eccentricity")} == {3}
+    assert tolalloc("check", place / "with_processes.py").returncode == 0
+
+
+@pytest.mark.slow
+def test_the_simulated_bench_gives_back_what_it_was_simulated_with(tmp_path):
+    tolalloc("new", tmp_path / "mine", "--with", "bench")
+    words = ("identify", tmp_path / "mine" / "bench.toml", "--reducer", tmp_path / "mine" / "reducer.toml", "--json")
+    found = tolalloc(*words)
+    assert found.returncode == 0, found.stderr
+    given = load_reducer(tmp_path / "mine" / "reducer.toml").stiffness.crank_disc_bearing
+    identified = json.loads(found.stdout)["parameters"][0]
+    least, most = identified["interval"]
+    assert identified["name"] == STIFFER
+    assert given < least < FACTOR * given < most
 
 
 @pytest.mark.slow
@@ -112,6 +151,21 @@ def test_nothing_is_overwritten_and_wrong_words_are_sentences(tmp_path):
     refused(tolalloc("new", tmp_path / "b", "--with", "cost"), "costs")
     refused(tolalloc("new", tmp_path / "1 b"), "NAME", "a letter first")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
+
+
+def test_what_is_missing_is_asked_on_a_terminal_alone(tmp_path, monkeypatch):
+    refused(tolalloc("new"), "NAME is missing")
+    answers = iter([str(tmp_path / "mine"), "rv80e", 4, 3, "none"])
+    asked = []
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr(
+        "typer.prompt", lambda question, **own: asked.append((question, own["default"])) or next(answers)
+    )
+    made = tolalloc("new")
+    assert made.returncode == 0, made.stderr
+    assert [default for _, default in asked] == ["mine", "rv20e", 3, 2, "none"]
+    reducer = load_reducer(tmp_path / "mine" / "reducer.toml")
+    assert (reducer.crank_count, reducer.disc_count) == (4, 3)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

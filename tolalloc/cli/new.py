@@ -18,7 +18,7 @@ def new(
     cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
     discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
     samples: Annotated[
-        str, typer.Option("--with", help="Samples for the other commands: costs,cmm,curve,parts or all.")
+        str, typer.Option("--with", help="Samples: costs,processes,cmm,bench,curve,parts,assembly or all.")
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
@@ -30,6 +30,11 @@ def new(
             raise InputError("tolalloc new: NAME is missing; give the folder to make, such as mine.")
         name = Path(typer.prompt("Name of the folder", default="mine"))
         like = like or typer.prompt(f"Like which preset ({', '.join(PRESETS)})", default="rv20e")
+        preset = Likeness(preset=like).reducer
+        cranks = cranks or typer.prompt("Cranks, 2 to 4", default=preset.crank_count, type=int)
+        discs = discs or typer.prompt("Discs, 1 to 3", default=preset.disc_count, type=int)
+        samples = samples or typer.prompt("Samples for the other commands (all, or none)", default="none")
+        samples = "" if samples == "none" else samples
     chosen = Likeness(preset=like or "rv20e", cranks=cranks, discs=discs)
     kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
     reducer, sources = NewFolder(place=name, like=chosen, samples=kinds).write()

@@ -20,7 +20,7 @@ from tolalloc.start.table import sources_of
 from tolalloc.start.workbook import table_workbook
 from tolalloc.units import ARCSECOND
 
-SAMPLES = ("costs", "cmm", "curve", "parts")
+SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "parts", "assembly")
 """Kinds of samples that a folder may have."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
 _USUAL = 60.0
@@ -65,15 +65,37 @@ set a drawing.
 | `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
 | `zones.csv` | the same as text |
 | `study.py` | limits and questions |
-{samples}
+{samples}{commands}
 Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
 """
 _SAID = {
-    "costs": ("shop.csv", "prices of a shop: `tolalloc costs shop.csv`"),
-    "cmm": ("pin_diameters.csv", "measured parts, for the column `measured` (with `distribution` = `empirical`)"),
-    "curve": ("unit7.csv", "a bad unit: `tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv`"),
-    "parts": ("parts.csv", "measured parts of two units: `tolalloc mount parts.csv --reducer reducer.toml`"),
+    "costs": {"shop.csv": "prices of a shop, invented"},
+    "processes": {
+        "processes.csv": "what processes hold, assumed",
+        "process_costs.csv": "ways to make a feature and what each costs, invented",
+        "with_processes.py": "the study with these ways to choose from",
+    },
+    "cmm": {
+        "pin_diameters.csv": "measured pins, simulated: name it under `measured`, with `empirical` under `distribution`"
+    },
+    "bench": {"bench.toml": "curves and loops of two units, simulated; its tables are `bench_….csv`"},
+    "curve": {"unit7.csv": "the curve of a bad unit, simulated"},
+    "parts": {"parts.csv": "measured parts of two units, simulated"},
+    "assembly": {
+        "chain.toml": "which part is adjusted against which, as zhang2025 has it",
+        "angles.csv": "measured angles of four parts, invented",
+    },
 }
+"""Kind of sample → its files and what they are."""
+_ASKED = {
+    "costs": "tolalloc costs shop.csv",
+    "processes": "tolalloc check with_processes.py",
+    "bench": "tolalloc identify bench.toml --reducer reducer.toml",
+    "curve": "tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv",
+    "parts": "tolalloc mount parts.csv --reducer reducer.toml",
+    "assembly": "tolalloc assemble chain.toml --measured angles.csv",
+}
+"""Kind of sample → the command that reads it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,10 +157,21 @@ class NewFolder:
         (folder / "zones.xlsx").write_bytes(table_workbook(sources))
         limit = reducer.catalogue.transmission_error / ARCSECOND if reducer.catalogue else _USUAL
         (folder / "study.py").write_text(_STUDY.format(name=name, limit=round(limit, 6)), encoding="utf-8")
-        rows = "".join(f"| `{file}` | {what} |\n" for file, what in (_SAID[kind] for kind in self.samples))
-        (folder / "README.md").write_text(_READ_ME.format(name=name, samples=rows), encoding="utf-8")
+        (folder / "README.md").write_text(self._read_me(), encoding="utf-8")
+        if "processes" in self.samples:
+            study = (folder / "study.py").read_text(encoding="utf-8")
+            files = '"zones.xlsx", processes="processes.csv", costs="process_costs.csv"'
+            study = study.replace('"zones.xlsx"', files).replace(f'name="{name}"', f'name="{name}-processes"')
+            (folder / "with_processes.py").write_text(study, encoding="utf-8")
         makers = Samples(reducer=reducer, sources=sources).makers if self.samples else {}
         for kind in self.samples:
             for file, text in makers[kind]().items():
                 (folder / file).write_text(text, encoding="utf-8")
         return reducer, sources
+
+    def _read_me(self) -> str:
+        """Return the page of the folder: what to type, and what every file is."""
+        rows = "".join(f"| `{file}` | {what} |\n" for kind in self.samples for file, what in _SAID[kind].items())
+        asked = "".join(f"{_ASKED[kind]}\n" for kind in self.samples if kind in _ASKED)
+        commands = f"\nOn the samples, some of them for minutes:\n\n```sh\n{asked}```\n" if asked else ""
+        return _READ_ME.format(name=self.place.name, samples=rows, commands=commands)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.reducer.files import load_reducer
 
 PRESETS = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
 """Presets whose dimensions follow one rule, smallest first."""
@@ -29,6 +31,11 @@ class Likeness:
         for option, count, allowed in (("--cranks", self.cranks, CRANKS), ("--discs", self.discs, DISCS)):
             if count is not None and count not in allowed:
                 raise InputError.at("tolalloc new", option, count, f"{allowed[0]} to {allowed[-1]}")
+
+    @property
+    def reducer(self) -> Reducer:
+        """The preset itself."""
+        return load_reducer(self.preset)
 
     def text(self, name: str) -> str:
         """Return the reducer file; what the preset does not state of the new counts is marked as an assumption."""

@@ -16,6 +16,9 @@ from tolalloc.drawings.sources import Source
 from tolalloc.rv.choice import bind
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.start.assembly_files import assembly_files
+from tolalloc.start.bench_files import bench_files
+from tolalloc.start.process_files import process_files
 from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
 
 _ANGLES, _PARTS, _UNITS = 720, 60, 2
@@ -34,7 +37,7 @@ pin ground,6,µm,12.5
 pin ground,3,µm,18
 pin ground,2,µm,25
 """
-_CURVE = "# Simulated: a unit whose pitch of the housing is bad.\nangle [deg],transmission error [arcsec]\n"
+_CURVE = "# Simulated: a unit whose disc 1 has a bad pitch.\nangle [deg],transmission error [arcsec]\n"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +58,12 @@ class Samples:
         """Kind of sample → what makes its files, by name."""
         return {
             "costs": lambda: {"shop.csv": self.shop},
+            "processes": lambda: process_files(self.sources),
             "cmm": lambda: {"pin_diameters.csv": self.measured_pins},
+            "bench": lambda: bench_files(self.reducer, self._errors, self._units(_UNITS)),
             "curve": lambda: {"unit7.csv": self.curve},
             "parts": lambda: {"parts.csv": self.parts},
+            "assembly": lambda: assembly_files(self.reducer),
         }
 
     @cached_property

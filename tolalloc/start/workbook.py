@@ -17,8 +17,9 @@ _CHOICES = {
     "unit": ["µm", "mm"],
     "locked": ["yes", "no"],
     "sorted": ["yes", "no"],
+    "grade": [f"IT{grade}" for grade in range(1, 12)],
 }
-"""Column → what may stand there."""
+"""Column → what may stand there; of a grade, which is carried through, anything else too."""
 _SPARE = 200
 """Rows below the table that have the same choices [-]."""
 
@@ -45,6 +46,7 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
         sheet.column_dimensions[letter].width = min(longest, 40) + 3
         if name in _CHOICES:
             allowed = DataValidation(type="list", formula1=f'"{",".join(_CHOICES[name])}"', allow_blank=True)
+            allowed.showErrorMessage = name != "grade"
             allowed.error, allowed.errorTitle = f"Allowed are {', '.join(_CHOICES[name])}.", name
             allowed.add(f"{letter}2:{letter}{sheet.max_row + _SPARE}")
             sheet.add_data_validation(allowed)

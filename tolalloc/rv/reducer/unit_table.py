@@ -105,32 +105,46 @@ def _deviation(cell: str, place: str, header: str, largest: float) -> float:
     return value
 
 
+def table_text(headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()) -> str:
+    """Return a CSV file with all digits of its numbers; comments are lines above the headers, names with units."""
+    text = StringIO(newline="")
+    text.writelines(f"# {comment}\n" for comment in comments)
+    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+    writer.writerows(map(no_formula, row) for row in (headers, *rows))
+    return text.getvalue()
+
+
 def write_table(
     path: Path, headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()
 ) -> None:
-    """Write a CSV file with all digits of its numbers.
-
-    Comments are lines above the headers, which are names with units.
+    """Write what `table_text` returns.
 
     Raises
     ------
     InputError
         The file exists or cannot be written.
     """
-    text = StringIO(newline="")
-    text.writelines(f"# {comment}\n" for comment in comments)
-    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
-    writer.writerows(map(no_formula, row) for row in (headers, *rows))
-    write_new(path, text.getvalue())
+    write_new(path, table_text(headers, rows, comments))
 
 
 def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
-    """Write units in the layout that `load_units` reads; what they neglect is not part of it.
+    """Write what `units_text` returns.
 
     Raises
     ------
     InputError
         There is no unit, units state different columns, or the file exists or cannot be written.
+    """
+    write_new(Path(path), units_text(units, path))
+
+
+def units_text(units: Sequence[BuiltUnit], path: str | Path, comments: Sequence[str] = ()) -> str:
+    """Return units in the layout that `load_units` reads; what they neglect is not part of it.
+
+    Raises
+    ------
+    InputError
+        There is no unit, or units state different columns.
     """
     if not units:
         raise InputError(f"{path}: there are no units to write.")
@@ -149,4 +163,4 @@ def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
         [unit.name, *(float(unit.deviations[column]) / factor for column, factor in zip(columns, factors, strict=True))]
         for unit in units
     )
-    write_table(Path(path), ["unit", *headers], rows)
+    return table_text(["unit", *headers], rows, comments)
