@@ -1,6 +1,6 @@
 """The drawing of `rv20e_allocation.py` on the believable RV-20E: bearings that give the rigidity of a catalogue.
 
-tolalloc identify --catalogue --reducer rv20e --stiffness rv20e_catalogue.stiffness.toml
+tolalloc identify --catalogue --reducer rv20e --write rv20e_catalogue.stiffness.toml
 tolalloc run studies/rv20e_believable.py --quick
 """
 

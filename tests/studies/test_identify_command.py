@@ -40,7 +40,7 @@ class Run:
 def run(curves, tmp_path_factory) -> Run:
     place = tmp_path_factory.mktemp("run")
     report, stiffness = place / "report", place / "bench.toml"
-    result = identify(curves, "--out", report, "--stiffness", stiffness, "--json")
+    result = identify(curves, "--out", report, "--write", stiffness, "--json")
     assert f"Report: {report / 'report.html'}" in result.stderr
     assert f"Stiffness file: {stiffness}" in result.stderr
     return Run(answered(result), report, stiffness)
@@ -198,7 +198,7 @@ def test_bounds_beyond_what_polynomials_follow_are_refused(curves):
 @pytest.mark.slow
 def test_weak_data_leave_the_stiffness_open_and_say_so(peak_to_peaks, tmp_path):
     report, file = tmp_path / "report", tmp_path / "weak.toml"
-    result = identify(peak_to_peaks, "--out", report, "--stiffness", file)
+    result = identify(peak_to_peaks, "--out", report, "--write", file)
     assert result.returncode == 0, result.stderr
     low, high = START / 2, START * 2
     assert f"K_pd is not identified by these data: its 95 % interval spans the bounds, {low:.4g}…{high:.4g} N/m." in (
@@ -263,7 +263,7 @@ def test_noise_that_nobody_states_is_estimated(curves, tmp_path):
 
 def test_a_stiffness_file_without_a_stiffness_is_not_passed_over(curves, tmp_path):
     """Who asks for the torque alone and for a stiffness file is told that there will be none."""
-    result = identify(curves, "--stiffness", tmp_path / "none.toml", name="torque=0.9:1.1")
+    result = identify(curves, "--write", tmp_path / "none.toml", name="torque=0.9:1.1")
     assert not (tmp_path / "none.toml").exists()
     assert result.returncode in (0, 2)
     assert "Traceback" not in result.stderr

@@ -154,7 +154,7 @@ CASES = (
         lambda folder: (folder / "found.toml").write_text("mine", encoding="utf-8"),
         "Error: found.toml: the file exists; name a new one, nothing is overwritten.",
     ),
-    bad("stiffness file in no folder", f"--parameter {NAME} --stiffness HERE/no/found.toml", "a folder that exists"),
+    bad("stiffness file in no folder", f"--parameter {NAME} --write HERE/no/found.toml", "a folder that exists"),
     data("out folder not empty", occupied, "report: the run folder is not empty; allowed is a new or empty one"),
     bad("out is a file", f"--parameter {NAME} --out HERE/units.csv", "units.csv: is a file"),
     bad("out below a file", f"--parameter {NAME} --out HERE/units.csv/report", "units.csv/report"),
@@ -214,7 +214,7 @@ def refusal(case: Bad, source: Path, folder: Path) -> tuple[subprocess.Completed
     for change in case.changes:
         change(folder)
     options = [option.replace("HERE", str(folder)) for option in case.options]
-    for option, name in (("--out", "report"), ("--stiffness", "found.toml")):
+    for option, name in (("--out", "report"), ("--write", "found.toml")):
         if option not in options:
             options += [option, str(folder / name)]
     if "--reducer" not in options:
@@ -238,7 +238,7 @@ def test_bad_input_is_refused_in_one_sentence(curves, peak_to_peaks, tmp_path, c
     assert "Gauss–Newton  " not in result.stderr, "refused only after the long part"
 
 
-@pytest.mark.parametrize(("option", "name"), [("--out", "report"), ("--stiffness", "found.toml")])
+@pytest.mark.parametrize(("option", "name"), [("--out", "report"), ("--write", "found.toml")])
 def test_no_file_is_about_a_reducer_that_nobody_named(curves, tmp_path, option, name):
     result = tolalloc("identify", curves / "measurement.toml", option, tmp_path / name)
     refused(result, "--reducer is missing", "rv20e_liu2020")
@@ -249,7 +249,7 @@ def test_no_file_is_about_a_reducer_that_nobody_named(curves, tmp_path, option, 
 def test_a_refusal_in_a_process_of_its_own(curves, tmp_path):
     options = ("--parameter", NAME, "--seed", "-1", "--out", tmp_path / "report", "--reducer", "rv20e_liu2020")
     refused(process("identify", curves / "measurement.toml", *options), "seed is -1")
-    refused(identify(tmp_path, "--stiffness", tmp_path / "found.toml"), "measurement.toml: no such file.")
+    refused(identify(tmp_path, "--write", tmp_path / "found.toml"), "measurement.toml: no such file.")
     assert list(tmp_path.iterdir()) == []
 
 

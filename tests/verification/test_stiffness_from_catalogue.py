@@ -50,7 +50,7 @@ def test_printed_stiffnesses_are_scaled_alike():
 @pytest.mark.slow
 def test_the_file_gives_a_study_the_same_rigidity(tmp_path):
     path = tmp_path / "bearings.toml"
-    result = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--stiffness", path, "--json")
+    result = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--write", path, "--json")
     assert result.returncode == 0, result.stderr
     said = json.loads(result.stdout)
     identified = load_identified_stiffness(path)

@@ -49,7 +49,7 @@ def identify(
         typer.Option("--catalogue", help="Instead of units: the rigidity in [catalogue], one factor on all bearings."),
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of every random number.")] = 1,
-    stiffness: Annotated[Path | None, typer.Option(help="Write the stiffnesses to this new .toml file.")] = None,
+    write: Annotated[Path | None, typer.Option(help="Stiffness file to write, new, for --stiffness elsewhere.")] = None,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -58,10 +58,10 @@ def identify(
     from tolalloc.report.folder import require_usable
     from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
 
-    design = load_reducer(named_reducer(reducer, stiffness, out))
+    design = load_reducer(named_reducer(reducer, write, out))
     require_usable(out)
-    if stiffness:
-        _require_stiffness_file(stiffness, out)
+    if write:
+        _require_stiffness_file(write, out)
     if catalogue:
         given = {"a measurement file": data, "--parameter": asked, "--prior": priors}
         for name, value in given.items():
@@ -71,11 +71,11 @@ def identify(
     elif data is None:
         raise InputError(f"{PLACE}: a measurement file is missing; give one, or --catalogue.")
     else:
-        answer, tables = _from_units(data, design, asked, priors, seed, stiffness)
+        answer, tables = _from_units(data, design, asked, priors, seed, write)
     write_report(answer, out)
-    if stiffness and answer.stiffness:
-        write_identified_stiffness(answer.stiffness, stiffness)
-        note(f"Stiffness file: {stiffness}")
+    if write and answer.stiffness:
+        write_identified_stiffness(answer.stiffness, write)
+        note(f"Stiffness file: {write}")
     tell(answer, as_json, *tables)
 
 
@@ -85,9 +85,9 @@ def _require_stiffness_file(file: Path, out: Path | None) -> None:
 
     require_new(file)
     if file.suffix != ".toml":
-        raise InputError.at(PLACE, "--stiffness", str(file), "a file that ends in .toml")
+        raise InputError.at(PLACE, "--write", str(file), "a file that ends in .toml")
     if out and (out.absolute() == file.absolute() or out.absolute() in file.absolute().parents):
-        raise InputError.at(PLACE, "--stiffness", str(file), "a file outside of the report's folder")
+        raise InputError.at(PLACE, "--write", str(file), "a file outside of the report's folder")
 
 
 def _from_catalogue(design: Reducer) -> tuple[CatalogueAnswer, list[tuple[pd.DataFrame, str]]]:
@@ -121,7 +121,7 @@ def _from_units(
         data=str(data),
     )
     if stiffness and not any(item.is_stiffness for item in study.parameters):
-        raise InputError.at(PLACE, "--stiffness", str(stiffness), "a file only where a stiffness is identified")
+        raise InputError.at(PLACE, "--write", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
     announce_compilation()
     with shown_progress() as progress:

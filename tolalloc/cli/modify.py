@@ -28,7 +28,9 @@ def modify(
     torque: RatedTorqueOption = None,
     profile: ProfileFile = None,
     points: ProfilePoints = 200,
-    write: Annotated[Path | None, typer.Option(help="Reducer file to write: the reducer with these amounts.")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Reducer file to write, new: the reducer with these amounts.")
+    ] = None,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:

@@ -1,0 +1,73 @@
+"""Options of the command line: one name for one thing in all commands."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import pytest
+from typer.main import get_command
+
+from tolalloc.cli.main import app
+
+COMMANDS = get_command(app).commands
+MEANT = {
+    "--out": {
+        "Run folder, new or empty; runs/NAME unless given.",
+        "Write a report into this folder, new or empty.",
+        "Folder of all run folders; finished ones in it are not run again.",
+    },
+    "--seed": {"Seed of every random number, instead of the study's.", "Seed of every random number."},
+    "--torque": {
+        "Torque on the carrier [N·m], negative where it resists the rotation; the reducer's test torque unless given.",
+        "Torque on the carrier [N·m], negative where it resists the rotation; minus the rated one unless given.",
+    },
+    "--write": {
+        "Reducer file to write, new: the reducer with these amounts.",
+        "Stiffness file to write, new, for --stiffness elsewhere.",
+    },
+}
+"""Option → what its helps say, where they differ in what holds unless given or in what is written."""
+
+
+def options() -> dict[str, dict[str, object]]:
+    """Return option → command → its parameter."""
+    found: dict[str, dict[str, object]] = defaultdict(dict)
+    for name, command in COMMANDS.items():
+        for own in command.params:
+            if own.param_type_name == "option":
+                for option in own.opts:
+                    found[option][name] = own
+    return found
+
+
+@pytest.mark.parametrize("option", sorted(options()))
+def test_an_option_means_one_thing_in_all_commands(option):
+    own = options()[option]
+    helps = {parameter.help for parameter in own.values()}
+    assert helps == MEANT.get(option, helps)
+    assert len(helps) == len(MEANT.get(option, ("one",)))
+    assert all(helps)
+
+
+@pytest.mark.parametrize("option", sorted(options()))
+def test_an_option_takes_one_kind_of_value_in_all_commands(option):
+    kinds = {str(own.type_descriptor.annotation).replace(" | None", "") for own in options()[option].values()}
+    assert len(kinds) == 1, kinds
+
+
+def test_one_thing_has_one_option():
+    """A help stands under one name alone."""
+    named = defaultdict(set)
+    for option, own in options().items():
+        for parameter in own.values():
+            named[parameter.help].add(option)
+    assert not {said: names for said, names in named.items() if len(names) > 1}
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_and_every_word_of_it_says_what_it_is(name):
+    command = COMMANDS[name]
+    assert command.help.rstrip().endswith(".")
+    assert command.epilog.startswith("Example: `tolalloc ")
+    for own in command.params:
+        assert own.help, (name, own.name)
