@@ -143,9 +143,9 @@ def test_a_newcomer_asks_what_a_zone_does(tmp_path, cranks):
 
 def test_nothing_is_overwritten_and_wrong_words_are_sentences(tmp_path):
     tolalloc("new", tmp_path / "mine")
-    before = {path: path.read_bytes() for path in (tmp_path / "mine").iterdir()}
+    before = {path: path.read_bytes() for path in (tmp_path / "mine").rglob("*") if path.is_file()}
     refused(tolalloc("new", tmp_path / "mine"), "is there already", "nothing is overwritten")
-    assert before == {path: path.read_bytes() for path in (tmp_path / "mine").iterdir()}
+    assert before == {path: path.read_bytes() for path in (tmp_path / "mine").rglob("*") if path.is_file()}
     refused(tolalloc("new", tmp_path / "b", "--like", "rv21e"), "rv20e")
     refused(tolalloc("new", tmp_path / "b", "--cranks", "5"), "--cranks", "2 to 4")
     refused(tolalloc("new", tmp_path / "b", "--with", "cost"), "costs")

@@ -21,5 +21,6 @@ EXAMPLES = {
     "mount": "tolalloc mount mine/parts.csv --reducer mine/reducer.toml",
     "simulate": "tolalloc simulate --reducer rv40e --out motion",
     "compare": "tolalloc compare runs/mine runs/other",
+    "schema": "tolalloc schema reducer",
     "doctor": "tolalloc doctor",
 }

@@ -24,6 +24,7 @@ from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new
 from tolalloc.cli.open import open_page
 from tolalloc.cli.run import allocate, rank, run
+from tolalloc.cli.schema import schema
 from tolalloc.cli.series import series
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te
@@ -67,6 +68,7 @@ _COMMANDS = (
     assemble,
     mount,
     simulate,
+    schema,
     doctor,
 )
 """In the order in which a newcomer meets them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.start.reducer_text import Likeness
 from tolalloc.start.samples import Samples
+from tolalloc.start.schema import schema
 from tolalloc.start.table import sources_of
 from tolalloc.start.workbook import table_workbook
 from tolalloc.units import ARCSECOND
@@ -65,6 +67,7 @@ set a drawing.
 | `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
 | `zones.csv` | the same as text |
 | `study.py` | limits and questions |
+| `schemas` | what may stand in the TOML files, for editors that offer it |
 {samples}{commands}
 Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
 """
@@ -96,6 +99,19 @@ _ASKED = {
     "assembly": "tolalloc assemble chain.toml --measured angles.csv",
 }
 """Kind of sample → the command that reads it."""
+_SCHEMAS = {"reducer.toml": "reducer", "bench.toml": "bench", "chain.toml": "chain"}
+"""File → kind of its schema."""
+
+
+def _write_schemas(folder: Path) -> None:
+    """Write the schemas of a folder's TOML files and name them in their first lines, where editors look."""
+    (folder / "schemas").mkdir()
+    for file, kind in _SCHEMAS.items():
+        if (path := folder / file).exists():
+            text = json.dumps(schema(kind), ensure_ascii=False, indent=2)
+            (folder / "schemas" / f"{kind}.json").write_text(text + "\n", encoding="utf-8")
+            named = f"#:schema ./schemas/{kind}.json\n{path.read_text(encoding='utf-8')}"
+            path.write_text(named, encoding="utf-8")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,6 +183,7 @@ class NewFolder:
         for kind in self.samples:
             for file, text in makers[kind]().items():
                 (folder / file).write_text(text, encoding="utf-8")
+        _write_schemas(folder)
         return reducer, sources
 
     def _read_me(self) -> str:
