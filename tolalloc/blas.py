@@ -19,6 +19,12 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+def blas_libraries() -> str:
+    """Return which BLAS libraries are loaded, with their versions; each works on one thread here."""
+    found = [own for own in _libraries().info() if own["user_api"] == "blas"]
+    return ", ".join(sorted({f"{own['internal_api']} {own['version']}" for own in found})) or "none that is known"
+
+
 def one_blas_thread() -> AbstractContextManager[Any]:
     """Return a context in which matrix products use one thread."""
     context: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")

@@ -211,6 +211,11 @@ class Model(ABC):
         return ()
 
     @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the drawing does not state and the model takes as exact, a sentence each."""
+        return ()
+
+    @property
     def content(self) -> Any:
         """What tells it from other models, for the digest of a study; its ``repr`` counts."""
         return (self.name, self.columns, self.outputs, self.settings)

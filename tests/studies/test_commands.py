@@ -99,6 +99,7 @@ def test_check_is_in_order():
     assert result.returncode == 0
     assert "is in order" in result.stdout
     assert "σ =" in result.stdout
+    assert "Neglected: not in the tolerance table and taken as exact: " in result.stdout
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ def test_the_doctor_tells_what_it_runs_on_and_solves_a_published_unit():
     assert abs(found["self-test [arcsec]"] - 96.629) < 1e-3
     assert {"tolalloc", "numpy", "python"} <= set(found["versions"])
     assert found["threads"] >= 1
+    assert found["BLAS"].startswith(("openblas ", "mkl ", "blis ", "none"))
     said = tolalloc("doctor")
     assert said.returncode == 0
     assert said.stdout.splitlines()[-1].startswith("All is well")

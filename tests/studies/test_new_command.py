@@ -42,7 +42,10 @@ def test_a_new_folder_is_in_order_and_has_every_source(tmp_path, preset, cranks,
         assert own.locked == (first_stage or own.zone == 0.0)
     checked = tolalloc("check", place / "study.py", "--json")
     assert checked.returncode == 0, checked.stderr
-    assert json.loads(checked.stdout)["sources"] == len(drawing.sources)
+    found = json.loads(checked.stdout)
+    assert found["sources"] == len(drawing.sources)
+    assert found["neglected"] == [own.name for own in drawing.sources if own.zone == 0.0]
+    assert {"crank1.tilt", "each_pin.position"} <= {*found["neglected"]}
 
 
 def test_three_cells_may_be_changed_in_excel(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -62,8 +63,14 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
         lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
+    neglected = [source.name for source in errors.sources if source.zone == 0.0]
+    if neglected:
+        kinds_of = dict.fromkeys(re.sub(r"\d+", "*", name) for name in neglected)
+        lines.append(f"Neglected, with a zone of 0, are {len(neglected)} sources: {', '.join(kinds_of)}.")
+    lines += [f"Neglected: {sentence}." for sentence in model.left_out]
     examined = model.examined(_random_units(prepared))
     lines += study.drawing.notes if study.drawing else ()
+    summary |= {"neglected": [*neglected, *model.left_out]}
     return {**summary, "examined": list(examined)}, [*lines, *examined]
 
 

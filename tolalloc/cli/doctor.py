@@ -19,6 +19,7 @@ _AGREES = 0.001
 
 def doctor(as_json: AsJson = False) -> None:
     """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
+    from tolalloc.blas import blas_libraries
     from tolalloc.compiled import is_kept, processor, thread_count
     from tolalloc.report.writer import versions
 
@@ -28,6 +29,7 @@ def doctor(as_json: AsJson = False) -> None:
         "platform": platform.platform(),
         "processor": " ".join(processor()[:2]),
         "threads": thread_count(),
+        "BLAS": blas_libraries(),
         "kernel compiled before": is_kept("turn"),
         "kept units in runs": f"{len(kept)} files, {sum(kept) / 2**20:.1f} MiB",
     }

@@ -202,6 +202,11 @@ class ReducerModel(Model):
         return {"torque [N·m]": self.kernel.torque}
 
     @property
+    def left_out(self) -> tuple[str, ...]:
+        """What binding the drawing took as exact."""
+        return self.bound_assumptions
+
+    @property
     def assumptions(self) -> tuple[str, ...]:
         """Those of the reducer, of the built unit and of what the drawing leaves out."""
         clearances = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
