@@ -1,0 +1,79 @@
+"""A script plays the newcomer: a new folder, three cells changed in Excel, a check, a run, for 2, 3 and 4 cranks.
+
+The whole `run --quick` of such a folder takes minutes, most of them for how far each zone may open alone. So the effort
+here is smaller still, and only the folder of three cranks is asked both questions.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from openpyxl import load_workbook
+
+from tests.studies.command import tolalloc
+from tolalloc.drawings.drawing import load_drawing
+
+SMALL = """seed=1,
+    effort=ta.Effort(
+        ranking=RankingEffort(
+            units=1000, sobol=SobolEffort(start=16, limit=16), trajectories=2, moment_units=100, derivative_units=10,
+            inverse_units=1, surrogate_units=96, level_units=100, level_runs=2, widened_units=100, permutations=2),
+        allocation=AllocationEffort(
+            verification_units=400, confirmation_units=800, shared_units=24, exact_points=4, share_blocks=4, error=0.5,
+            search=SearchEffort(steps=2)),
+        is_quick=True),
+"""
+IMPORTS = """from tolalloc.allocation.effort import AllocationEffort, SearchEffort
+from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
+
+import tolalloc as ta
+"""
+CELLS = (
+    ("disc1.pitch", "plus [unit]", 11),
+    ("pin.diameter", "cost [cost units]", 7.5),
+    ("housing.runout", "locked", "yes"),
+)
+
+
+def change_cells(path: Path) -> None:
+    """Change three cells as a person does in a spreadsheet program."""
+    book = load_workbook(path)
+    sheet = book.active
+    columns = {cell.value: cell.column for cell in sheet[1]}
+    rows = {sheet.cell(row=row, column=columns["id"]).value: row for row in range(2, sheet.max_row + 1)}
+    for name, column, value in CELLS:
+        sheet.cell(row=rows[name], column=columns[column]).value = value
+    book.save(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cranks", "questions"), [(2, "ta.Allocation"), (3, "ta.Ranking"), (4, "ta.Allocation")])
+def test_a_newcomer_comes_from_nothing_to_an_answer(tmp_path, cranks, questions):
+    place = tmp_path / "mine"
+    assert tolalloc("new", place, "--cranks", cranks).returncode == 0
+    change_cells(place / "zones.xlsx")
+    checked = tolalloc("check", place / "study.py")
+    assert checked.returncode == 0, checked.stderr
+    study = (place / "study.py").read_text(encoding="utf-8")
+    asked = "[ta.Ranking(), ta.Allocation()]"
+    assert asked in study
+    allocation = "ta.Allocation(fixed_first=False, front=False, what_if=False)"
+    kept = f"[{allocation}]" if questions == "ta.Allocation" else f"[ta.Ranking(), {allocation}]"
+    study = study.replace("import tolalloc as ta\n", IMPORTS).replace("seed=1,\n", SMALL).replace(asked, kept)
+    (place / "study.py").write_text(study.replace("0.9973", "0.9"), encoding="utf-8")
+    run = tolalloc("run", place / "study.py", "--out", tmp_path / "run")
+    assert run.returncode == 0, run.stderr
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["allocation"]["cost [cost units]"] > 0
+    assert "housing.pitch" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    before = {own.name: own for own in load_drawing(place / "zones.xlsx").sources}
+    after = {own.name: own for own in load_drawing(tmp_path / "run" / "allocation.csv").sources}
+    assert before["disc1.pitch"].zone == pytest.approx(11e-6)
+    assert after.keys() == before.keys()
+    for name, own in after.items():
+        if before[name].locked:
+            assert own.zone == pytest.approx(before[name].zone)
+        else:
+            assert before[name].minimum * 0.999 <= own.zone <= before[name].maximum * 1.001
