@@ -175,7 +175,7 @@ class ReducerChoice:
             radial=radial,
             identified=self.identified,
             unit=self.unit,
-            bound_assumptions=assumptions,
+            left_out=assumptions,
         )
 
 

@@ -62,7 +62,7 @@ class ReducerModel(Model):
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
     clearances: tuple[float, float] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
-    bound_assumptions: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
+    left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
 
     @property
     def reducer(self) -> Reducer:
@@ -202,11 +202,6 @@ class ReducerModel(Model):
         return {"torque [N·m]": self.kernel.torque}
 
     @property
-    def left_out(self) -> tuple[str, ...]:
-        """What binding the drawing took as exact."""
-        return self.bound_assumptions
-
-    @property
     def assumptions(self) -> tuple[str, ...]:
         """Those of the reducer, of the built unit and of what the drawing leaves out."""
         clearances = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
@@ -214,7 +209,7 @@ class ReducerModel(Model):
         return (
             *self.reducer.assumptions,
             *(self.unit.assumptions if self.unit else ()),
-            *self.bound_assumptions,
+            *self.left_out,
             *without,
         )
 
