@@ -66,7 +66,8 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     neglected = [source.name for source in errors.sources if source.zone == 0.0]
     if neglected:
         kinds_of = dict.fromkeys(re.sub(r"\d+", "*", name) for name in neglected)
-        lines.append(f"Neglected, with a zone of 0, are {len(neglected)} sources: {', '.join(kinds_of)}.")
+        share = f"{len(neglected)} of {len(errors.sources)} rows"
+        lines.append(f"Neglected, with a zone of 0: {', '.join(kinds_of)} ({share}).")
     lines += [f"Neglected: {sentence}." for sentence in model.left_out]
     examined = model.examined(_random_units(prepared))
     lines += study.drawing.notes if study.drawing else ()
