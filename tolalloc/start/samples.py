@@ -37,7 +37,7 @@ pin ground,6,µm,12.5
 pin ground,3,µm,18
 pin ground,2,µm,25
 """
-_CURVE = "# Simulated: a unit whose disc 1 has a bad pitch.\nangle [deg],transmission error [arcsec]\n"
+_CURVE = "# Simulated: a unit whose pitch of the housing is bad.\nangle [deg],transmission error [arcsec]\n"
 
 
 @dataclass(frozen=True, kw_only=True)
