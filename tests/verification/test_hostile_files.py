@@ -95,7 +95,7 @@ def test_hidden_sheets_and_merged_cells_are_refused(tmp_path):
         book.active.sheet_state = "hidden"
         book.create_sheet("shown")
 
-    assert "the first sheet is hidden" in refusal(load_tolerance_table, workbook(tmp_path, hide))
+    assert "the sheet is hidden" in refusal(load_tolerance_table, workbook(tmp_path, hide))
     merged = workbook(tmp_path, lambda book: book.active.merge_cells("G2:G3"))
     assert "the cells G2:G3 are merged" in refusal(load_tolerance_table, merged)
 

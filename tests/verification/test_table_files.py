@@ -6,7 +6,7 @@ import csv
 
 import pandas as pd
 import pytest
-from openpyxl import Workbook
+from openpyxl import Workbook, load_workbook
 
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, HEADERS
@@ -74,6 +74,27 @@ def shop_sheet(path, change=lambda sheet: None, cells=lambda value: value):
     change(book.active)
     book.save(path)
     return path
+
+
+def test_a_sheet_may_be_chosen(sources, tmp_path):
+    path = shop_sheet(tmp_path / "t.xlsx")
+    book = load_workbook(path)
+    book.active.title = "Rev B"
+    book.active.row_dimensions[len(TITLES) + 2].hidden = True
+    book.create_sheet("Rev A", 0)
+    book.create_sheet("Lists").sheet_state = "hidden"
+    book.save(path)
+    drawing = load_drawing(path, sheet="Rev B")
+    assert drawing.sources == sources
+    assert len(drawing.notes) == 2  # of the titles and of the hidden row
+    with pytest.raises(InputError, match="the table is empty"):
+        load_drawing(path)
+    with pytest.raises(InputError, match=r"t\.xlsx: sheet is 'Rev C'; allowed is one of 'Rev A', 'Rev B'\.$"):
+        load_drawing(path, sheet="Rev C")
+    with pytest.raises(InputError, match="sheet 'Lists': the sheet is hidden"):
+        load_drawing(path, sheet="Lists")
+    with pytest.raises(InputError, match="sheet is 'Rev B'; allowed is none, since only a workbook"):
+        load_drawing("rv20e_baseline", sheet="Rev B")
 
 
 def test_titles_above_the_header_are_left_out(sources, tmp_path):

@@ -143,6 +143,7 @@ def load_drawing(
     correlations: str | Path = "",
     costs: Costs = "",
     folder: Path | None = None,
+    sheet: str = "",
 ) -> Drawing:
     """Return a drawing from its files, each by shipped name or path.
 
@@ -159,6 +160,8 @@ def load_drawing(
         what the table says at its zone, falling as 1/zone.
     folder
         Folder that relative paths start from, such as that of a study; the current one unless given.
+    sheet
+        Sheet of a workbook that holds the tolerance table; the first unless given.
 
     Raises
     ------
@@ -171,28 +174,28 @@ def load_drawing(
     >>> len(baseline.sources), f"{1e6 * baseline.sources[0].zone:.1f} µm"
     (23, '4.0 µm')
     """
-    sources = load_tolerance_table(beside(folder, table), beside(folder, processes))
+    sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
     return Drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
-        notes=_notes(found_from_here(beside(folder, table))),
+        notes=_notes(found_from_here(beside(folder, table)), sheet),
     )
 
 
-def _notes(table: Path) -> tuple[str, ...]:
+def _notes(table: Path, sheet: str = "") -> tuple[str, ...]:
     """Return what a reader of a tolerance table must know: what of the file was left out, and what is hidden in it."""
     if not table.suffix:
         return ()  # a shipped one
-    header = read_table_file(table, header=("id",))[0][0]
+    header = read_table_file(table, header=("id",), sheet=sheet)[0][0]
     titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
     left_out = (titles,) if header > 1 else ()
     if table.suffix.lower() not in (".xlsx", ".xlsm"):
         return left_out
     from tolalloc.drawings.workbook import hidden_cells
 
-    return (*left_out, *hidden_cells(table))
+    return (*left_out, *hidden_cells(table, sheet))
 
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:

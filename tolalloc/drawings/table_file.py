@@ -38,23 +38,26 @@ _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.files.no_formula` writes before a text."""
 
 
-def read_table_file(path: Path, header: Sequence[str] = ()) -> tuple[NumberedRow, ...]:
+def read_table_file(path: Path, header: Sequence[str] = (), sheet: str = "") -> tuple[NumberedRow, ...]:
     """Return the cells of a CSV or XLSX file as text, the header first, blank rows left out.
 
     Every row is filled up to the length of the first: Excel leaves out separators behind the last cell. Where names are
     given, the header is the first row that has them all, and rows above it are titles, which are left out.
+    Of a workbook the named sheet is read, the first unless named.
 
     Raises
     ------
     InputError
-        The file is missing, no table, or cells stand under no header.
+        The file is missing, no table, or without that sheet; or cells stand under no header.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        from tolalloc.drawings.workbook import first_sheet
+        from tolalloc.drawings.workbook import sheet_texts
 
-        rows = _under_headers(path, _without_titles(first_sheet(path), header), "each needs one")
+        rows = _under_headers(path, _without_titles(sheet_texts(path, sheet), header), "each needs one")
         texts = [split_header(name)[0] in _TEXTS for name in rows[0][1]] if rows else []
         rows = rows[:1] + [_with_points(path, number, cells, texts) for number, cells in rows[1:]]
+    elif sheet:
+        raise InputError.at(path, "sheet", sheet, "none, since only a workbook (XLSX) has sheets")
     else:
         rows = _records(path, header)
     if not rows:

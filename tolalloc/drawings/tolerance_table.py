@@ -33,8 +33,10 @@ SMALLEST_KEPT = 0.01
 """Smallest share that sorting may leave of all parts [-]."""
 
 
-def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic") -> tuple[Source, ...]:
+def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic", sheet: str = "") -> tuple[Source, ...]:
     """Return the sources of a tolerance table and its processes, each by shipped name or from the user's file.
+
+    Of a workbook the named sheet is read, the first unless named.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic")
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    (_, first), *others = read_table_file(path, header=("id",))
+    (_, first), *others = read_table_file(path, header=("id",), sheet=sheet)
     stated = [split_header(header) for header in first]
     headers = tuple(name for name, _ in stated)
     require_columns(path, headers, ToleranceRow)

@@ -1,4 +1,4 @@
-"""The first sheet of a user's workbook as text; what a reader of values would silently miss is refused."""
+"""A sheet of a user's workbook as text; what a reader of values would silently miss is refused."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class AmbiguousText(str):
     __slots__ = ()
 
 
-def first_sheet(path: Path) -> list[tuple[str, ...]]:
-    """Return the cells of the first sheet as text, whole numbers without decimals.
+def sheet_texts(path: Path, sheet: str = "") -> list[tuple[str, ...]]:
+    """Return the cells of the named sheet as text, of the first one unless named; whole numbers without decimals.
 
     Raises
     ------
     InputError
-        The file is missing, no workbook, or larger than is believed; or its first sheet is hidden, or has merged cells,
-        an error, or a formula whose value was not kept.
+        The file is missing, no workbook, or larger than is believed; or the sheet is not there or hidden, or has
+        merged cells, an error, or a formula whose value was not kept.
     """
     content = read_bytes(path, "a workbook (XLSX)")
     try:
         _require_small(path, content)
         # Values do not say which cells were formulas, and formulas do not say their values.
-        values, formulas = (_loaded(content, data_only) for data_only in (True, False))
+        values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
         texts = _texts(path, values, formulas)
     except InputError:
         raise
@@ -49,11 +49,11 @@ def first_sheet(path: Path) -> list[tuple[str, ...]]:
     return texts
 
 
-def hidden_cells(path: Path) -> tuple[str, ...]:
-    """Return a sentence for the hidden rows and one for the hidden columns of the first sheet, which are read too."""
-    sheet = _loaded(read_bytes(path, "a workbook (XLSX)"), data_only=True)
-    rows = [str(at) for at, row in sheet.row_dimensions.items() if row.hidden]
-    columns = [at for at, column in sheet.column_dimensions.items() if column.hidden]
+def hidden_cells(path: Path, sheet: str = "") -> tuple[str, ...]:
+    """Return a sentence for the hidden rows and one for the hidden columns of a sheet, which are read too."""
+    loaded = _loaded(path, read_bytes(path, "a workbook (XLSX)"), data_only=True, sheet=sheet)
+    rows = [str(at) for at, row in loaded.row_dimensions.items() if row.hidden]
+    columns = [at for at, column in loaded.column_dimensions.items() if column.hidden]
     return tuple(
         f"{path.name}: hidden {what} of the sheet are read like the others: {', '.join(found)}"
         for what, found in (("rows", rows), ("columns", columns))
@@ -76,20 +76,25 @@ def _require_small(path: Path, content: bytes) -> None:
     )
 
 
-def _loaded(content: bytes, data_only: bool) -> Any:
-    """Return the first sheet that has cells."""
+def _loaded(path: Path, content: bytes, data_only: bool, sheet: str) -> Any:
+    """Return the named one of the sheets that have cells, the first unless named."""
     from openpyxl import load_workbook
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is lost on writing it again, which nobody does
-        return load_workbook(BytesIO(content), data_only=data_only, keep_links=False).worksheets[0]
+        sheets = load_workbook(BytesIO(content), data_only=data_only, keep_links=False).worksheets
+    named = {own.title: own for own in sheets}
+    if sheet and sheet not in named:
+        shown = [repr(title) for title, own in named.items() if own.sheet_state == "visible"]
+        raise InputError.at(path, "sheet", sheet, f"one of {', '.join(shown)}")
+    return named[sheet] if sheet else sheets[0]
 
 
 def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
     """Return the cells as text."""
     place = f"{path}, sheet {values.title!r}"
     if values.sheet_state != "visible":
-        raise InputError(f"{place}: the first sheet is hidden; allowed is a table in the first sheet, shown.")
+        raise InputError(f"{place}: the sheet is hidden; allowed is a table in a sheet that is shown.")
     if values.merged_cells.ranges:
         where = next(iter(values.merged_cells.ranges))
         raise InputError(f"{place}: the cells {where} are merged; allowed is one value in each cell.")
