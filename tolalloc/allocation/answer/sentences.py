@@ -23,12 +23,11 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen = answer.chosen
     achieved = chosen.achieved
     found = [
-        f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units} fresh units keep "
+        f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units:,} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
     if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
-    found += _solved(chosen)
     if answer.met and not answer.header.quick:
         found.append(
             "No search has seen these units; over all designs that were tried on such units, the probability that a "
@@ -37,6 +36,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     found.append(_cost(answer))
     return (
         *found,
+        *_solved(chosen),
         _compared(answer),
         *_certificate(answer),
         *_modification(answer),
@@ -47,16 +47,16 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     )
 
 
-def _solved(design: VerifiedDesign) -> list[str]:
+def _solved(design: VerifiedDesign) -> tuple[str, ...]:
     """Return which of the fresh units were solved, where that were not all of them."""
     units = design.confirming.units if design.confirming else None
     if units is None or units.near.all():
-        return []
-    return [
-        f"Of these units {units.near.size:,} were solved: all that a regression through other units calls near a "
+        return ()
+    return (
+        f"Of the fresh units {units.near.size:,} were solved: all that a regression through other units calls near a "
         f"limit, and {units.drawn.whatever:,} whatever it says of them, so that the interval holds even where it is "
-        "wrong."
-    ]
+        "wrong.",
+    )
 
 
 def missed(design: VerifiedDesign) -> str:

@@ -42,7 +42,7 @@ def limit_price(side: Side, price: float) -> tuple[float, str]:
 
 
 def unit_quantile(design: VerifiedDesign, check: Check) -> float:
-    """Return the limit that exactly the target share of a design's units keeps [unit of the output].
+    """Return the limit that just the target share of a design's units keeps [unit of the output].
 
     Parameters
     ----------
@@ -59,7 +59,12 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
     guarantee = check.requirement.guarantee
     if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
         return float("nan")
-    sign, values = check.sides[0].sign, check.requirement.read(design.outputs)
+    side, confirming = check.sides[0], design.confirming
+    if confirming and not confirming.units.near.all():
+        excess = side.sign * (check.requirement.read(confirming.outputs) - side.limit)
+        beyond = confirming.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
+        return float(side.limit + side.sign * beyond)
+    sign, values = side.sign, check.requirement.read(design.outputs)
     turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))
     return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])
 
