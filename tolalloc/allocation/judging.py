@@ -19,7 +19,7 @@ from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Evaluation, Model, Response
 
-AS_GOOD_AS = 4.0
+AS_GOOD_AS = 4
 """Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""
 _SPENT = 0.75
 """Share of the error left that a design may spend [-]."""
@@ -45,7 +45,7 @@ def error_of(error: float, attempt: int) -> float:
     return error * _SPENT * (1 - _SPENT) ** (attempt - 1)
 
 
-def confidence_of_fewer(confidence: float, units: float, final: float) -> float:
+def confidence_of_fewer(confidence: float, units: int, final: int) -> float:
     """Return the confidence with which fewer units find what the final ones are expected to find [-].
 
     Notes

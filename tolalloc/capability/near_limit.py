@@ -64,7 +64,7 @@ class Drawn:
         however its share is parted.
         """
         if self.whatever == self.units:
-            return allowed_rejections(self.units, target, confidence)
+            return float(allowed_rejections(self.units, target, confidence))
         if confidence <= _EVEN_ODDS:
             return self.units * (1.0 - target)
         return _allowed(self, target, confidence)
@@ -132,7 +132,7 @@ def _allowed(drawn: Drawn, target: float, confidence: float) -> float:
     allowed, too_much = -1, int(np.ceil(drawn.units * share)) + 1
     while too_much - allowed > 1:
         tried = (allowed + too_much) // 2
-        if drawn.probability_of_no_more(tried, share) <= 1 - confidence:
+        if drawn.probability_of_no_more(float(tried), share) <= 1 - confidence:
             allowed = tried
         else:
             too_much = tried
