@@ -71,3 +71,16 @@ def test_the_page_of_public_names_lists_each_with_its_first_line():
         said = f'"{found}"' if isinstance(found, str) else (inspect.getdoc(found) or "").splitlines()[0]
         assert f"| `{name}` | {said} |" in page
     assert page.count("| `") == len(ta.__all__)
+
+
+def test_the_page_of_rooms_lists_each_with_the_first_line_of_its_own():
+    page = (ROOT / "docs" / "reference" / "rooms.md").read_text(encoding="utf-8")
+    package = ROOT / "tolalloc"
+    rooms = [file.parent for file in package.glob("**/__init__.py") if file.parent != package]
+    outer = [room for room in rooms if room.name != "solvers"]
+    files = [file for file in package.glob("*.py") if file.name != "__init__.py"]
+    for place in (*outer, *files):
+        source = (place / "__init__.py" if place.is_dir() else place).read_text(encoding="utf-8")
+        said = source.removeprefix('"""').partition("\n")[0].removesuffix('"""')
+        assert f"| `{place.relative_to(ROOT).as_posix()}` | {said} |" in page
+    assert page.count("| `") == len(outer) + len(files)

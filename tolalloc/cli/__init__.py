@@ -1,1 +1,1 @@
-"""The commands."""
+"""The commands: words in, an answer out."""

@@ -1,1 +1,1 @@
-"""Error sources: tolerance tables, built units, and the way from a drawing's zone to random columns."""
+"""Error sources: tolerance tables, and the way from a drawing's zone to random columns."""

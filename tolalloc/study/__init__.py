@@ -1,1 +1,1 @@
-"""A study, its stages and its run folder."""
+"""A study with its questions, what runs them, and the folder of a run."""

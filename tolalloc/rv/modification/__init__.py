@@ -1,1 +1,1 @@
-"""How to choose the two modification amounts: problems of the sources, a sure reference, and evolutionary searches."""
+"""How to choose the two modification amounts: problems of the sources, and a search that is sure of its optimum."""

@@ -1,1 +1,1 @@
-"""The one seam between what is asked and what answers: errors in, outputs and statuses back."""
+"""What the equivalent model answers to columns of random units: outputs, statuses and derivatives."""
