@@ -144,7 +144,7 @@ def _place_in_file(location: tuple[int | str, ...], data: Any, missing: bool) ->
     """Return where in the data a problem is; of a field that may be of several kinds, pydantic names the kind too."""
     found: list[int | str] = []
     for part in location:
-        known = part in data if isinstance(data, Mapping) else isinstance(data, list)
+        known = part in data if isinstance(data, Mapping) else isinstance(data, list) and part in range(len(data))
         if known:
             data = data[part]
         elif not (missing and part == location[-1]):

@@ -294,3 +294,10 @@ def test_all_faults_of_other_files_are_said(tmp_path):
     assert len(faults(load_units, units)) == 3
     prices = written(tmp_path, "s.csv", "process,tolerance,unit,cost\ng,0,µm,1\ng,1,cm,1\ng,2,µm,1\n")
     assert len(faults(load_shop_points, prices)) == 2
+
+
+@pytest.mark.parametrize("line", ["a = [1.9]", "a = [1.9,]", "a = []"])
+def test_a_vector_without_its_direction_is_refused(line, tmp_path):
+    (tmp_path / "u.unit.toml").write_text(f"{UNIT}[vectors]\n{line}\n")
+    with pytest.raises(InputError, match=r"u.unit.toml: vectors.a.1 is missing\."):
+        load_unit(tmp_path / "u.unit.toml")
