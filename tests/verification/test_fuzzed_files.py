@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import random
+import re
+import signal
 import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
@@ -19,6 +23,7 @@ from openpyxl import Workbook
 import tolalloc as ta
 from studies.published.measurement_folder import write_measurements
 from studies.published.simulated_bench import random_units, simulated_bench
+from tests.plain_reading import DECIMALS, differences, made, rows, said
 from tests.studies.bench_files import CURVES_AND_LOOPS
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs_file import load_process_costs
@@ -56,6 +61,25 @@ def in_little_memory():
     before = memory("VmRSS")
     yield
     assert memory("VmHWM") - before < GIBIBYTE
+
+
+@contextmanager
+def in_time(seconds: int) -> Iterator[None]:
+    """Raise where something hangs; only Unix wakes what hangs."""
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def raised(*_: object) -> None:
+        raise TimeoutError(f"over {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, raised)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 VALUES = (
@@ -108,14 +132,17 @@ def mutated_workbook(rows: list[list[object]], chance: random.Random) -> bytes:
     for row in rows:
         sheet.append(row)
     for _ in range(chance.randint(1, 3)):
+        column = chance.randint(1, len(rows[0]))
         value = chance.choice([value for value in VALUES if value.isprintable() and len(value) < 30_000])
+        if chance.random() < 0.6:
+            value = chance.choice(rows[1:])[column - 1]
         far = chance.random() < 0.05
-        sheet.cell(10 ** chance.randint(2, 6) if far else chance.randint(1, 8), chance.randint(1, 12)).value = value
+        sheet.cell(10 ** chance.randint(2, 6) if far else chance.randint(2, len(rows)), column).value = value
     if chance.random() < 0.1:
         sheet.merge_cells("B2:B3")
     out = BytesIO()
     book.save(out)
-    if chance.random() < 0.5:
+    if chance.random() < 0.3:
         changed, which = BytesIO(), chance.choice(zipfile.ZipFile(out).namelist())
         with zipfile.ZipFile(out) as old, zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as new:
             for part in old.namelist():
@@ -123,7 +150,7 @@ def mutated_workbook(rows: list[list[object]], chance: random.Random) -> bytes:
                 new.writestr(part, mutated(text.decode().replace(">", ">\n"), chance) if part == which else text)
         out = changed
     content = bytearray(out.getvalue())
-    if chance.random() < 0.3:
+    if chance.random() < 0.2:
         for _ in range(chance.randint(1, 9)):
             content[chance.randrange(len(content))] = chance.randrange(256)
     return bytes(content)
@@ -171,56 +198,102 @@ def kinds(tmp_path_factory) -> dict[str, tuple[Path, Callable[[Path], Any]]]:
     }
 
 
-def outcome(read: Callable[..., object], *given: object, **named: object) -> str:
-    """Return whether an input was read or refused; anything else is raised."""
+def outcome(read: Callable[..., object], *given: object, **named: object) -> tuple[str, object]:
+    """Return whether an input was read or refused, and what was read; anything else is raised."""
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), in_time(20):
             warnings.simplefilter("error", RuntimeWarning)  # of numbers that overflow
-            read(*given, **named)
+            return "read", read(*given, **named)
     except TolallocError as error:
-        said = str(error).split("\n")
-        assert len(said) <= 21 and all(0 < len(sentence) <= 2000 for sentence in said), error
-        return "refused"
-    return "read"
+        sentences = str(error).split("\n")
+        assert len(sentences) <= 21 and all(0 < len(sentence) <= 2000 for sentence in sentences), error
+        return "refused", None
+
+
+JUDGED = {
+    # What has a default, left out where that stood
+    "tolerance table": r"\d+/(3|7|9|14|23) left out",  # nominal 0, normal, no shift, not sorted, one of each
+    "process library": r"\d+/(3|4|6) left out",  # no shift, normal, not sorted
+    "chain": r"\.(adjust|measure|effort\.\w+) left out",
+    "reducer": r"\.stiffness\.pin_contact_law left out",
+    # Notes, which are for people; and no fixed cost
+    "prices": r"\d+/4( left out)?",
+    "process costs": r"\d+/9( left out)?|\d+/3 left out",
+}
+"""What a person judged right: where a file may say another thing and mean the same."""
+
+
+def require_read_plainly(name: str, before: tuple[dict, object], path: Path, answer: object) -> None:
+    """Raise unless a reader's answer is another where a plain reading of the file is, and only there."""
+    now, is_same = said(path), made(answer) == before[1]
+    told = differences(before[0], now)
+    if not told:
+        assert is_same, "the file says the same, and was read as another"
+    elif is_same:
+        judged = JUDGED.get(name, "(?!)")
+        odd = [place for place, share in told.items() if share > DECIMALS and not re.fullmatch(judged, place)]
+        in_any_order = rows(before[0], judged) == rows(now, judged)
+        assert in_any_order or not odd, f"the file says another thing, and was read as the same: {odd}"
+
+
+Reader = Callable[[Path], Any]
+
+
+def fuzz(name: str, path: Path, read: Reader, contents: Iterator[bytes]) -> Counter[str]:
+    """Read contents in the place of a good file, and put it back; nothing else in the folder changes."""
+    outcomes, good = Counter[str](), path.read_bytes()
+    beside = {other: other.read_bytes() for other in path.parent.iterdir() if other != path}
+    before = said(path), made(read(path))
+    for content in contents:
+        path.write_bytes(content)
+        try:
+            kind, answer = outcome(read, path)
+            if kind == "read":
+                require_read_plainly(name, before, path, answer)
+        except BaseException as error:
+            error.add_note(f"{name}: {content[:3000]!r}")
+            raise
+        finally:
+            after = path.read_bytes()
+            path.write_bytes(good)
+        outcomes[kind] += 1
+        assert after == content
+    assert {other: other.read_bytes() for other in path.parent.iterdir() if other != path} == beside
+    return outcomes
 
 
 def fuzzed(kinds, names, seed: int, count: int) -> Counter[str]:
-    """Mutate files in their place, read them, and put them back; nothing else in the folder changes."""
+    """Mutate text files of every kind."""
     chance, outcomes = random.Random(seed), Counter[str]()
     for name in names:
         path, read = kinds[name]
-        good = path.read_bytes()
-        beside = {other: other.read_bytes() for other in path.parent.iterdir() if other != path}
-        assert outcome(read, path) == "read", name
-        for _ in range(count):
-            content = mutated(good.decode(), chance)
-            path.write_bytes(content)
-            try:
-                outcomes[outcome(read, path)] += 1
-            except BaseException as error:
-                error.add_note(f"{name}: {content[:3000]!r}")
-                raise
-            finally:
-                after = path.read_bytes()
-                path.write_bytes(good)
-            assert after == content
-        assert {other: other.read_bytes() for other in path.parent.iterdir() if other != path} == beside
+        good = path.read_text(encoding="utf-8")
+        outcomes += fuzz(name, path, read, (mutated(good, chance) for _ in range(count)))
     return outcomes
 
 
-def fuzzed_workbooks(kinds, seed: int, count: int) -> Counter[str]:
-    """Read mutated workbooks with a tolerance table."""
+def fuzzed_workbooks(kinds, names, seed: int, count: int) -> Counter[str]:
+    """Mutate workbooks of the kinds that may be one."""
     chance, outcomes = random.Random(seed), Counter[str]()
-    table = kinds["tolerance table"][0]
-    rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()[:5]]
-    path = table.with_suffix(".xlsx")
-    for _ in range(count):
-        content = mutated_workbook(rows, chance)
-        path.write_bytes(content)
-        outcomes[outcome(load_tolerance_table, path)] += 1
-        assert path.read_bytes() == content
-    path.unlink()
+    for name in names:
+        table, read = kinds[name]
+        lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        rows: list[list[object]] = [list(map(as_cell, row)) for row in csv.reader(lines[:5])]
+        book, path = Workbook(), table.with_suffix(".xlsx")
+        for row in rows:
+            book.active.append(row)
+        book.save(path)
+        outcomes += fuzz(name, path, read, (mutated_workbook(rows, chance) for _ in range(count)))
+        path.unlink()
     return outcomes
+
+
+def as_cell(text: str) -> object:
+    """Return a cell as a spreadsheet keeps it: numbers as such."""
+    try:
+        return float(text)
+    except ValueError:
+        return text or None
 
 
 FIELDS = (
@@ -267,7 +340,7 @@ def fuzzed_fields(seed: int, count: int) -> Counter[str]:
         kind, names = chance.choice(MADE)
         given = {name: chance.choice(FIELDS) for name in chance.sample(names, chance.randint(1, min(2, len(names))))}
         try:
-            outcomes[outcome(kind, **given)] += 1
+            outcomes[outcome(kind, **given)[0]] += 1
         except Exception as error:
             error.add_note(f"{kind}: {sorted(given)}, {[type(value) for value in given.values()]}")
             raise
@@ -279,14 +352,18 @@ RECORDS = ("reducer", "stiffness", "unit", "chain")
 BENCH = ("units", "measurement", "curve")
 
 
+WORKBOOKS = ("tolerance table", "correlations")
+
+
 @pytest.mark.parametrize("names", [TABLES, RECORDS, BENCH], ids=["tables", "records", "bench"])
-def test_mutated_files_are_read_or_refused(names, kinds):
+def test_mutated_files_are_read_plainly_or_refused(names, kinds):
     outcomes = fuzzed(kinds, names, seed=1, count=7)
     assert outcomes["refused"] > outcomes["read"] > 0
 
 
-def test_mutated_workbooks_are_read_or_refused(kinds):
-    assert fuzzed_workbooks(kinds, seed=1, count=10)["refused"] > 0
+def test_mutated_workbooks_are_read_plainly_or_refused(kinds):
+    outcomes = fuzzed_workbooks(kinds, WORKBOOKS, seed=1, count=7)
+    assert outcomes["refused"] > 0 < outcomes["read"]
 
 
 def test_fields_of_any_kind_make_a_study_or_are_refused():
@@ -294,9 +371,10 @@ def test_fields_of_any_kind_make_a_study_or_are_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
-def test_thousands_of_mutated_inputs_are_read_or_refused(seed, kinds):
-    outcomes = fuzzed(kinds, (*TABLES, *RECORDS, *BENCH), seed, count=80)
-    outcomes += fuzzed_workbooks(kinds, seed, count=80)
-    outcomes += fuzzed_fields(seed, count=1000)
-    assert outcomes.total() == 2040
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_thousands_of_mutated_inputs_are_read_plainly_or_refused(seed, kinds):
+    """Ten thousand with three seeds."""
+    outcomes = fuzzed(kinds, (*TABLES, *RECORDS, *BENCH), seed, count=220)
+    outcomes += fuzzed_workbooks(kinds, WORKBOOKS, seed, count=150)
+    outcomes += fuzzed_fields(seed, count=400)
+    assert outcomes.total() == 3340
