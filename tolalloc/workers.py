@@ -82,14 +82,17 @@ def workers_at(address: str) -> Iterator[Workers]:
     """
     try:
         from distributed import Client, LocalCluster
+        from distributed.comm import get_address_host_port
     except ImportError:
-        raise InputError("--scheduler: Dask is not installed; pip install 'tolalloc[distributed]'.") from None
+        raise InputError("workers: Dask is not installed; pip install 'tolalloc[distributed]'.") from None
     if address != LOCAL:
         try:
-            client = Client(address, timeout=_PATIENCE, set_as_default=False)
+            full = address if "://" in address else f"tcp://{address}"
+            get_address_host_port(full, strict=True)  # a client of no address hangs when it is closed
+            client = Client(full, timeout=_PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             allowed = f"'{LOCAL}' or the address of a scheduler that answers ({in_short(str(error))})"
-            raise InputError.at("tolalloc", "--scheduler", address, allowed) from None
+            raise InputError.of_argument("workers", "scheduler", address, allowed) from None
         with client:
             yield _prepared(client, address)
         return
@@ -102,10 +105,10 @@ def _prepared(client: Any, address: str) -> Workers:
     """Return the workers with one thread each, once all are known to have this version of the package."""
     found = client.run(code_digest)
     if not found:
-        raise InputError.at("tolalloc", "--scheduler", address, "a scheduler that has workers; start some first")
+        raise InputError.of_argument("workers", "scheduler", address, "a scheduler that has workers; start some first")
     others = [worker for worker, digest in found.items() if digest != code_digest()]
     if others:
-        raise InputError(f"--scheduler: the worker {others[0]} has another version of tolalloc; install the same one.")
+        raise InputError(f"workers: the worker {others[0]} has another version of tolalloc; install the same one.")
     client.register_plugin(_one_thread_plugin())
     return Workers(client=client)
 
