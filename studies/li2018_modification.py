@@ -12,8 +12,8 @@ import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
 from tolalloc.report.document import Document, Section
 from tolalloc.rv.modification.problem import reference
+from tolalloc.rv.modification.request import ModificationRequest
 from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
-from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.units import MICROMETRE
 
@@ -45,9 +45,9 @@ def ladder() -> pd.DataFrame:
 def build(quick: bool) -> Document:
     """Return the report."""
     reducer = load_reducer("rv40e_xi2015")
-    study = ModificationStudy(method="li2018", radial_clearance=RADIAL_CLEARANCE)
+    request = ModificationRequest(method="li2018", radial_clearance=RADIAL_CLEARANCE)
     with shown_progress("searches") as progress:
-        found = compared(study, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
+        found = compared(request, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
     section = Section(
         heading="Closed form",
         paragraphs=(

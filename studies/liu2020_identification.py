@@ -20,7 +20,7 @@ from tolalloc.bench.identification.information import information
 from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
 from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.study import IdentificationStudy, identify
+from tolalloc.bench.identification.request import IdentificationRequest, identify
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.cli.progress import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
@@ -234,11 +234,11 @@ def _peak_to_peaks(
     bench = Bench(peak_to_peak_torque=-1.0, peak_to_peak_noise=ARCSECOND, curve_angles=nothing, loop_torques=nothing)
     units = random_units(errors, 50, seeds.child("units"), LIKE_TABLE_7)
     measured = simulated_bench(true, units, bench).measured(seeds.child("noise"))
-    study = IdentificationStudy(
+    request = IdentificationRequest(
         parameters=tuple(parameter(name, given, BOUNDS[name]) for name in LIU2020),
         data="50 simulated units",
     )
-    answer = identify(study, measured, given, progress)
+    answer = identify(request, measured, given, progress)
     return answer, compare(answer, _seeds(quick), progress)
 
 
@@ -258,8 +258,8 @@ def _curves_and_loops(
     """Identify from curves in both directions and torque loops of five units, then again with fresh noise."""
     exact = simulated_bench(true, _five_units(errors, seeds), CURVES_AND_LOOPS)
     parameters = tuple(parameter(name, given) for name in LIU2020)
-    study = IdentificationStudy(parameters=parameters, data="5 simulated units")
-    results = identify(study, exact.measured(seeds.child("once")), given, progress)
+    request = IdentificationRequest(parameters=parameters, data="5 simulated units")
+    results = identify(request, exact.measured(seeds.child("once")), given, progress)
     progress.begin("measured again and again")
     truth = np.array([item.coordinate(TRUTH[item.name]) for item in parameters])
     repetitions = 10 if quick else 100

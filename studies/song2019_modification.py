@@ -18,8 +18,8 @@ from tolalloc.rv.cycloid.assessment import assess
 from tolalloc.rv.cycloid.mesh import flank_angle
 from tolalloc.rv.cycloid.tooth_profile import ToothProfile
 from tolalloc.rv.modification.problem import reference
+from tolalloc.rv.modification.request import ModificationRequest
 from tolalloc.rv.modification.rotated_profile import METRICS, rotated_profile_fit
-from tolalloc.rv.modification.study import ModificationStudy
 from tolalloc.rv.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.teeth.figures import clearance_figure
@@ -119,7 +119,7 @@ def build(quick: bool) -> Document:
     with shown_progress("searches") as progress:
         positive, negative = (
             compared(
-                ModificationStudy(method="song2019", radial_clearance=0.0, shift_sign=sign),
+                ModificationRequest(method="song2019", radial_clearance=0.0, shift_sign=sign),
                 own,
                 -own.load.rated_torque,
                 range(3 if quick else 30),

@@ -19,8 +19,8 @@ from tolalloc.rv.multibody.system import engine
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
-from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation, with_ideal_gears
 from tolalloc.rv.simulation.figures import error_figure, run_figures
+from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation, with_ideal_gears
 from tolalloc.rv.simulation.run import simulate
 from tolalloc.units import ARCSECOND, RPM
 
@@ -50,7 +50,7 @@ def readings() -> dict[str, Reducer]:
 def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> SimulationAnswer:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
-    asked = SimulationStudy(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
+    asked = SimulationRequest(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
     with shown_progress("ms") as progress:
         return simulate(replace(prepare_simulation(asked), reducer=reducer), progress)
 

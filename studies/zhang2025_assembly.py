@@ -20,7 +20,7 @@ from published.zhang2025_sections import (
 
 import tolalloc as ta
 from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.study import AssemblyStudy, assemble
+from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.cli.progress import shown_progress
 from tolalloc.report.document import Document
 from tolalloc.units import ARCSECOND
@@ -36,14 +36,14 @@ def parts_drawn() -> np.ndarray:
 
 def build(quick: bool) -> Document:
     """Return the report."""
-    study = AssemblyStudy(
+    request = AssemblyRequest(
         plan=load_plan("bx40e"),
         name="Parts drawn within ±60″",
         errors=parts_drawn(),
         assemblies=10_000 if quick else 100_000,
     )
     with shown_progress("assemblies") as progress:
-        answer = assemble(study, progress)
+        answer = assemble(request, progress)
     document, plan = answer.document, answer.plan
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)
     mounting, mounted = mounting_section(3 if quick else 100)

@@ -52,10 +52,25 @@ class TolallocError(Exception):
 class InputError(TolallocError):
     """A value at the border of the program is not allowed."""
 
+    argument: str = ""
+    """Name of the argument that holds the value, where one does; a command says its option instead."""
+
     @classmethod
     def at(cls, place: Path | str, field: str, value: object, allowed: str) -> InputError:
         """Say in one sentence where the value stands, what it is and what is allowed."""
         return cls(f"{place}: {field} is {quoted(value)}; allowed is {allowed}.")
+
+    @classmethod
+    def of_argument(cls, work: str, argument: str, value: object, allowed: str) -> InputError:
+        """Say the same of an argument of a piece of work, such as a diagnosis."""
+        error = cls.at(work, argument, value, allowed)
+        error.argument = argument
+        return error
+
+    def as_option(self, command: str, option: str) -> InputError:
+        """Return the error as somebody needs it who gave an option of a command."""
+        _, _, said = str(self).partition(self.argument)
+        return InputError(f"{command}: {option}{said}")
 
 
 class UnknownNameError(TolallocError):

@@ -28,10 +28,10 @@ from tolalloc.compiled import use_threads
 from tolalloc.rv.dynamics.properties import Damping
 from tolalloc.rv.dynamics.simulation import simulate as simulate_model
 from tolalloc.rv.simulation.answer import SimulationAnswer
-from tolalloc.rv.simulation.definition import (
+from tolalloc.rv.simulation.request import (
     INTEGRATORS,
     PreparedSimulation,
-    SimulationStudy,
+    SimulationRequest,
     prepare_simulation,
     with_ideal_gears,
 )
@@ -48,7 +48,7 @@ TARGET = 20.0
 
 def prepared(engine: str, step: float) -> PreparedSimulation:
     """Return the run at a time step."""
-    asked = prepare_simulation(SimulationStudy(engine=engine, ramp=0.1, duration=0.4, step=step))
+    asked = prepare_simulation(SimulationRequest(engine=engine, ramp=0.1, duration=0.4, step=step))
     return replace(asked, reducer=with_ideal_gears(asked.reducer))
 
 

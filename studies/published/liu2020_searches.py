@@ -21,7 +21,7 @@ from tolalloc.bench.identification.gauss_newton import Batch, Identified, gauss_
 from tolalloc.bench.identification.parameters import BIAS
 from tolalloc.bench.identification.prediction import KernelPredictor, StandIn
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.study import STARTS
+from tolalloc.bench.identification.request import STARTS
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.progress import Progress

@@ -15,7 +15,7 @@ from tolalloc.report.document import Document, Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.rv.modification.answer import ModificationAnswer
 from tolalloc.rv.modification.problem import ModificationProblem
-from tolalloc.rv.modification.study import ModificationStudy, choose
+from tolalloc.rv.modification.request import ModificationRequest, choose
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.teeth.answer import span
 from tolalloc.units import MICROMETRE
@@ -67,7 +67,7 @@ def searchers(method: str) -> dict[str, Searcher]:
 
 
 def compared(
-    study: ModificationStudy, reducer: Reducer, torque: float, seeds: range, progress: Progress
+    study: ModificationRequest, reducer: Reducer, torque: float, seeds: range, progress: Progress
 ) -> ModificationComparison:
     """Return the best amounts and how every algorithm found them; each algorithm and finished search is told."""
     progress.begin("reference")

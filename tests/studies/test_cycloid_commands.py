@@ -154,7 +154,7 @@ def test_modify_li2018_gives_the_closed_form():
     [
         (["li2017"], ["li2017", "li2018"]),
         (["li2018", "--radial", "500"], ["meet the constraints", "0…100 µm", "radial clearance"]),
-        (["li2018", "--radial", "-5"], ["radial clearance", "-5 µm", "0 to 1000 µm"]),
+        (["li2018", "--radial", "-5"], ["--radial", "-5 µm", "0 to 1000 µm"]),
         (["song2019", "--rotation", "0.5"], ["rotation", "0.5"]),
         (["song2019", "--metric", "far"], ["far", "nearest"]),
     ],

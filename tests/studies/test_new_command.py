@@ -152,7 +152,7 @@ def test_nothing_is_overwritten_and_wrong_words_are_sentences(tmp_path):
     refused(tolalloc("new", tmp_path / "b", "--like", "rv21e"), "rv20e")
     refused(tolalloc("new", tmp_path / "b", "--cranks", "5"), "--cranks", "2 to 4")
     refused(tolalloc("new", tmp_path / "b", "--with", "cost"), "costs")
-    refused(tolalloc("new", tmp_path / "1 b"), "NAME", "a letter first")
+    refused(tolalloc("new", tmp_path / "1 b"), "name is", "a letter first")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.studies.command import process, refused, tolalloc
 from tolalloc.exceptions import TolallocError
-from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation
+from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation
 
 # Ten times the speed of xi2015: a crank turn takes 24 ms. One pin pass takes 0.6 ms.
 SHORT = ("--speed", "5250", "--ramp", "0.02", "--duration", "0.06", "--step", "1e-5")
@@ -106,7 +106,7 @@ def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
     ("options", "words"),
     [
         (("--engine", "newmrk"), ("engine 'newmrk' is not known", "newmark")),
-        (("--duration", "1.6"), ("--duration is 1.6; allowed is 1.737 s or more",)),
+        (("--duration", "1.6"), ("duration is 1.6; allowed is 1.737 s or more",)),
         (("--torque", "0"), ("--torque is 0.0; allowed is -5720 N·m to below 0",)),
         (("--torque", "572"), ("--torque is 572.0", "a load that drives it is not simulated")),
         (("--out", "report"), ("--reducer is missing", "rv40e, rv40e_xi2015, rv80e")),
@@ -120,21 +120,21 @@ def test_a_wrong_option_is_refused(options, words):
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        ({"speed_rpm": 0.0}, "--speed is 0.0; allowed is a number above 0"),
-        ({"duration": -1.0}, "--duration is -1.0"),
-        ({"step": 3.0}, "--step is 3.0; allowed is 1e-05 s to the duration of 2 s"),
-        ({"step": 0.45}, "--step is 0.45; allowed is up to 0.00148 s, 4 steps per pin pass"),
-        ({"step": 1e-7}, "--step is 1e-07"),
-        ({"torque_nm": -6000.0}, "--torque is -6000.0"),
-        ({"damping": -1.0}, "--damping is -1.0; allowed is 0 or a positive number"),
-        ({"pin_stiffness": float("nan")}, "--pin-stiffness is nan"),
+        ({"speed_rpm": 0.0}, "speed_rpm is 0.0; allowed is a number above 0"),
+        ({"duration": -1.0}, "duration is -1.0"),
+        ({"step": 3.0}, "step is 3.0; allowed is 1e-05 s to the duration of 2 s"),
+        ({"step": 0.45}, "step is 0.45; allowed is up to 0.00148 s, 4 steps per pin pass"),
+        ({"step": 1e-7}, "step is 1e-07"),
+        ({"torque_nm": -6000.0}, "torque_nm is -6000.0"),
+        ({"damping": -1.0}, "damping is -1.0; allowed is 0 or a positive number"),
+        ({"pin_stiffness": float("nan")}, "pin_stiffness is nan"),
         ({"reducer": "rv41e"}, "'rv41e' is not known"),
         ({"unit": "tabel4"}, "'tabel4' is not known; the nearest known is table4"),
     ],
 )
 def test_a_number_or_name_out_of_range_is_refused(option, words):
     with pytest.raises(TolallocError, match=re.escape(words)):
-        prepare_simulation(SimulationStudy(**option))
+        prepare_simulation(SimulationRequest(**option))
 
 
 @pytest.mark.slow

@@ -17,8 +17,8 @@ from tolalloc.assembly.answer.tables import characteristic_table, larger
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
+from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.assembly.steps import Efforts, steps_in_order
-from tolalloc.assembly.study import AssemblyStudy, assemble
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.report.charts import chart
 from tolalloc.rv.equivalent.line_load import ContactPattern
@@ -74,7 +74,7 @@ class Silent:
 
 
 def run(plan, errors=None) -> AssemblyAnswer:
-    return assemble(AssemblyStudy(plan=plan, name="seven", errors=errors, assemblies=2000), Silent())
+    return assemble(AssemblyRequest(plan=plan, name="seven", errors=errors, assemblies=2000), Silent())
 
 
 @pytest.fixture(scope="module")

@@ -56,7 +56,7 @@ TRIED = np.geomspace(0.01, LARGEST_PRECISION, 161)
 
 
 @dataclass(frozen=True, kw_only=True)
-class AssemblyStudy:
+class AssemblyRequest:
     """Which assembly is asked about."""
 
     plan: AssemblyPlan  # The chain at the precision that was asked for
@@ -68,7 +68,7 @@ class AssemblyStudy:
 
 def prepare_assembly(
     chain: str | Path, measured: Path | None = None, precision: float | None = None, seed: int = 1
-) -> AssemblyStudy:
+) -> AssemblyRequest:
     """Return an assembly with its files read and checked: a shipped chain or a file, and measured errors of its parts.
 
     The precision is Q in place of the chain's own [-].
@@ -76,21 +76,21 @@ def prepare_assembly(
     Raises
     ------
     InputError, UnknownNameError
-        The option, or the file, row, field and value that are not allowed.
+        The argument, or the file, row, field and value that are not allowed.
     """
     if seed < 0:
-        raise InputError.at("tolalloc assemble", "--seed", seed, "0 or a positive integer")
+        raise InputError.of_argument("assembly", "seed", seed, "0 or a positive integer")
     if precision is not None and not 0 <= precision <= LARGEST_PRECISION:
-        raise InputError.at("tolalloc assemble", "--precision", precision, f"0 to {LARGEST_PRECISION:g}")
+        raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_PRECISION:g}")
     plan = load_plan(chain)
     if precision is not None:
         plan = replace(plan, precision=precision)
     if measured is None:
-        return AssemblyStudy(plan=plan, seed=seed)
-    return AssemblyStudy(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
+        return AssemblyRequest(plan=plan, seed=seed)
+    return AssemblyRequest(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
 
 
-def assemble(study: AssemblyStudy, progress: Progress) -> AssemblyAnswer:
+def assemble(request: AssemblyRequest, progress: Progress) -> AssemblyAnswer:
     """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
 
     Raises
@@ -100,25 +100,25 @@ def assemble(study: AssemblyStudy, progress: Progress) -> AssemblyAnswer:
     SolveError
         A unit without equilibrium.
     """
-    plan, record, seeds = study.plan, RunRecord(progress, OUTCOMES), SeedTree(study.seed).child("assembly")
+    plan, record, seeds = request.plan, RunRecord(progress, OUTCOMES), SeedTree(request.seed).child("assembly")
     with record.stage("adjustment"):
         gains = tuned_gains(plan, plan.precision, plan.tolerances)
         swept = np.array(sorted({*SWEPT, plan.precision}))
         sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
         fewer = _fewer(plan)
-        measured = None if study.errors is None else _measured(plan, study.name, study.errors, swept)
+        measured = None if request.errors is None else _measured(plan, request.name, request.errors, swept)
     with record.stage("tolerances"):
-        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), study.assemblies)
+        tolerances, unreachable = _tolerances(plan, seeds.child("verification"), request.assemblies)
     with record.stage("transmission"):
         shown = np.array(sorted({*SHOWN, plan.precision}))
         transmission = None
         if plan.reducer:
-            transmission = transmission_effect(plan, study.errors, shown, seeds.child("transmission"), record.observe)
+            transmission = transmission_effect(plan, request.errors, shown, seeds.child("transmission"), record.observe)
     return AssemblyAnswer(
         header=Header(
             name=plan.name,
             model=transmission.reducer.name if transmission else "",
-            seed=study.seed,
+            seed=request.seed,
             assumptions=(*plan.assumptions, *(transmission.reducer.assumptions if transmission else ())),
             statuses=record.counts,
             stages=record.stages,

@@ -25,22 +25,22 @@ def assemble(
 ) -> None:
     """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.assembly.study import assemble as assembled
-    from tolalloc.assembly.study import prepare_assembly
+    from tolalloc.assembly.request import assemble as assembled
+    from tolalloc.assembly.request import prepare_assembly
     from tolalloc.report.folder import require_usable
 
-    study = prepare_assembly(chain, measured, precision, seed)
+    request = prepare_assembly(chain, measured, precision, seed)
     require_usable(out)
-    if study.plan.reducer:
+    if request.plan.reducer:
         announce_compilation()
     with shown_progress("assemblies") as progress:
-        answer = assembled(study, progress)
+        answer = assembled(request, progress)
     write_report(answer, out)
     listed, steps = answer.tables["steps"], []
     said = [name for name in ("step [-]", "mount", "measure") if name in listed]
     for (step, *done), rows in listed.groupby(said, sort=False):
         work = ", ".join(f"{verb} {what}" for verb, what in zip(said[1:], done, strict=True))
         steps.append((rows.drop(columns=said), f"Step {step}: {work}, turn about own axes"))
-    name, datum = study.name or study.plan.name, study.plan.chain.datum
+    name, datum = request.name or request.plan.name, request.plan.chain.datum
     final = f"{name}: final angles against {datum}, before and after adjusting"
     tell(answer, as_json, *steps, (answer.characteristics, final))

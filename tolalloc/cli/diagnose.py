@@ -29,7 +29,7 @@ def diagnose(
 ) -> None:
     """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.bench.diagnosis.study import DiagnosisStudy, diagnose_unit
+    from tolalloc.bench.diagnosis.request import DiagnosisRequest, diagnose_unit
     from tolalloc.drawings.correlation import Correlation, load_correlations
     from tolalloc.drawings.error_model import ErrorModel
     from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -41,7 +41,7 @@ def diagnose(
         design = with_stiffness(design, load_identified_stiffness(stiffness))
     sources = load_tolerance_table(tolerances)
     correlation = load_correlations(correlations, sources) if correlations else Correlation()
-    asked = DiagnosisStudy(
+    asked = DiagnosisRequest(
         curve=curve,
         reducer=design,
         errors=ErrorModel(sources, correlation=correlation),

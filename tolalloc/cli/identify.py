@@ -32,7 +32,7 @@ def identify(
         Path | None, typer.Argument(help="Measurement file (TOML): units and their readings; none with --catalogue.")
     ] = None,
     reducer: ReducerOption = None,
-    asked: Annotated[
+    parameters: Annotated[
         list[str] | None,
         typer.Option(
             "--parameter",
@@ -63,7 +63,7 @@ def identify(
     if write:
         _require_stiffness_file(write, out)
     if catalogue:
-        given = {"a measurement file": data, "--parameter": asked, "--prior": priors}
+        given = {"a measurement file": data, "--parameter": parameters, "--prior": priors}
         for name, value in given.items():
             if value:
                 raise InputError(f"{PLACE}: --catalogue needs no units; leave out {name}.")
@@ -71,7 +71,7 @@ def identify(
     elif data is None:
         raise InputError(f"{PLACE}: a measurement file is missing; give one, or --catalogue.")
     else:
-        answer, tables = _from_units(data, design, asked, priors, seed, write)
+        answer, tables = _from_units(data, design, parameters, priors, seed, write)
     write_report(answer, out)
     if write and answer.stiffness:
         write_identified_stiffness(answer.stiffness, write)
@@ -111,21 +111,21 @@ def _from_units(
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
     from tolalloc.bench.identification.exhibits import estimates_table
     from tolalloc.bench.identification.parameters import LIU2020
-    from tolalloc.bench.identification.study import IdentificationStudy
-    from tolalloc.bench.identification.study import identify as identified
+    from tolalloc.bench.identification.request import IdentificationRequest
+    from tolalloc.bench.identification.request import identify as identified
     from tolalloc.bench.measurement.files import load_measurements
 
-    study = IdentificationStudy(
+    request = IdentificationRequest(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
         seed=seed,
         data=str(data),
     )
-    if stiffness and not any(item.is_stiffness for item in study.parameters):
+    if stiffness and not any(item.is_stiffness for item in request.parameters):
         raise InputError.at(PLACE, "--write", str(stiffness), "a file only where a stiffness is identified")
     measurements = load_measurements(data)
     announce_compilation()
     with shown_progress() as progress:
-        answer = identified(study, measurements, design, progress)
+        answer = identified(request, measurements, design, progress)
     tables = [(estimates_table(answer), f"{design.name}: {measurements.name}")]
     if answer.choices:
         short = ["fitted", "units left out, over noise [-]", "chosen"]

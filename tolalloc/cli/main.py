@@ -23,6 +23,7 @@ from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new
 from tolalloc.cli.open import open_page
+from tolalloc.cli.options import saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.schema import schema
 from tolalloc.cli.series import series
@@ -75,7 +76,7 @@ _COMMANDS = (
 
 for command in _COMMANDS:
     word = command.__name__.removesuffix("_page")
-    app.command(word, epilog=f"Example: `{EXAMPLES[word]}`")(command)
+    app.command(word, epilog=f"Example: `{EXAMPLES[word]}`")(saying_options(command, word))
 
 
 def main() -> None:

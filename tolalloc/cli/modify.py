@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def modify(
     method: Annotated[str, typer.Argument(help="song2019 (towards a rotated profile) or li2018 (least gap).")],
     reducer: ReducerOption = None,
-    radial_um: Annotated[float, typer.Option("--radial", help="Least clearance at tip and root [µm].")] = 15.0,
+    radial: Annotated[float, typer.Option("--radial", help="Least clearance at tip and root [µm].")] = 15.0,
     rotation: Annotated[float, typer.Option(help="song2019: rotation of the profile to come close to [rad].")] = 0.005,
     metric: Annotated[str, typer.Option(help="song2019: same_angle, normal or nearest.")] = "same_angle",
     negative: Annotated[bool, typer.Option("--negative-shift", help="song2019: a negative shift.")] = False,
@@ -36,13 +36,13 @@ def modify(
 ) -> None:
     """Choose equidistant and shift amount by a published objective, and say what they deliver."""
     from tolalloc.files import require_new
-    from tolalloc.rv.modification.study import ModificationStudy, choose
+    from tolalloc.rv.modification.request import ModificationRequest, choose
     from tolalloc.rv.reducer.files import load_reducer, write_modified
     from tolalloc.units import MICROMETRE
 
-    study = ModificationStudy(
+    request = ModificationRequest(
         method=method,
-        radial_clearance=radial_um * MICROMETRE,
+        radial_clearance=radial * MICROMETRE,
         rotation=rotation,
         metric=cast("Metric", metric),
         shift_sign=-1 if negative else 1,
@@ -55,7 +55,7 @@ def modify(
     design = load_reducer(named)
     asked = design.torque_on_carrier(-design.load.rated_torque if torque is None else torque, "tolalloc modify")
     announce_compilation("cycloid")
-    answer = choose(study, design, asked)
+    answer = choose(request, design, asked)
     write_asked(answer, out, answer.contact.assessment.profile, profile, points)
     if write:
         write_modified(named, answer.best.modification, write)

@@ -23,15 +23,15 @@ def mount(
 ) -> None:
     """Build the units with the least peak-to-peak from measured parts: who goes where, turned how far."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.assembly.mounting.study import mount as mounted
-    from tolalloc.assembly.mounting.study import prepare_mounting
+    from tolalloc.assembly.mounting.request import mount as mounted
+    from tolalloc.assembly.mounting.request import prepare_mounting
     from tolalloc.report.folder import require_usable
 
-    study = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
+    request = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
     require_usable(out)
     announce_compilation()
     with shown_progress() as progress:
-        answer = mounted(study, progress)
+        answer = mounted(request, progress)
     write_report(answer, out)
     fittings, units = answer.tables["fittings"], answer.tables["units"]
     tell(answer, as_json, (fittings, f"{parts.stem}: who goes where"), (units, "Unit by unit"))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from tolalloc.exceptions import InputError
 
@@ -55,3 +58,27 @@ def named_reducer(reducer: str | None, *written: Path | None) -> str:
             "or a TOML file."
         )
     return DEFAULT_REDUCER
+
+
+def saying_options(command: Callable[..., None], word: str) -> Callable[..., None]:
+    """Return a command whose errors say its options where the package says the name of an argument."""
+
+    @wraps(command)
+    def run(**given: object) -> None:
+        try:
+            command(**given)
+        except InputError as error:
+            option = _option(command, error.argument)
+            raise (error.as_option(f"tolalloc {word}", option) if option else error) from None
+
+    return run
+
+
+def _option(command: Callable[..., None], argument: str) -> str:
+    """Return the option from which an argument comes, which may carry its unit besides; nothing if there is none."""
+    for name, kind in get_type_hints(command, include_extras=True).items():
+        if argument == name or argument.startswith(f"{name}_"):
+            for own in getattr(kind, "__metadata__", ()):
+                if isinstance(own, OptionInfo):
+                    return (own.param_decls or (f"--{name.replace('_', '-')}",))[0]
+    return ""

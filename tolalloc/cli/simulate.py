@@ -44,10 +44,10 @@ def simulate(
 ) -> None:
     """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
     from tolalloc.report.folder import require_usable
-    from tolalloc.rv.simulation.definition import SimulationStudy, prepare_simulation
+    from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation
     from tolalloc.rv.simulation.run import simulate as simulated
 
-    asked = SimulationStudy(
+    asked = SimulationRequest(
         reducer=named_reducer(reducer, out),
         unit=unit,
         speed_rpm=speed,

@@ -57,7 +57,7 @@ class LiveServer:
         try:
             server = _BoundedServer(("127.0.0.1", self.port), handler)
         except (OSError, OverflowError) as error:
-            raise InputError.at("tolalloc open", "--port", self.port, f"a free port ({error})") from None
+            raise InputError.of_argument("live page", "port", self.port, f"a free port ({error})") from None
         return server
 
     @property

@@ -30,7 +30,7 @@ def browser() -> str:
         if found := which(name):
             return found
     raise InputError(
-        f"--pdf: no browser that prints is installed (looked for {', '.join(BROWSERS)}); leave it out, open "
+        f"PDF: no browser that prints is installed (looked for {', '.join(BROWSERS)}); leave it out, open "
         "report.html and print it from there."
     )
 
@@ -44,7 +44,7 @@ def require_printable(paper: str) -> None:
         No browser is installed, or an unknown paper.
     """
     if paper not in PAPERS:
-        raise InputError.at("tolalloc run", "--paper", paper, " or ".join(PAPERS))
+        raise InputError.of_argument("report", "paper", paper, " or ".join(PAPERS))
     browser()
 
 

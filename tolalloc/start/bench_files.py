@@ -36,7 +36,7 @@ def bench_files(reducer: Reducer, errors: ErrorModel, deviations: Float[np.ndarr
         reducer, IdentifiedStiffness(source="simulated", values={STIFFER: value}, standard_uncertainty={STIFFER: 0.0})
     )
     rated, generator = float(reducer.load.rated_torque), SeedTree(1).child("bench").generator()
-    kernel = bind(true, errors, -rated, "tolalloc new")[0]
+    kernel = bind(true, errors, -rated, "new folder")[0]
     x, model = kernel.errors(deviations), kernel.model
 
     def twisted(torque: float, angle: Float[np.ndarray, " angle"], kind: str) -> Float[np.ndarray, "unit angle"]:

@@ -134,10 +134,10 @@ class NewFolder:
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.place.name):
-            raise InputError.at("tolalloc new", "NAME", self.place.name, "60 letters, digits, - and _, a letter first")
+            raise InputError.at("new folder", "name", self.place.name, "60 letters, digits, - and _, a letter first")
         for kind in self.samples:
             if kind not in SAMPLES:
-                raise UnknownNameError.among("tolalloc new", "--with", kind, (*SAMPLES, "all"))
+                raise UnknownNameError.among("new folder", "sample", kind, (*SAMPLES, "all"))
 
     def write(self) -> tuple[Reducer, tuple[Source, ...]]:
         """Write the folder, whole or not at all, and return its reducer and its sources.

@@ -27,10 +27,10 @@ class Likeness:
 
     def __post_init__(self) -> None:
         if self.preset not in PRESETS:
-            raise UnknownNameError.among("tolalloc new", "--like", self.preset, PRESETS)
-        for option, count, allowed in (("--cranks", self.cranks, CRANKS), ("--discs", self.discs, DISCS)):
+            raise UnknownNameError.among("new reducer", "preset", self.preset, PRESETS)
+        for name, count, allowed in (("cranks", self.cranks, CRANKS), ("discs", self.discs, DISCS)):
             if count is not None and count not in allowed:
-                raise InputError.at("tolalloc new", option, count, f"{allowed[0]} to {allowed[-1]}")
+                raise InputError.of_argument("new reducer", name, count, f"{allowed[0]} to {allowed[-1]}")
 
     @property
     def reducer(self) -> Reducer:

@@ -72,7 +72,7 @@ class Samples:
 
     @cached_property
     def _kernel(self) -> KernelResponse:
-        return bind(self.reducer, self._errors, None, "tolalloc new")[0]
+        return bind(self.reducer, self._errors, None, "new folder")[0]
 
     def _units(self, units: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units [m, angles rad]."""

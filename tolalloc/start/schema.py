@@ -61,7 +61,7 @@ def schema(kind: str) -> dict[str, Any]:
     6
     """
     if kind not in KINDS:
-        raise UnknownNameError.among("tolalloc schema", "KIND", kind, KINDS)
+        raise UnknownNameError.among("schema", "kind", kind, KINDS)
     record = KINDS[kind]()
     found = record.model_json_schema(by_alias=True)
     for table in (found, *found.get("$defs", {}).values()):

@@ -22,7 +22,7 @@ MOST_STARTS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
-class MountingStudy:
+class MountingRequest:
     """Which parts are to be mounted."""
 
     name: str  # Where the parts come from
@@ -34,7 +34,7 @@ class MountingStudy:
 
 def prepare_mounting(
     parts: Path, reducer: str = "rv20e", torque_nm: float | None = None, starts: int = 4, seed: int = 1
-) -> MountingStudy:
+) -> MountingRequest:
     """Return the parts with their CSV file read and checked, for the reducer of a preset or TOML file.
 
     The torque on the carrier is the reducer's test torque unless given, negative where it resists the rotation [N·m].
@@ -42,17 +42,17 @@ def prepare_mounting(
     Raises
     ------
     InputError, UnknownNameError
-        The option, or the file, row, field and value that are not allowed.
+        The argument, or the file, row, field and value that are not allowed.
     """
     if seed < 0:
-        raise InputError.at("tolalloc mount", "--seed", seed, "0 or a positive integer")
+        raise InputError.of_argument("mounting", "seed", seed, "0 or a positive integer")
     if not 1 <= starts <= MOST_STARTS:
-        raise InputError.at("tolalloc mount", "--starts", starts, f"1 to {MOST_STARTS}")
+        raise InputError.of_argument("mounting", "starts", starts, f"1 to {MOST_STARTS}")
     design = load_reducer(reducer)
-    torque = design.torque_on_carrier(torque_nm, "tolalloc mount")
+    torque = design.torque_on_carrier(torque_nm, "mounting")
     model, measured = EquivalentModel(at_torque(design, torque)), load_parts(parts, design)
     columns = tuple(name for name in model.columns if name not in design.modification.deviations)
-    return MountingStudy(
+    return MountingRequest(
         name=parts.stem,
         stock=PartStock(reducer=design, parts=measured, columns=columns),
         kernel=KernelResponse(model=model, torque=torque, columns=columns, fixed=design.modification.deviations),
@@ -61,7 +61,7 @@ def prepare_mounting(
     )
 
 
-def mount(study: MountingStudy, progress: Progress) -> MountingAnswer:
+def mount(request: MountingRequest, progress: Progress) -> MountingAnswer:
     """Return who goes where, how it is turned there, and what that is worth beside chance.
 
     Raises
@@ -69,17 +69,17 @@ def mount(study: MountingStudy, progress: Progress) -> MountingAnswer:
     SolveError
         Too many units have no answer.
     """
-    record, seeds = RunRecord(progress, OUTCOMES), SeedTree(study.seed).child("mounting")
-    kernel, stock = replace(study.kernel, observe=record.observe), study.stock
+    record, seeds = RunRecord(progress, OUTCOMES), SeedTree(request.seed).child("mounting")
+    kernel, stock = replace(request.kernel, observe=record.observe), request.stock
     with record.stage("search"):
-        found = best_mounting(stock, kernel, seeds.child("search"), study.starts)
+        found = best_mounting(stock, kernel, seeds.child("search"), request.starts)
     with record.stage("chance"):
         chance = random_mounting(stock, kernel, max(found.evaluations // stock.units, 1), seeds.child("chance"))
     return MountingAnswer(
         header=Header(
-            name=study.name,
+            name=request.name,
             model=stock.reducer.name,
-            seed=study.seed,
+            seed=request.seed,
             conditions={"torque on the carrier [N·m]": kernel.torque},
             assumptions=stock.reducer.assumptions,
             statuses=record.counts,

@@ -26,11 +26,11 @@ from tolalloc.units import ARCSECOND, DEGREE
 LARGEST_NOISE = 60.0
 """Largest error of a reading that is believed [arcsec]."""
 
-PLACE = "tolalloc diagnose"
+PLACE = "diagnosis"
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagnosisStudy:
+class DiagnosisRequest:
     """Which unit is to be diagnosed."""
 
     curve: Path  # CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``
@@ -47,17 +47,22 @@ class DiagnosisStudy:
 
     def __post_init__(self) -> None:
         for name, value, good, allowed in (
-            ("--noise", self.noise_arcsec, 0 < self.noise_arcsec <= LARGEST_NOISE, f"above 0 up to {LARGEST_NOISE:g}"),
-            ("--discrepancy", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
-            ("--angle-offset", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
-            ("--level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
-            ("--seed", self.seed, self.seed >= 0, "0 or a positive integer"),
+            (
+                "noise_arcsec",
+                self.noise_arcsec,
+                0 < self.noise_arcsec <= LARGEST_NOISE,
+                f"above 0 up to {LARGEST_NOISE:g}",
+            ),
+            ("discrepancy_arcsec", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
+            ("angle_offset_deg", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
+            ("level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
+            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
         ):
             if not good:
-                raise InputError.at(PLACE, name, value, allowed)
+                raise InputError.of_argument(PLACE, name, value, allowed)
 
 
-def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
+def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAnswer:
     """Return what the curve of a unit tells of its parts, and tell how far the work has come.
 
     Raises
@@ -68,9 +73,9 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
         Too many curves failed.
     """
     record = RunRecord(progress, OUTCOMES)
-    kernel, assumed = bind(asked.reducer, asked.errors, asked.torque_nm, PLACE)
-    cleaned = clean_curve(load_readings(asked.curve, ANGLE, TRANSMISSION_ERROR), asked.angle_offset_deg * DEGREE)
-    kernel, errors = replace(kernel, observe=record.observe), asked.errors
+    kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE)
+    cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)
+    kernel, errors = replace(kernel, observe=record.observe), request.errors
     curve = MeasuredCurve(
         unit=0,
         torque=kernel.torque,
@@ -79,25 +84,26 @@ def diagnose_unit(asked: DiagnosisStudy, progress: Progress) -> DiagnosisAnswer:
         repairs=cleaned.repairs,
     )
     noise = Noise(
-        reading=asked.noise_arcsec * cleaned.noise_factor * ARCSECOND, discrepancy=asked.discrepancy_arcsec * ARCSECOND
+        reading=request.noise_arcsec * cleaned.noise_factor * ARCSECOND,
+        discrepancy=request.discrepancy_arcsec * ARCSECOND,
     )
     with one_blas_thread(), record.stage("diagnosis"):
-        seeds = SeedTree(asked.seed).child("diagnosis")
-        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, asked.effort, asked.level)
+        seeds = SeedTree(request.seed).child("diagnosis")
+        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, request.effort, request.level)
     return DiagnosisAnswer(
         header=Header(
-            name=asked.curve.stem,
-            model=asked.reducer.name,
-            seed=asked.seed,
+            name=request.curve.stem,
+            model=request.reducer.name,
+            seed=request.seed,
             assumptions=assumed,
             statuses=record.counts,
             stages=record.stages,
         ),
-        reducer=asked.reducer,
+        reducer=request.reducer,
         torque=kernel.torque,
         errors=errors,
         curve=curve,
         noise=noise,
-        level=asked.level,
+        level=request.level,
         diagnosis=found,
     )

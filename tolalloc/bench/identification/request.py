@@ -30,7 +30,7 @@ STARTS = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentificationStudy:
+class IdentificationRequest:
     """What is to be identified.
 
     Raises
@@ -44,19 +44,21 @@ class IdentificationStudy:
     data: str = "measurements"  # Where the data were read, for errors
 
     def __post_init__(self) -> None:
-        place = "tolalloc identify"
+        place = "identification"
         names = [item.name for item in self.parameters]
         if not set(names) - {BIAS}:
-            raise InputError.at(place, "parameters", names, "one or more besides the bias, which is the baseline")
+            raise InputError.of_argument(
+                place, "parameters", names, "one or more besides the bias, which is the baseline"
+            )
         for name in names:
             if names.count(name) > 1:
-                raise InputError.at(place, "parameter", name, "each parameter once")
+                raise InputError.of_argument(place, "parameters", name, "each parameter once")
         if self.seed < 0:
-            raise InputError.at(place, "seed", self.seed, "0 or a positive integer")
+            raise InputError.of_argument(place, "seed", self.seed, "0 or a positive integer")
 
 
 def identify(
-    study: IdentificationStudy, measurements: Measurements, reducer: Reducer, progress: Progress
+    request: IdentificationRequest, measurements: Measurements, reducer: Reducer, progress: Progress
 ) -> IdentificationAnswer:
     """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
 
@@ -69,32 +71,32 @@ def identify(
     SolveError
         A unit has no equilibrium.
     """
-    data, seeds = data_of(measurements, study.data), SeedTree(study.seed).child("identification")
-    _require_visible(study, data)
-    kernel = KernelPredictor(reducer, study.parameters, measurements, data, progress.advance)
+    data, seeds = data_of(measurements, request.data), SeedTree(request.seed).child("identification")
+    _require_visible(request, data)
+    kernel = KernelPredictor(reducer, request.parameters, measurements, data, progress.advance)
     problem = IdentificationProblem(
-        parameters=study.parameters,
+        parameters=request.parameters,
         data=data,
         predictor=kernel,
         weight=np.ones(len(measurements.units)),
-        place=study.data,
+        place=request.data,
     )
     require_enough(problem)
     progress.begin("polynomials of the model")
     stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
-    _require_close(study, data, stand_in)
-    quick = problem.of(study.parameters, stand_in)
+    _require_close(request, data, stand_in)
+    quick = problem.of(request.parameters, stand_in)
     progress.begin("Gauss–Newton")
-    found = _found(problem, quick, study.seed, seeds)
+    found = _found(problem, quick, request.seed, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
     widened = problem.widened(own.variance_factor)
     written = gauss_newton(replace(widened, evenly=True), found.coordinates[np.newaxis]).coordinates
     at_written = kernel(written)
     progress.begin("what the data fix")
-    here = widened.of(study.parameters, stand_in.anchored(found.coordinates, prediction))
+    here = widened.of(request.parameters, stand_in.anchored(found.coordinates, prediction))
     near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
-    profiles = tuple(profile(here, near, at, own) for at in range(len(study.parameters)))
+    profiles = tuple(profile(here, near, at, own) for at in range(len(request.parameters)))
     drift = float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max())
     if drift > LARGE_DRIFT:
         profiles = tuple(item.widened(own.interval[:, at]) for at, item in enumerate(profiles))
@@ -103,11 +105,11 @@ def identify(
     choices = judged_choices(quick, stand_in, reducer) if several else ()
     spread = information(widened, at_written, written)
     return IdentificationAnswer(
-        header=Header(name=measurements.name, model=reducer.name, seed=study.seed),
+        header=Header(name=measurements.name, model=reducer.name, seed=request.seed),
         measurements=measurements,
         reducer=reducer,
         data=data,
-        parameters=study.parameters,
+        parameters=request.parameters,
         found=found,
         at_start=kernel(problem.start),
         at_found=prediction,
@@ -116,7 +118,7 @@ def identify(
         written=spread,
         profiles=profiles,
         drift=drift,
-        estimates=estimates(study.parameters, own, spread, profiles),
+        estimates=estimates(request.parameters, own, spread, profiles),
         bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
         choices=choices,
         chosen=simplest(choices) if choices else None,
@@ -124,26 +126,26 @@ def identify(
     )
 
 
-def _require_visible(study: IdentificationStudy, data: AllReadings) -> None:
+def _require_visible(request: IdentificationRequest, data: AllReadings) -> None:
     """Refuse a bias or a torque where no reading shows one, and a prior against readings without a stated noise."""
-    names = [item.name for item in study.parameters]
+    names = [item.name for item in request.parameters]
     if BIAS in names and data.peak_to_peak is None:
         raise InputError(
-            f"{study.data}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
+            f"{request.data}: parameter 'bias' needs peak-to-peaks; the mean of curves and loops is removed."
         )
-    if not data.noise_stated and any(isfinite(item.prior) for item in study.parameters):
-        raise InputError(f"{study.data}: a prior can only be weighed against readings whose noise_arcsec is stated.")
+    if not data.noise_stated and any(isfinite(item.prior) for item in request.parameters):
+        raise InputError(f"{request.data}: a prior can only be weighed against readings whose noise_arcsec is stated.")
     if TORQUE in names and all(block.kind == LOOP for block in data.blocks):
         raise InputError(
-            f"{study.data}: parameter 'torque' needs peak-to-peaks or curves; loops measure their torque themselves."
+            f"{request.data}: parameter 'torque' needs peak-to-peaks or curves; loops measure their torque themselves."
         )
 
 
-def _require_close(study: IdentificationStudy, data: AllReadings, stand_in: StandIn) -> None:
+def _require_close(request: IdentificationRequest, data: AllReadings, stand_in: StandIn) -> None:
     """Refuse bounds within which polynomials are no stand-in for the model."""
     off = stand_in.polynomial.rms_error
     if not off <= data.noise.min():
-        bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in study.parameters)
+        bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in request.parameters)
         error = (
             "in a part of them the model has no answer"
             if np.isnan(off)
@@ -151,8 +153,7 @@ def _require_close(study: IdentificationStudy, data: AllReadings, stand_in: Stan
             f"{data.noise.min() / ARCSECOND:.2g}″"
         )
         raise InputError(
-            f"tolalloc identify: bounds {bounds} are too wide, {error}; allowed are narrower ones, such as half "
-            "to double."
+            f"identification: bounds {bounds} are too wide, {error}; allowed are narrower ones, such as half to double."
         )
 
 

@@ -29,7 +29,7 @@ ASSUMPTIONS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModificationStudy:
+class ModificationRequest:
     """What is to be chosen.
 
     Raises
@@ -47,14 +47,14 @@ class ModificationStudy:
     require_gap: bool = False
 
     def __post_init__(self) -> None:
-        place = "tolalloc modify"
+        place = "modification"
         if self.method not in ASSUMPTIONS:
             raise UnknownNameError.among(place, "method", self.method, ASSUMPTIONS)
         if self.metric not in METRICS:
             raise UnknownNameError.among(place, "metric", self.metric, METRICS)
         if not 0 <= self.radial_clearance <= 1e-3:
             asked = f"{self.radial_clearance / MICROMETRE:g} µm"
-            raise InputError.at(place, "radial clearance", asked, "0 to 1000 µm")
+            raise InputError.of_argument(place, "radial_clearance", asked, "0 to 1000 µm")
 
     def problem(self, reducer: Reducer) -> ModificationProblem:
         """Return what is minimised on a reducer's cycloid stage."""
@@ -70,7 +70,7 @@ class ModificationStudy:
         )
 
 
-def choose(study: ModificationStudy, reducer: Reducer, torque: float) -> ModificationAnswer:
+def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> ModificationAnswer:
     """Return the best amounts, and what they do on the reducer.
 
     The reducer's own modification is replaced; the torque on the carrier is that of the contact, negative resists
@@ -81,7 +81,7 @@ def choose(study: ModificationStudy, reducer: Reducer, torque: float) -> Modific
     InputError
         No amounts meet the constraints, or the best ones cannot be ground or mounted.
     """
-    problem = study.problem(reducer)
+    problem = request.problem(reducer)
     best = reference(problem)
     if best.violation > 0:
         equidistant, shift = (
@@ -96,23 +96,23 @@ def choose(study: ModificationStudy, reducer: Reducer, torque: float) -> Modific
     contact = contact_answer(replace(reducer, modification=best.modification), torque)
     return ModificationAnswer(
         header=Header(
-            name=study.method,
+            name=request.method,
             model=reducer.name,
             conditions=contact.header.conditions,
-            assumptions=ASSUMPTIONS[study.method],
+            assumptions=ASSUMPTIONS[request.method],
         ),
         problem=problem,
         best=best,
         contact=contact,
-        cautions=_cautions(study, reducer),
+        cautions=_cautions(request, reducer),
     )
 
 
-def _cautions(study: ModificationStudy, reducer: Reducer) -> tuple[str, ...]:
+def _cautions(request: ModificationRequest, reducer: Reducer) -> tuple[str, ...]:
     """Return what the method itself must warn of."""
-    if study.method != "song2019" or study.rotation * reducer.cycloid_stage.disc_pitch_radius <= LARGE:
+    if request.method != "song2019" or request.rotation * reducer.cycloid_stage.disc_pitch_radius <= LARGE:
         return ()
     return (
-        f"A rotation of {study.rotation:g} rad is {study.rotation / ARCMINUTE:.0f} arcmin of play to each side; a "
+        f"A rotation of {request.rotation:g} rad is {request.rotation / ARCMINUTE:.0f} arcmin of play to each side; a "
         "precision reducer has one or two: ask for less before setting a drawing.",
     )

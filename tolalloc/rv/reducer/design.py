@@ -219,7 +219,7 @@ class Reducer:
         """
         torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
         if not (is_number(torque) and 0 < abs(torque) <= largest):
-            raise InputError.at(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
+            raise InputError.of_argument(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
         return torque
 
     @property

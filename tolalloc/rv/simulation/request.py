@@ -43,7 +43,7 @@ LOAD_TIME = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulationStudy:
+class SimulationRequest:
     """What is to be simulated; as it stands, the run of xi2015.
 
     Raises
@@ -70,33 +70,33 @@ class SimulationStudy:
 
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
-            raise UnknownNameError.among("tolalloc simulate", "engine", self.engine, ENGINES)
-        for option, value in (
-            ("--speed", self.speed_rpm),
-            ("--duration", self.duration),
-            ("--ramp", self.ramp),
-            ("--step", self.step),
-            ("--pin-stiffness", 1.0 if self.pin_stiffness is None else self.pin_stiffness),
+            raise UnknownNameError.among("simulation", "engine", self.engine, ENGINES)
+        for name, value in (
+            ("speed_rpm", self.speed_rpm),
+            ("duration", self.duration),
+            ("ramp", self.ramp),
+            ("step", self.step),
+            ("pin_stiffness", 1.0 if self.pin_stiffness is None else self.pin_stiffness),
         ):
             if not 0.0 < value < inf:
-                raise InputError.at("tolalloc simulate", option, value, "a number above 0")
-        for option, value in (
-            ("--output-inertia", self.output_inertia),
-            ("--damping", self.damping),
-            ("--mass-damping", self.mass_damping or 0.0),
+                raise InputError.of_argument("simulation", name, value, "a number above 0")
+        for name, value in (
+            ("output_inertia", self.output_inertia),
+            ("damping", self.damping),
+            ("mass_damping", self.mass_damping or 0.0),
         ):
             if not 0.0 <= value < inf:
-                raise InputError.at("tolalloc simulate", option, value, "0 or a positive number")
+                raise InputError.of_argument("simulation", name, value, "0 or a positive number")
         if not self.duration / MOST_STEPS <= self.step <= self.duration:
             allowed = f"{self.duration / MOST_STEPS:.3g} s to the duration of {self.duration:g} s"
-            raise InputError.at("tolalloc simulate", "--step", self.step, allowed)
+            raise InputError.of_argument("simulation", "step", self.step, allowed)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedSimulation:
     """A checked simulation."""
 
-    asked: SimulationStudy  # What was asked
+    asked: SimulationRequest  # What was asked
     reducer: Reducer  # Design with the pin contacts that were asked for
     unit: BuiltUnit  # Its errors
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
@@ -158,13 +158,13 @@ class PreparedSimulation:
         return {name: value for name, value in self.unit.deviations.items() if value and name not in modification}
 
 
-def prepare_simulation(asked: SimulationStudy) -> PreparedSimulation:
+def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     """Return a simulation with its files read and checked.
 
     Raises
     ------
     InputError, UnknownNameError
-        The file, field or option that is not allowed, or an engine that is not installed.
+        The file, field or argument that is not allowed, or an engine that is not installed.
     """
     reducer, unit = load_reducer(asked.reducer), load_unit(asked.unit)
     if asked.engine == "exudyn":
@@ -179,16 +179,16 @@ def prepare_simulation(asked: SimulationStudy) -> PreparedSimulation:
     if not -LARGEST_TORQUE * reducer.load.rated_torque <= torque < 0.0:
         lowest = f"{-LARGEST_TORQUE * reducer.load.rated_torque:g}"
         allowed = f"{lowest} N·m to below 0, which resists the rotation; a load that drives it is not simulated"
-        raise InputError.at("tolalloc simulate", "--torque", torque, allowed)
+        raise InputError.of_argument("simulation", "torque_nm", torque, allowed)
     prepared = PreparedSimulation(asked=asked, reducer=reducer, unit=unit, torque=torque)
     if prepared.crank_turns < 1:
         least = prepared.loaded + prepared.crank_turn
         allowed = f"{least:.4g} s or more, which the ramps of speed and load and one crank turn take"
-        raise InputError.at("tolalloc simulate", "--duration", asked.duration, allowed)
+        raise InputError.of_argument("simulation", "duration", asked.duration, allowed)
     longest = prepared.crank_turn / reducer.cycloid_stage.pin_count / FEWEST_STEPS
     if asked.step > longest:
         allowed = f"up to {longest:.3g} s, {FEWEST_STEPS} steps per pin pass"
-        raise InputError.at("tolalloc simulate", "--step", asked.step, allowed)
+        raise InputError.of_argument("simulation", "step", asked.step, allowed)
     _ = prepared.errors  # an error that an engine does not know is said before anything runs
     if asked.engine == "exudyn":
         part_errors(reducer, prepared.prototype_errors)

@@ -19,7 +19,7 @@ from tolalloc.rv.equivalent.outputs import forces
 from tolalloc.rv.multibody.drive import TimeCourse
 from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
 from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries
-from tolalloc.rv.simulation.definition import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
+from tolalloc.rv.simulation.request import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
 from tolalloc.units import RPM
 
 MOST_ANGLES = 5000
