@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -84,3 +85,15 @@ def test_the_page_of_rooms_lists_each_with_the_first_line_of_its_own():
         said = source.removeprefix('"""').partition("\n")[0].removesuffix('"""')
         assert f"| `{place.relative_to(ROOT).as_posix()}` | {said} |" in page
     assert page.count("| `") == len(outer) + len(files)
+
+
+def public_records() -> list[type]:
+    return [kind for name in ta.__all__ if inspect.isclass(kind := getattr(ta, name)) and is_dataclass(kind)]
+
+
+@pytest.mark.parametrize("record", public_records(), ids=lambda record: record.__name__)
+def test_the_help_of_a_public_record_says_what_its_fields_are(record):
+    section = inspect.getdoc(record).partition("Parameters")[2]
+    stated = re.findall(r"^(\w+(?:, \w+)*)$", section, re.MULTILINE)
+    named = {name for line in stated for name in line.split(", ")}
+    assert {own.name for own in fields(record) if own.init} <= named

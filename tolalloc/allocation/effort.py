@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import NamedFields
 from tolalloc.surrogate import validation
 
 _FEWEST_ALLOCATING = {
@@ -52,7 +54,7 @@ def _require_enough(effort: object, prefix: str) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrontEffort:
+class FrontEffort(NamedFields):
     """How much the search for the front may spend.
 
     Parameters
@@ -69,6 +71,8 @@ class FrontEffort:
         Kernel runs along the front after each search [-].
     """
 
+    called: ClassVar[str] = "effort of a front"
+
     population: int = 80
     generations: int = 100
     population_on_kernel: int = 20
@@ -79,7 +83,7 @@ class FrontEffort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchEffort:
+class SearchEffort(NamedFields):
     """How much the search may spend.
 
     Parameters
@@ -92,13 +96,15 @@ class SearchEffort:
         Effort of the Pareto front.
     """
 
+    called: ClassVar[str] = "effort of a search"
+
     steps: int = 8
     reach: float = 2.5
     front: FrontEffort = field(default_factory=FrontEffort)
 
 
 @dataclass(frozen=True, kw_only=True)
-class AllocationEffort:
+class AllocationEffort(NamedFields):
     """How much an allocation may compute.
 
     Parameters
@@ -137,6 +143,8 @@ class AllocationEffort:
     InputError
         A number with which a stage would stop, often after long work of others.
     """
+
+    called: ClassVar[str] = "effort of an allocation"
 
     verification_units: int = 6144
     confirmation_units: int = 32_768

@@ -26,12 +26,24 @@ Costs = str | Path | Mapping[str, Any]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Drawing:
-    """What is known of the parts before anything is computed."""
+    """What is known of the parts before anything is computed.
 
-    name: str  # Tolerance table as it was named, for reports
-    errors: ErrorModel  # The sources of the table with their correlations
-    costs: Costs = ""  # Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads
-    notes: tuple[str, ...] = ()  # What a reader of its table must know, such as which rows were hidden
+    Parameters
+    ----------
+    name
+        Tolerance table as it was named, for reports.
+    errors
+        The sources of the table with their correlations.
+    costs
+        Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads.
+    notes
+        What a reader of its table must know, such as which rows were hidden.
+    """
+
+    name: str
+    errors: ErrorModel
+    costs: Costs = ""
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of_rows(

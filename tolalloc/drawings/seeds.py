@@ -19,9 +19,16 @@ _SOBOL_BITS = 32
 
 @dataclass(frozen=True)
 class SeedTree:
-    """A node of the tree."""
+    """A place in the tree of random numbers: who draws there draws the same, whoever draws elsewhere, and when.
 
-    # Seed of the study, where 0 is a seed like every other [-]; names from the root to this node
+    Parameters
+    ----------
+    seed
+        Seed of the study, where 0 is a seed like every other [-].
+    path
+        Names from the root to this place.
+    """
+
     seed: int
     path: tuple[str, ...] = ()
 

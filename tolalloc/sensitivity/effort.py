@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import ceil
+from typing import ClassVar
 
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
+from tolalloc.named_fields import NamedFields
 from tolalloc.surrogate import validation
 
 WORST_SHARE = 0.05
@@ -46,16 +48,33 @@ _CHAIN = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class SobolEffort:
-    """How much a Sobol analysis may compute."""
+class SobolEffort(NamedFields):
+    """How much a Sobol analysis may compute.
 
-    # First and largest number of Saltelli blocks, the first a power of two; equal for a fixed number [-]
+    Parameters
+    ----------
+    start
+        First number of Saltelli blocks, a power of two [-].
+    limit
+        Largest number of them; as the first one for a fixed number [-].
+    places
+        First places whose order must be stable in the ranking over all outputs [-].
+    probability
+        Share of resamples that must have that order [-].
+    resamples
+        Bootstrap resamples [-].
+    second_order
+        Whether pairs of sources get an index, at nearly twice the samples.
+    """
+
+    called: ClassVar[str] = "effort of Sobol indices"
+
     start: int = 512
     limit: int = 65_536
-    places: int = 3  # First places whose order must be stable in the ranking over all outputs [-]
-    probability: float = 0.9  # Share of resamples that must have that order [-]
-    resamples: int = 400  # Bootstrap resamples [-]
-    second_order: bool = False  # Whether pairs of sources get an index, at nearly twice the samples
+    places: int = 3
+    probability: float = 0.9
+    resamples: int = 400
+    second_order: bool = False
 
     def __post_init__(self) -> None:
         if self.start < 2 or self.start & (self.start - 1):
@@ -65,8 +84,35 @@ class SobolEffort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RankingEffort:
+class RankingEffort(NamedFields):
     """How much a ranking may compute.
+
+    Parameters
+    ----------
+    units
+        Random units behind yields, capabilities and what the units out of the limit share [-].
+    design
+        How these units are spread; yields have an interval for the Monte Carlo design alone.
+    sobol
+        Blocks of the Sobol analysis, and what stops their growth.
+    trajectories
+        Trajectories of Morris' elementary effects [-].
+    moment_units
+        Units behind PAWN and delta [-].
+    derivative_units
+        Units behind derivatives [-].
+    inverse_units
+        Units behind every trial zone; the yield target may ask for more [-].
+    surrogate_units
+        Units behind the surrogates [-].
+    level_units
+        Units of a level of the subset simulation, for limits that are rarely exceeded [-].
+    level_runs
+        Runs of it, and of the widened sampling that checks it [-].
+    widened_units
+        Units of a width of that sampling [-].
+    permutations
+        Permutations behind Shapley effects, where sources are correlated [-].
 
     Raises
     ------
@@ -74,24 +120,20 @@ class RankingEffort:
         A number with which an estimator would stop, often after long work of others.
     """
 
-    units: int = 16_384  # Random units behind yields, capabilities and what the units out of the limit share [-]
-    # How these units are spread; yields have an interval for the Monte Carlo design alone
+    called: ClassVar[str] = "effort of a ranking"
+
+    units: int = 16_384
     design: SamplingDesign = SamplingDesign.MONTE_CARLO
-    # Blocks of the Sobol analysis, and what stops their growth
     sobol: SobolEffort = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
-    trajectories: int = 32  # Trajectories of Morris' elementary effects [-]
-    # Units behind PAWN and delta, behind derivatives, behind every trial zone, and behind the surrogates; the yield
-    # target may ask for more behind the trial zones [-]
+    trajectories: int = 32
     moment_units: int = 4096
     derivative_units: int = 1024
     inverse_units: int = 2048
     surrogate_units: int = 2048
-    # Units of a level of the subset simulation, runs of it and of the widened sampling that checks it, and units of a
-    # width of that, all for limits that are rarely exceeded [-]
     level_units: int = 4000
     level_runs: int = 5
     widened_units: int = 2000
-    permutations: int = 1000  # Permutations behind Shapley effects, where sources are correlated [-]
+    permutations: int = 1000
 
     def __post_init__(self) -> None:
         for field_name, fewest in _FEWEST.items():

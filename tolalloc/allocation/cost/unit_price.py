@@ -18,6 +18,13 @@ from tolalloc.named_fields import NamedFields, is_number
 class QualityLoss(NamedFields):
     """What a unit costs its user although it is within its limit, growing with the square of the deviation.
 
+    Parameters
+    ----------
+    limit
+        Deviation from the best value at which the loss is `at_limit` [unit of the output].
+    at_limit
+        Loss of a unit at the limit, such as its repair [cost units].
+
     Raises
     ------
     InputError
@@ -31,8 +38,8 @@ class QualityLoss(NamedFields):
     called: ClassVar[str] = "quality loss"
     by_position: ClassVar[int] = 2
 
-    limit: float  # Deviation from the best value at which the loss is `at_limit` [unit of the output]
-    at_limit: float  # Loss of a unit at the limit, such as its repair [cost units]
+    limit: float
+    at_limit: float
 
     def __post_init__(self) -> None:
         if not (is_number(self.limit) and isfinite(self.limit) and self.limit > 0):
@@ -56,6 +63,17 @@ class QualityLoss(NamedFields):
 class UnitPrice(NamedFields):
     """What becomes of units beyond the limit, and so what a good unit costs.
 
+    Parameters
+    ----------
+    inspection
+        Inspecting one unit [cost units].
+    rework_share
+        Share of the units beyond the limit that rework makes good; the others are scrapped [-].
+    rework
+        Reworking one unit [cost units].
+    scrap
+        Scrapping one unit, beyond what making it cost [cost units].
+
     Raises
     ------
     InputError
@@ -65,10 +83,10 @@ class UnitPrice(NamedFields):
     called: ClassVar[str] = "price of a unit"
     by_position: ClassVar[int] = 4
 
-    inspection: float = 0.0  # Inspecting one unit [cost units]
-    rework_share: float = 0.0  # Share of the units beyond the limit that rework makes good; the others are scrapped [-]
-    rework: float = 0.0  # Reworking one unit [cost units]
-    scrap: float = 0.0  # Scrapping one unit, beyond what making it cost [cost units]
+    inspection: float = 0.0
+    rework_share: float = 0.0
+    rework: float = 0.0
+    scrap: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
