@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.published.liu2020_table2 import mesh_as_printed, pin_contact_as_printed
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.cycloid.contact_stiffness import pin_contact_table2
 from tolalloc.rv.reducer.design import CycloidStage
@@ -24,8 +25,6 @@ from tolalloc.rv.reducer.table2 import (
     ball_coefficient_as_printed,
     gear_mesh,
     largest_preload,
-    mesh_as_printed,
-    pin_contact_as_printed,
     roller_bearing,
     shaft_support,
 )

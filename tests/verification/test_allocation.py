@@ -22,7 +22,7 @@ from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.search import allocate
 from tolalloc.allocation.trial import OutputTrial
-from tolalloc.allocation.trust_region import aimed
+from tolalloc.allocation.trust_region import aimed, kept_stacks
 from tolalloc.allocation.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
@@ -373,7 +373,8 @@ def test_the_bound_and_the_price_are_those_of_the_chosen_models(prepared):
     assert found.optimum.bound_prices.min() >= -1e-6
     assert found.optimum.cost <= found.inside.cost
     shares = np.array([0.999, 1.0, 1.001])
-    front = exact_front(verifier.space, found.limit_stacks, found.limit, shares)
+    stacks = kept_stacks(found.chosen, found.tried, margin=0.0)
+    front = exact_front(verifier.space, stacks, found.limit, shares)
     assert front.cost[1] == pytest.approx(found.optimum.cost, rel=1e-6)
     np.testing.assert_allclose(front.bound, front.cost, rtol=1e-6)
     slope = (front.cost[0] - front.cost[2]) / (front.limits[2] - front.limits[0])

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
 from tolalloc.allocation.repricing import named_zones, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
@@ -27,8 +27,6 @@ from tolalloc.units import MICROMETRE
 if TYPE_CHECKING:
     import pandas as pd
 
-_USUAL = 0.9973
-"""Share at which the quantile of an output is read whose limit asks for no yield [-]."""
 _BEYOND = 10
 """Units beyond a quantile below which its interval is too narrow [-]."""
 
@@ -229,7 +227,7 @@ def limited_shares(requirement: Requirement) -> tuple[float, ...]:
 
     Two limits leave half of the rejects beyond either of them.
     """
-    target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else _USUAL
+    target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else USUAL_YIELD
     sides = requirement.limits.turned
     beyond = (1 - target) / len(sides)
     return tuple(1 - beyond if sign > 0 else beyond for sign, _ in sides)

@@ -17,6 +17,8 @@ from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields, is_number
 
+USUAL_YIELD = 0.9973
+"""Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
 _MISSED = 0.005
 """Share of a worst case by which an ascent may have missed it [-]."""
 
@@ -96,7 +98,7 @@ class AtYield(NamedFields):
 
     def __post_init__(self) -> None:
         if not (is_number(self.target) and 0.5 <= self.target < 1):
-            share = self.target / 100 if is_number(self.target) and 50 <= self.target < 100 else 0.9973
+            share = self.target / 100 if is_number(self.target) and 50 <= self.target < 100 else USUAL_YIELD
             raise InputError.at(self.called, "target", self.target, f"a share from 0.5 to below 1, such as {share:g}")
 
     @property

@@ -54,11 +54,6 @@ class ZoneAllocation:
         """The same with the budget that the limits leave, however far the chosen design lies beyond them."""
         return self.stacks if self.chosen.met else aimed(self.chosen, list(self.tried))
 
-    @cached_property
-    def limit_stacks(self) -> tuple[Stack, ...]:
-        """The same with the budget of the limits themselves."""
-        return kept_stacks(self.chosen, self.tried, margin=0.0)
-
     def with_chosen(self, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> ZoneAllocation:
         """Return the allocation with another design, which was found beside those of the search."""
         every = (*self.tried, *tried)

@@ -23,11 +23,6 @@ class Change:
     low: float
     high: float
 
-    @property
-    def is_shown(self) -> bool:
-        """Whether the interval leaves out no change at all."""
-        return self.low > 0 or self.high < 0
-
 
 def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " unit"]) -> Change:
     """Return how the share of good units changes [-].

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield, Guarantee
+from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields, is_number
-
-if TYPE_CHECKING:
-    from tolalloc.allocation.guarantee import Guarantee
-    from tolalloc.capability.indices import Limits
-
-_YIELD = 0.9973
-"""Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +41,6 @@ class Limit(NamedFields):
     show: Guarantee | None = None
 
     def __post_init__(self) -> None:
-        from tolalloc.allocation.guarantee import Guarantee
-
         if isinstance(self.show, type) or not (self.show is None or isinstance(self.show, Guarantee)):
             raise InputError.at("limit", "show", self.show, "AtYield(...), AtCpk(...), WorstCase() or RootSumSquare()")
         for name in ("upper", "lower"):
@@ -62,13 +55,9 @@ class Limit(NamedFields):
     @property
     def guarantee(self) -> Guarantee:
         """What must be shown."""
-        from tolalloc.allocation.guarantee import AtYield
-
-        return self.show or AtYield(target=_YIELD)
+        return self.show or AtYield(target=USUAL_YIELD)
 
     @property
     def limits(self) -> Limits:
         """The limits alone."""
-        from tolalloc.capability.indices import Limits
-
         return Limits(upper=self.upper, lower=self.lower)

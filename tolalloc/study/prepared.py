@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from tolalloc.allocation.cost.process_costs_file import load_process_costs, priced
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
+from tolalloc.allocation.requirement import JointRequirement, Requirement
 from tolalloc.chunks import Mapper
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -16,12 +20,7 @@ from tolalloc.report.answer import Header
 from tolalloc.study.limit import Limit
 
 if TYPE_CHECKING:
-    from tolalloc.allocation.design_space import DesignSpace
-    from tolalloc.allocation.requirement import Requirement
     from tolalloc.study.study import Study
-
-_USUAL_YIELD = 0.9973
-"""Yield of a first limit that asks for something else, such as a Cpk [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +66,6 @@ class Prepared:
         InputError, UnknownNameError
             No limit, or limits of no output.
         """
-        from tolalloc.allocation.requirement import Requirement
-
         if not self.study.limits:
             raise InputError(f"{self.place}: limits is empty; limit one output at least, the leading one first.")
         for name in self.study.limits:
@@ -92,8 +89,6 @@ class Prepared:
     @property
     def requirements_with_joint(self) -> tuple[Requirement, ...]:
         """What the study limits, and last that a share of the units keeps all limits at once, if it asks for that."""
-        from tolalloc.allocation.requirement import JointRequirement
-
         if self.study.joint is None or len(self.requirements) == 1:
             return self.requirements
         return (*self.requirements, JointRequirement.of(self.requirements, self.study.joint))
@@ -101,17 +96,12 @@ class Prepared:
     @property
     def target(self) -> float:
         """Share of units that must keep the first limit [-]."""
-        from tolalloc.allocation.guarantee import AtYield
-
         shown = self.requirements[0].guarantee
-        return shown.target if isinstance(shown, AtYield) else _USUAL_YIELD
+        return shown.target if isinstance(shown, AtYield) else USUAL_YIELD
 
     @cached_property
     def space(self) -> DesignSpace:
         """Zones and settings that an allocation may choose."""
-        from tolalloc.allocation.cost.process_costs_file import load_process_costs, priced
-        from tolalloc.allocation.design_space import DesignSpace
-
         costs = self.study.drawing.costs if self.study.drawing else ""
         if isinstance(costs, Mapping):
             for name, row in ((name, row) for name, rows in costs.items() for row in rows):

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
-    from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
     from tolalloc.progress import RunRecord
     from tolalloc.report.answer import Answer
     from tolalloc.report.document import Document
@@ -62,7 +63,6 @@ class Ranking(Question):
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
-        from tolalloc.drawings.seeds import SeedTree
         from tolalloc.sensitivity.answer import rank
         from tolalloc.sensitivity.measures import Measures
 
@@ -113,7 +113,6 @@ class Difference(Question):
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
         """Return both drawings on the same units."""
         from tolalloc.allocation.difference import difference
-        from tolalloc.drawings.seeds import SeedTree
 
         return difference(
             model=prepared.model,
@@ -164,8 +163,6 @@ class Allocation(Question):
     quality_loss: QualityLoss | None = None
 
     def __post_init__(self) -> None:
-        from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
-
         for name in ("grades", "fixed_first", "front", "what_if"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError.at("question allocation", name, getattr(self, name), "True or False")

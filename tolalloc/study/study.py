@@ -8,20 +8,20 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
+from tolalloc.allocation.guarantee import AtYield
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.study.effort import QUICK, Effort
 from tolalloc.study.limit import Limit
 from tolalloc.study.questions import Allocation, Question, Ranking, named
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer
-    from tolalloc.allocation.guarantee import AtYield
     from tolalloc.drawings.drawing import Drawing
     from tolalloc.models import ModelSource
     from tolalloc.progress import Progress
     from tolalloc.report.answer import Answer
     from tolalloc.sensitivity.answer import RankingAnswer
-    from tolalloc.study.effort import Effort
     from tolalloc.study.runner import Run
 
 
@@ -30,29 +30,15 @@ _LONGEST_TEXT = 60
 _NAME = r"[\w-][\w. -]{0,99}"
 
 
-def _full() -> Effort:
-    from tolalloc.study.effort import Effort
-
-    return Effort()
-
-
 def _effort(name: str, place: str) -> Effort:
     """Return the effort of a name, ``quick`` or ``full``."""
-    from tolalloc.study.effort import QUICK
-
     if name not in ("quick", "full"):
         raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
-    return QUICK if name == "quick" else _full()
+    return QUICK if name == "quick" else Effort()
 
 
 def _is_source(model: object) -> bool:
     return hasattr(model, "bound") and not isinstance(model, type)
-
-
-def _is_yield(joint: object) -> bool:
-    from tolalloc.allocation.guarantee import AtYield
-
-    return isinstance(joint, AtYield)
 
 
 def _is_share(value: object) -> bool:
@@ -126,7 +112,7 @@ class Study(NamedFields):
     name: str = "study"
     seed: int = 1
     largest_failed_share: float = 0.01
-    effort: Effort = field(default_factory=_full)
+    effort: Effort = field(default_factory=Effort)
     title_block: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -141,7 +127,7 @@ class Study(NamedFields):
             ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
             ("drawing", self.drawing is None or hasattr(self.drawing, "errors"), "ta.drawing(...)"),
             ("limits", _are_named(self.limits), "a dictionary of outputs and their ta.Limit(...)"),
-            ("joint", self.joint is None or _is_yield(self.joint), "ta.AtYield(...) or None"),
+            ("joint", self.joint is None or isinstance(self.joint, AtYield), "ta.AtYield(...) or None"),
             ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
             ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
             ("questions", _are_questions(self.questions), "ta.Ranking(...), ta.Allocation(...) and other questions"),

@@ -9,10 +9,6 @@ from __future__ import annotations
 
 from math import pi, radians, sin, sqrt
 
-import numpy as np
-from jaxtyping import Float
-
-from tolalloc.rv.reducer.design import CycloidStage
 from tolalloc.units import GIGAPASCAL
 
 TAPER_ANGLE = radians(80.0)
@@ -57,7 +53,7 @@ def gear_mesh(
 ) -> float:
     """Return K_sp of one mesh: the stiffness of ISO 6336-1 per face width, times the width and E/206 GPa [N/m].
 
-    liu2020 prints 0.1551 for the standard's 0.15551 and leaves the face width out (`mesh_as_printed`); the value per
+    liu2020 prints 0.1551 for the standard's 0.15551 and leaves the face width out; the value per
     width is in N/(mm·µm), so one millimetre of width gives 1e6 times as much in N/m. The mean over a mesh of gears
     without profile shift under 100 N/mm or more; the standard's factor 0.8 between theory and measurement is left out
     as in the print, and lighter loads are softer still. A reducer file may give contact ratios of 1 to 2.5 and
@@ -66,11 +62,6 @@ def gear_mesh(
     flexibility = 0.04723 + 0.15551 / sun_virtual_teeth + 0.25791 / planet_virtual_teeth
     per_width = (0.75 * contact_ratio + 0.25) / flexibility * 1e9
     return per_width * face_width * elastic_modulus / GEAR_STEEL
-
-
-def mesh_as_printed(contact_ratio: float, sun_virtual_teeth: float, planet_virtual_teeth: float) -> float:
-    """Return K_sp as printed, with 0.1551 and per face width: not a stiffness but one per width [N/(mm·µm)]."""
-    return (0.75 * contact_ratio + 0.25) / (0.04723 + 0.1551 / sun_virtual_teeth + 0.25791 / planet_virtual_teeth)
 
 
 def ball_coefficient_as_printed(radius: float, balls: int, elastic_modulus: float, poisson_ratio: float) -> float:
@@ -104,19 +95,3 @@ def largest_preload(ball_radius: float, balls: int, elastic_modulus: float, pois
     """
     contact_modulus = elastic_modulus / (2.0 * (1.0 - poisson_ratio**2))
     return balls * 4.0 / 3.0 * contact_modulus * ball_radius**2 * LARGEST_CONTACT**3
-
-
-def pin_contact_as_printed(
-    stage: CycloidStage, elastic_modulus: float, poisson_ratio: float, pin_angle: Float[np.ndarray, "*angles"]
-) -> Float[np.ndarray, "*angles"]:
-    """Return K_djk as printed, πbE·Rp·S^1.5/(4(1−µ²)(Rp·S^1.5 + 2r_rp·T)), T = K1(1+zp)cos φ − (1+zp·K1²) [N/m].
-
-    Sound where T > 0, on the concave part of the tooth. On the convex part, T < 0, it exceeds that of a flat flank,
-    and it is singular or negative where the pin is larger than half the radius of the path of its centre; the model
-    then takes `tolalloc.rv.cycloid.contact_stiffness.pin_contact_table2`.
-    """
-    shortening, pins, cosine = stage.shortening, stage.pin_count, np.cos(pin_angle)
-    path = stage.pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5
-    bend = shortening * (1 + pins) * cosine - (1 + pins * shortening**2)
-    flat = pi * stage.face_width * elastic_modulus / (4 * (1 - poisson_ratio**2))
-    return np.asarray(flat * path / (path + 2 * stage.pin_radius * bend))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
@@ -12,8 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.exceptions import InputError
-from tolalloc.report.picture.blocks import block, coarse_block, values_of
+from tolalloc.report.picture.blocks import block, coarse_block
 from tolalloc.rv.equivalent.kinematics import Positions
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.reducer.design import Reducer
@@ -75,30 +73,6 @@ class Scene:
             }
         found["places"] = [asdict(place) | {"sources": list(place.sources)} for place in self.places]
         return {"version": VERSION, **found, "carrier_angle": block(self.carrier_angle)}
-
-    def to_json(self, coarse: bool = False) -> str:
-        """Return the scene as text that `Scene.from_json` reads back to the last digit, unless it is coarse."""
-        return json.dumps(self.record(coarse), ensure_ascii=False, allow_nan=False)
-
-    @classmethod
-    def from_json(cls, text: str) -> Scene:
-        """Return the scene that a text holds.
-
-        Raises
-        ------
-        InputError
-            It is of another version.
-        """
-        found = json.loads(text)
-        version = found.pop("version", None)
-        if version != VERSION:
-            raise InputError.at("scene", "version", version, str(VERSION))
-        for name in ("forward", "backward"):
-            torque = found[name].pop("torque")
-            found[name] = States(torque=torque, **{key: values_of(entry) for key, entry in found[name].items()})
-        places = tuple(Place(**{**place, "sources": tuple(place["sources"])}) for place in found["places"])
-        angles, assumptions = values_of(found["carrier_angle"]), tuple(found["assumptions"])
-        return cls(**{**found, "places": places, "carrier_angle": angles, "assumptions": assumptions})
 
 
 def scene_of(
