@@ -11,7 +11,6 @@ import typer
 from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
 from tolalloc.cli.options import ReducerOption, named_reducer
 from tolalloc.cli.progress import shown_progress
-from tolalloc.drawings.table_file import plain_number
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -166,6 +165,8 @@ def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> t
 
 def _number(text: str, option: str, whole: str) -> float:
     """Return a number of an option."""
+    from tolalloc.drawings.table_file import plain_number
+
     try:
         return plain_number(text)
     except ValueError:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from tolalloc.progress import Progress
-
 if TYPE_CHECKING:
     from rich.progress import TaskID
+
+    from tolalloc.progress import Progress
 
 _BETWEEN = 5.0
 """Time between two lines of one stage in a log [s]."""
