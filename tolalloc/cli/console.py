@@ -39,6 +39,14 @@ def announce_compilation(room: str = "equivalent") -> None:
         note(f"Compiling the kernel for this machine: {lasts}, once.", dim=True)
 
 
+def announce_kernel(model: object) -> None:
+    """Say the same of the kernel of a study's model; a user's own model has none."""
+    from tolalloc.rv.choice import ReducerChoice
+
+    if isinstance(model, ReducerChoice):
+        announce_compilation()
+
+
 def print_json(answer: dict[str, Any]) -> None:
     """Print an answer for a program."""
     sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")

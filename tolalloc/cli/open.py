@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import announce_compilation, note
+from tolalloc.cli.console import announce_kernel, note
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
@@ -25,7 +25,6 @@ def open_page(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
     """Open the live page of a study: move a zone, see cost, curve and yield of the real model."""
-    from tolalloc.function_model import FunctionModel
     from tolalloc.live.address import Address
     from tolalloc.live.desk import Desk
     from tolalloc.live.session import Session
@@ -34,8 +33,7 @@ def open_page(
     study = load_study(script)
     session = Session(prepared=Prepared(study=study))
     _ = session.requirements  # what is wrong with the study is said before a page opens
-    if not isinstance(study.model, FunctionModel):
-        announce_compilation()
+    announce_kernel(study.model)
     place = script.resolve()
     server = _server(Desk(session=session, script=place), Address.of(place), port)
     Address(port=server.http.server_port, token=server.token).keep(place)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, announce_compilation, note, print_json, tell
+from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, tell
 from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
@@ -163,7 +163,6 @@ class _Way:
 
 def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
-    from tolalloc.function_model import FunctionModel
     from tolalloc.report.pdf import require_printable, write_pdf
     from tolalloc.study.questions import named
     from tolalloc.study.runner import kept_beside
@@ -172,8 +171,7 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
     questions = named(kinds, tuple(study.questions), f"study {study.name}")
     if way.paper:
         require_printable(way.paper)
-    if not isinstance(study.model, FunctionModel):
-        announce_compilation()
+    announce_kernel(study.model)
     try:
         with solvers(way.scheduler) as solved_by, shown_progress() as progress:
             found = run_study(study, folder, questions, progress, checkpoint, fresh=way.fresh, solved_by=solved_by)

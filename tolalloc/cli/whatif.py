@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_kernel, tell, write_report
 from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
@@ -24,14 +24,12 @@ def whatif(
     as_json: AsJson = False,
 ) -> None:
     """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units."""
-    from tolalloc.function_model import FunctionModel
     from tolalloc.report.folder import require_usable
     from tolalloc.study.questions import Difference
 
     require_usable(out)
     study = load_study(script)
-    if not isinstance(study.model, FunctionModel):
-        announce_compilation()
+    announce_kernel(study.model)
     question = Difference(zones=dict(_zone(text) for text in zones), units=units)
     with shown_progress() as progress:
         answer = study.ask(question, study.effort, progress)
