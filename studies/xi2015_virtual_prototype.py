@@ -18,10 +18,11 @@ from tolalloc.rv.multibody.prototype import with_rigid_bearings
 from tolalloc.rv.multibody.system import engine
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
+from tolalloc.rv.simulation.answer import SimulationAnswer
 from tolalloc.rv.simulation.figures import error_figure, run_figures
 from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation, with_ideal_gears
 from tolalloc.rv.simulation.run import simulate
+from tolalloc.rv.simulation.sentences import range_text
 from tolalloc.units import ARCSECOND, RPM
 
 IMPLIED = 3.67e7

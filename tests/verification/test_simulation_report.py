@@ -9,8 +9,9 @@ import pytest
 
 from tolalloc.report.answer import Header
 from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries, range_text
+from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries
 from tolalloc.rv.simulation.figures import error_figure, line
+from tolalloc.rv.simulation.sentences import range_text
 from tolalloc.units import ARCSECOND, RPM
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4

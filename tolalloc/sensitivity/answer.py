@@ -27,10 +27,14 @@ from tolalloc.sensitivity.derivatives import (
     derivative_measures,
     local_derivatives,
 )
+from tolalloc.sensitivity.driver_tables import ranking_table
 from tolalloc.sensitivity.inverse import InverseSensitivity
+from tolalloc.sensitivity.limit_tables import capability_table, inverse_table, reject_table
 from tolalloc.sensitivity.measures import Measures
 from tolalloc.sensitivity.ranking import Reproduction
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent, elementary_effects
+from tolalloc.sensitivity.sections import driver_sections, limit_sections, trust_sections
+from tolalloc.sensitivity.sentences import assumptions, sentences, summary, warnings
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, SobolIndices, order_contribution
 from tolalloc.sensitivity.target import TargetSensitivity
@@ -137,64 +141,46 @@ class RankingAnswer(Answer):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """Who drives the leading output, each order and the units out of the limits."""
-        from tolalloc.sensitivity.sentences import sentences
-
         return sentences(self)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on the answer."""
-        from tolalloc.sensitivity.sentences import warnings
-
         return warnings(self)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Drivers, limits, and what the answer rests on."""
-        from tolalloc.sensitivity.sections import driver_sections, limit_sections, trust_sections
-
         return (*driver_sections(self), *limit_sections(self), *trust_sections(self))
 
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
-        from tolalloc.sensitivity.sentences import assumptions
-
         return assumptions(self)
 
     @cached_property
     def ranking(self) -> pd.DataFrame:
         """The ranking of the leading output."""
-        from tolalloc.sensitivity.driver_tables import ranking_table
-
         return ranking_table(self)
 
     @cached_property
     def requirements(self) -> pd.DataFrame:
         """Every output with its distribution, capability and yield."""
-        from tolalloc.sensitivity.limit_tables import capability_table
-
         return capability_table(self)
 
     @cached_property
     def rejects(self) -> pd.DataFrame:
         """What the units outside have in common."""
-        from tolalloc.sensitivity.limit_tables import reject_table
-
         return reject_table(self)
 
     @cached_property
     def alone(self) -> pd.DataFrame:
         """How far each zone may open alone."""
-        from tolalloc.sensitivity.limit_tables import inverse_table
-
         return inverse_table(self)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The whole answer for a program, units in the names."""
-        from tolalloc.sensitivity.sentences import summary
-
         return summary(self)
 
 

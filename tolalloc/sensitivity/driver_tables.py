@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.report.feature_frame import Frames
-from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.sensitivity.answer import RankingAnswer
 
 
 def _blocks(pair: Neighbours | None) -> str:

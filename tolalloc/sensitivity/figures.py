@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.report.wording import quantity, sign_of
-from tolalloc.sensitivity.answer import RankingAnswer
+
+if TYPE_CHECKING:
+    from tolalloc.sensitivity.answer import RankingAnswer
 
 _SHOWN = 24
 """Rows of a picture; the table has all [-]."""

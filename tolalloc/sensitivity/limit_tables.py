@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
@@ -9,8 +11,10 @@ from jaxtyping import Float
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.report.wording import quantity, unit_of
-from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.sensitivity.answer import RankingAnswer
 
 
 def capability_table(answer: RankingAnswer) -> pd.DataFrame:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pandas as pd
 
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.report.document import Section
 from tolalloc.sensitivity import driver_tables, figures, limit_tables
-from tolalloc.sensitivity.answer import RankingAnswer
+
+if TYPE_CHECKING:
+    from tolalloc.sensitivity.answer import RankingAnswer
 
 
 def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.report.wording import quantity, sign_of
-from tolalloc.sensitivity.answer import RankingAnswer
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+if TYPE_CHECKING:
+    from tolalloc.sensitivity.answer import RankingAnswer
 
 _RARE = 1000.0
 """Units of a million from which a share is said in percent [-]."""

@@ -9,6 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from tolalloc.allocation.answer.dimensions import dimensions_table
+from tolalloc.allocation.answer.drawing import drawing_table, drawn_sources, sources_to_go_on_from, write_drawing
+from tolalloc.allocation.answer.sections import sections
+from tolalloc.allocation.answer.sentences import assumptions, sentences, warnings
+from tolalloc.allocation.answer.tables import requirements_table
 from tolalloc.allocation.candidates import Candidates
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
 from tolalloc.allocation.design_space import DesignSpace
@@ -136,37 +141,27 @@ class AllocationAnswer(Answer):
     @cached_property
     def drawn_sources(self) -> tuple[Source, ...]:
         """All sources of the tolerance table at the zones of the drawing, with process, grade and cost."""
-        from tolalloc.allocation.answer.drawing import drawn_sources
-
         return drawn_sources(self)
 
     @cached_property
     def drawing(self) -> Drawing:
         """The drawing as the next study takes it, with the cost of every zone as it is made."""
-        from tolalloc.allocation.answer.drawing import sources_to_go_on_from
-
         errors = replace(self.space.errors, sources=sources_to_go_on_from(self))
         return Drawing(name=f"{self.header.name}, allocated", errors=errors)
 
     @cached_property
     def drawing_table(self) -> pd.DataFrame:
         """The drawing in short: zone, grade, process, share of the variance and cost of every source."""
-        from tolalloc.allocation.answer.drawing import drawing_table
-
         return drawing_table(self)
 
     @cached_property
     def dimensions_table(self) -> pd.DataFrame:
         """The drawing with one line per dimension, which all members of a group share."""
-        from tolalloc.allocation.answer.dimensions import dimensions_table
-
         return dimensions_table(self)
 
     @cached_property
     def requirements_table(self) -> pd.DataFrame:
         """Every limited side with what each design was shown to keep, and what the limit costs."""
-        from tolalloc.allocation.answer.tables import requirements_table
-
         return requirements_table(self)
 
     @property
@@ -188,29 +183,21 @@ class AllocationAnswer(Answer):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """The answer in sentences, each no stronger than what was computed."""
-        from tolalloc.allocation.answer.sentences import sentences
-
         return sentences(self)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on the answer."""
-        from tolalloc.allocation.answer.sentences import warnings
-
         return warnings(self)
 
     @cached_property
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
-        from tolalloc.allocation.answer.sentences import assumptions
-
         return assumptions(self)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """The sections of the report."""
-        from tolalloc.allocation.answer.sections import sections
-
         return sections(self)
 
     @cached_property
@@ -270,8 +257,6 @@ class AllocationAnswer(Answer):
 
     def add_files(self, folder: Path) -> None:
         """Write ``allocation.csv``, which is read back, and ``drawing.xlsx``, which goes on calculating."""
-        from tolalloc.allocation.answer.drawing import write_drawing
-
         write_drawing(self, folder)
 
 

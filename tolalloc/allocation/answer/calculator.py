@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import floor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,6 @@ from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.drawings.callouts import callout
@@ -25,6 +25,9 @@ from tolalloc.report.excel import Formula, keep_values
 from tolalloc.report.feature_frame import FeatureFrame
 from tolalloc.report.wording import unit_of
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 _FIRST = 2
 """Row of the first entry below the header."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.report.feature_frame import FeatureFrame, Frames
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.wording import short, with_unit
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 _SAME = 1e-9
 """Relative difference up to which two zones are the same [-]."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.calculator import calculator_sheets, style_calculator
 from tolalloc.allocation.answer.dimensions import frames_of
 from tolalloc.allocation.cost.process_costs_file import today
@@ -19,6 +19,9 @@ from tolalloc.report.feature_frame import write_frames
 from tolalloc.report.wording import unit_of
 from tolalloc.report.writer import write_csv
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 
 def drawn_sources(answer: AllocationAnswer) -> tuple[Source, ...]:

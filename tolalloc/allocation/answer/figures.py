@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.answer import tables
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.trade import SettingTrade
 from tolalloc.report.figure import Figure, HeatMap, Series
 from tolalloc.report.wording import quantity, short, unit_of, with_unit
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 
 def front_figure(answer: AllocationAnswer, fronts: Fronts) -> Figure:

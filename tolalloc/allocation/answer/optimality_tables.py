@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.tables import searches, solver_noise
 from tolalloc.allocation.candidates import GRADES
 from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.pareto import Front
 from tolalloc.report.wording import short, unit_of
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 
 def certificate_table(answer: AllocationAnswer) -> pd.DataFrame:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.before_after import units_figure, zones_figure
 from tolalloc.allocation.answer.dimensions import effects_figure
 from tolalloc.allocation.answer.drawing import full_drawing_table
@@ -13,6 +14,9 @@ from tolalloc.allocation.guarantee import AtYield
 from tolalloc.report.document import Section
 from tolalloc.report.wording import quantity, short, unit_of, with_unit
 from tolalloc.sensitivity.driver_tables import sobol_table
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 
 def sections(answer: AllocationAnswer) -> tuple[Section, ...]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.callouts import callout_assumptions
 from tolalloc.report.wording import short, unit_of, with_unit
 from tolalloc.surrogate.regression import NEEDED_Q2
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""

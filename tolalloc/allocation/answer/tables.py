@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.candidates import ALONE, GRADES
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.local_model import Side
@@ -14,6 +15,9 @@ from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.report.wording import short, unit_of
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 _ROUNDING = 1e-6
 """Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.robustness import Robustness
 from tolalloc.allocation.trade import SettingTrade
 from tolalloc.report.wording import quantity, unit_of
 from tolalloc.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.allocation.answer.answer import AllocationAnswer
 
 
 def trade_table(trade: SettingTrade) -> pd.DataFrame:

@@ -11,6 +11,11 @@ from jaxtyping import Float
 
 from tolalloc.assembly.angular.allocation import AngularAllocation, AngularVerification
 from tolalloc.assembly.angular.tuning import PrecisionCost, RetunedAllocation
+from tolalloc.assembly.answer.cautions import assumptions, warnings
+from tolalloc.assembly.answer.sections import sections
+from tolalloc.assembly.answer.sentences import sentences
+from tolalloc.assembly.answer.summary import summary
+from tolalloc.assembly.answer.tables import characteristic_table
 from tolalloc.assembly.gains import Gains
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AssemblyPlan
@@ -88,41 +93,29 @@ class AssemblyAnswer(Answer):
     @property
     def sentences(self) -> tuple[str, ...]:
         """What adjusting is worth, each sentence no stronger than what was computed."""
-        from tolalloc.assembly.answer.sentences import sentences
-
         return sentences(self)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        from tolalloc.assembly.answer.cautions import warnings
-
         return warnings(self)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Steps, precision, transmission, tolerances, finite rotations."""
-        from tolalloc.assembly.answer.sections import sections
-
         return sections(self)
 
     @cached_property
     def characteristics(self) -> pd.DataFrame:
         """Tilt and rotation of every characteristic before and after adjusting."""
-        from tolalloc.assembly.answer.tables import characteristic_table
-
         return characteristic_table(self)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
-        from tolalloc.assembly.answer.cautions import assumptions
-
         return assumptions(self)
 
     @property
     def summary(self) -> dict[str, Any]:
         """The answer for a program, units in the names."""
-        from tolalloc.assembly.answer.summary import summary
-
         return summary(self)

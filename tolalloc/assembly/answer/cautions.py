@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.tables import MISSED, at_precision, has_limits, larger
 from tolalloc.assembly.answer.tolerance_tables import is_retuned, limited_tolerances
 from tolalloc.assembly.answer.transmission import risen
 from tolalloc.units import ARCSECOND
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 
 WHY_LARGER = (
     "Discs that are turned against each other share the load unequally: at a small torque one carries alone and hides "

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.answer import tables, tolerance_tables, transmission
-from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.cautions import WHY_LARGER
 from tolalloc.assembly.answer.summary import finite_difference
 from tolalloc.assembly.answer.tables import at_precision, larger, norm_of, states, tilt_and_rotation
@@ -16,6 +17,9 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure, Series
 from tolalloc.units import ARCSECOND
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 
 _EXPECTED = (
     "No part is measured yet, so angles and turns below are three standard deviations of what is expected; noise is "

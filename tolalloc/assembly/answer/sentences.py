@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.tables import at_precision, norm_of
 from tolalloc.assembly.answer.tolerance_tables import is_priced, is_retuned, limited_tolerances, verified_name
 from tolalloc.assembly.answer.transmission import LINE_LOAD, PIN_FORCE, RATED_PEAK_TO_PEAK, answers, change, perfect
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.units import ARCSECOND
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 
 LITTLE = 0.01
 """Share of all final angles below which another unit of precision buys little [-]."""

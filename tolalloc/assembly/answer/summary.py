@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.assembly.answer import tables, tolerance_tables
-from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.tables import has_limits
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, adjustable, efforts
 from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 
 
 def summary(answer: AssemblyAnswer) -> dict[str, Any]:

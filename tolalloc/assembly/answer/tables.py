@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.answer import AdjustedParts, AssemblyAnswer
 from tolalloc.assembly.steps import adjustable
 from tolalloc.units import ARCSECOND
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AdjustedParts, AssemblyAnswer
 
 READ = 2
 """Digits behind the point of an arcsecond that a bench can turn or read [-]."""

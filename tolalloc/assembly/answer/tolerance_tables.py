@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem
-from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.answer.tables import has_limits, rounded
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.units import ARCSECOND
+
+if TYPE_CHECKING:
+    from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer
 
 _NOTHING = 1e-6
 """Share of the cost below which one filter is as cheap as another; solvers differ by less [-]."""

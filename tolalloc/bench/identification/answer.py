@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.bench.identification import exhibits
 from tolalloc.bench.identification.data import PEAK_TO_PEAK, AllReadings
 from tolalloc.bench.identification.gauss_newton import Identified
 from tolalloc.bench.identification.information import Information
@@ -234,8 +235,6 @@ class IdentificationAnswer(Answer):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Sections in the order of the questions that a reader has."""
-        from tolalloc.bench.identification import exhibits
-
         polynomial = self.polynomial
         parameters = Section(
             heading="Parameters",

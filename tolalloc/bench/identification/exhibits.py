@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
-from tolalloc.bench.identification.answer import IdentificationAnswer
 from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, ReadingBlock
 from tolalloc.bench.identification.information import LEVEL
 from tolalloc.bench.identification.parameters import BIAS, Parameter
 from tolalloc.report.figure import Figure, Series
 from tolalloc.units import ARCSECOND, DEGREE
+
+if TYPE_CHECKING:
+    from tolalloc.bench.identification.answer import IdentificationAnswer
 
 _OPEN = 10.0  # width of an interval of a logarithm beyond which it says nothing [-]
 _TOP = 4.0  # a profile is drawn up to so many times its threshold

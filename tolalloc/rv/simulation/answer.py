@@ -13,6 +13,8 @@ from jaxtyping import Float, Int
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section
 from tolalloc.rv.reducer.design import Reducer
+from tolalloc.rv.simulation.figures import error_figure, run_figures
+from tolalloc.rv.simulation.sentences import range_text, sentences, warnings
 from tolalloc.units import ARCSECOND, DEGREE, RPM
 
 if TYPE_CHECKING:
@@ -85,22 +87,16 @@ class SimulationAnswer(Answer):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """The answer in a few sentences."""
-        from tolalloc.rv.simulation.sentences import sentences
-
         return sentences(self)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        from tolalloc.rv.simulation.sentences import warnings
-
         return warnings(self)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Headings with their paragraphs, figures and tables."""
-        from tolalloc.rv.simulation.figures import error_figure, run_figures
-
         return (
             Section(
                 heading="The last whole crank turns",
@@ -280,11 +276,6 @@ class SimulationAnswer(Answer):
         """Carrier angle [deg], transmission error in motion and at rest [arcsec]."""
         angle = self.series.carrier_angle[self.at_rest.steps] / DEGREE
         return angle, self.transmission_error / ARCSECOND, self.at_rest.transmission_error / ARCSECOND
-
-
-def range_text(least: int, most: int) -> str:
-    """Return a range of counts as people write it."""
-    return f"{least}" if least == most else f"{least}…{most}"
 
 
 def _contact_cells(contacts: tuple[tuple[int, int], ...]) -> dict[str, str]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.simulation.answer import SimulationAnswer
 from tolalloc.units import RPM
+
+if TYPE_CHECKING:
+    from tolalloc.rv.simulation.answer import SimulationAnswer
 
 _POINTS = 2000
 """Points of a line, about two for every dot of a screen; the file of the whole series has all [-]."""

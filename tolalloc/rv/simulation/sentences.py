@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tolalloc.rv.simulation.answer import SimulationAnswer, range_text
 from tolalloc.units import ARCSECOND, DEGREE, RPM
+
+if TYPE_CHECKING:
+    from tolalloc.rv.simulation.answer import SimulationAnswer
 
 COARSE = 20
 """Time steps per pin pass below which a wave is not drawn well [-]."""
@@ -21,6 +25,11 @@ NEAR = 1.25
 """Ratio of an excitation to the lowest natural frequency, up or down, that counts as near [-]."""
 TURNING_BACK = -0.45
 """Correlation of successive changes below which a quantity turns back at every step; −0.5 has noise [-]."""
+
+
+def range_text(least: int, most: int) -> str:
+    """Return a range of counts as people write it."""
+    return f"{least}" if least == most else f"{least}…{most}"
 
 
 def sentences(results: SimulationAnswer) -> tuple[str, ...]:
