@@ -1,4 +1,4 @@
-"""One output of a response with its derivatives by central differences, where no exact ones are known."""
+"""One output with its derivatives: exact ones where the model knows them, else central differences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,34 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Response, SettingDerivatives
+from tolalloc.models import Evaluation, Model, Response, ResponseWithDerivatives, SettingDerivatives
+
+_STEP = 0.02
+"""Step of a difference by a column over its standard deviation [-]."""
+
+
+def derived(model: Model, output: str, deviation: Float[np.ndarray, " column"]) -> ResponseWithDerivatives:
+    """Return an output of a model with its derivatives by the columns, whose standard deviations make the steps."""
+    if output in model.exact:
+        return _Exact(model=model, output=output)
+    return DifferencedResponse(response=model.reading((output,)), output=output, steps=_STEP * deviation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exact:
+    """An output with the exact derivatives that its model knows."""
+
+    model: Model
+    output: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The model's columns."""
+        return self.model.columns
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the output of every sample and its derivatives."""
+        return self.model.derivatives(self.output, x)
 
 
 @dataclass(frozen=True, kw_only=True)

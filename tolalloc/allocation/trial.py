@@ -13,7 +13,7 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
 from tolalloc.capability.worst_unit import worst_unit
-from tolalloc.differences import DifferencedResponse
+from tolalloc.differences import derived
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
@@ -21,8 +21,6 @@ from tolalloc.models import Evaluation, Model, ResponseWithDerivatives, SettingD
 
 _SCALE_STEP = 0.05
 """Step of a scale to either side, over the scale [-]."""
-_COLUMN_STEP = 0.02
-"""Step of a column to either side, over its standard deviation [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,10 +189,7 @@ class FreshUnits:
 
     def _differentiable(self, output: str) -> ResponseWithDerivatives:
         """Return the output at the design with derivatives by the columns, exact ones where the model knows them."""
-        response = self._at(self.design).reading((output,))
-        if isinstance(response, ResponseWithDerivatives):
-            return response
-        return DifferencedResponse(response=response, output=output, steps=_COLUMN_STEP * self.x.std(axis=0))
+        return derived(self._at(self.design), output, self.x.std(axis=0))
 
     def _at(self, design: Float[np.ndarray, " variable"]) -> Model:
         return self.model.at(self.space.settings_of(design))

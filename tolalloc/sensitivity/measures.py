@@ -6,19 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-from jaxtyping import Float
-
 from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
-from tolalloc.differences import DifferencedResponse
+from tolalloc.differences import derived
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Model, Response, ResponseWithDerivatives, SettingDerivatives
+from tolalloc.models import Model, Response, ResponseWithDerivatives
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
@@ -33,25 +30,6 @@ from tolalloc.surrogate.validation import Candidate
 
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
-_STEP = 0.02
-"""Step of a difference by a column over its standard deviation [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Exact:
-    """An output with the exact derivatives that its model knows."""
-
-    model: Model
-    output: str
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The model's columns."""
-        return self.model.columns
-
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return the output of every sample and its derivatives."""
-        return self.model.derivatives(self.output, x)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,11 +125,7 @@ class Measures:
 
     def derived(self, sample: MonteCarlo) -> ResponseWithDerivatives:
         """Return the leading output with its derivatives, exact ones if the model knows them."""
-        if self.leading in self.model.exact:
-            return _Exact(model=self.model, output=self.leading)
-        return DifferencedResponse(
-            response=self.response, output=self.leading, steps=_STEP * sample.x[sample.evaluation.good].std(axis=0)
-        )
+        return derived(self.model, self.leading, sample.x[sample.evaluation.good].std(axis=0))
 
     def moments(self, sample: MonteCarlo) -> MomentIndependent:
         """Return PAWN and delta of the first units of a sample."""
