@@ -40,10 +40,31 @@ _STEPS = 10
 _CURVED_STEPS = 16  # under a curved law, whose stiffness changes with every step
 DEEPEST = 2.5
 """ln(λ/depth) of the deepest line contact that is solved here; no pin is pressed nearly so far [-]."""
-_FITTED = 60.0  # the same, up to which the first guess is fitted; beyond are pins that bend
-# Polynomials in ln(λ/depth) whose quotient is w within 6e-6 of it, between these two; the highest power first
-_GUESS_ABOVE = (1.005474163226404, 43.38101546887862, 233.56651878989643, 23.804776956823332, -126.06674351599219)
-_GUESS_BELOW = (1.0, 38.406473312790936, 134.0172497759548, -42.19423112046455)
+_FITTED = (5.0, 40.0)
+"""The same, between which w is a quotient of two polynomials; elsewhere are contacts that hardly touch [-]."""
+# Polynomials in ln(λ/depth) whose quotient is w within 3e-15 of it; the highest power first
+_ABOVE = (
+    5.672391747372849e-07,
+    0.0001299594283366941,
+    0.007869168757409338,
+    0.16762474883751757,
+    1.3152282419323045,
+    3.208371600720944,
+    -0.0405589794698379,
+    -2.926977775381174,
+    0.22754703860728592,
+)
+_BELOW = (
+    1e-12,
+    5.660080962424214e-07,
+    0.00012637603146998638,
+    0.007277723649627696,
+    0.1416246660138495,
+    0.9440256812267587,
+    1.6378491713093841,
+    -0.5558535883401736,
+    -0.62195314420652,
+)
 _BEYOND = 1.000001  # of the way to the next contact
 ALL = 2**WIDTH - 1
 """One bit for every lane."""
@@ -120,21 +141,21 @@ def _line_contact(stiffness, log_length, depth):
     """Return force, stiffness and one bit per lane that is pressed too far, of Hertzian line contact at depths above 0.
 
     The law of `tolalloc.rv.cycloid.solvers.contact_law`: w − ln w = ln(λ/depth), F = c·depth/w with c twice the
-    stiffness. One of Halley's steps triples the digits of the first guess and so ends at rounding. Quotients share
-    their denominators: a division takes as long as ten products.
+    stiffness k, and dF/d(depth) = c/(w − 1). Quotients share their denominators: a division takes as long as ten
+    products.
     """
     one = spread(1.0)
     goal = subtract(log_length, logarithm(depth))
     far = above(spread(DEEPEST), goal)
     goal = larger(goal, spread(DEEPEST))
-    w = divide(_polynomial(_GUESS_ABOVE, goal), _polynomial(_GUESS_BELOW, goal))
-    beyond = above(goal, spread(_FITTED))
-    if beyond:
-        w = choose(beyond, _halley(add(goal, logarithm(add(goal, one))), goal), w)
-    w = _halley(w, goal)
-    below = subtract(w, one)
-    scale = divide(add(stiffness, stiffness), multiply(w, below))
-    return multiply(multiply(scale, below), depth), multiply(scale, w), far
+    p, q = _polynomial(_ABOVE, goal), _polynomial(_BELOW, goal)  # w = p/q
+    elsewhere = above(goal, spread(_FITTED[1])) | above(spread(_FITTED[0]), goal)
+    if elsewhere:
+        w = _halley(_halley(_halley(add(goal, logarithm(add(goal, one))), goal), goal), goal)
+        p, q = choose(elsewhere, w, p), choose(elsewhere, one, q)
+    below = subtract(p, q)
+    scale = divide(multiply(add(stiffness, stiffness), q), multiply(p, below))
+    return multiply(multiply(scale, below), depth), multiply(scale, p), far
 
 
 @jit_in_place
