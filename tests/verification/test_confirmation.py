@@ -61,6 +61,7 @@ def at(share: float) -> float:
 
 SHOWN = ta.AtYield(TARGET)
 EACH = np.sqrt(TARGET)
+GAIN = 0.005
 ON_THE_LIMIT = {
     "one limit": ({GAP: ta.Limit(upper=at(TARGET), show=SHOWN)}, None),
     "jointly, one with both sides": (
@@ -77,11 +78,11 @@ def test_of_designs_just_at_their_limit_no_more_than_the_stated_error_are_drawn(
     study = prepared(*ON_THE_LIMIT[limits])
     design, costs = designed(study), count(10)
 
-    def another(kind, judged, attempt):
+    def another(kind, judged, attempt, worth):
         return kind, replace(design, cost=float(next(costs)))
 
     answers = [
-        confirm(judge_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another)
+        confirm(judge_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another, GAIN)
         for seed in range(ANSWERS)
     ]
     drawn = sum(found.drawn is not None for found in answers)
@@ -121,21 +122,23 @@ def test_with_the_full_effort_designs_two_percent_inside_are_confirmed_in_most_c
     assert np.mean(confirmed) > 0.8
 
 
-def test_of_what_was_confirmed_one_cheaper_design_is_tried_and_a_miss_changes_nothing():
+def test_after_a_confirmed_design_cheaper_ones_are_tried_and_a_miss_costs_nothing():
     study = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
     design = designed(study)
     beyond = replace(design, design=3.0 * design.design, cost=0.5 * design.cost)
+    between = replace(design, design=1.01 * design.design, cost=0.9 * design.cost)
     asked = []
 
-    def cheaper(kind, judged, attempt):
-        asked.append(judged.confirmed)
-        return kind, beyond
+    def cheaper(kind, judged, attempt, worth):
+        asked.append((judged.confirmed, worth / design.cost))
+        following = {1: beyond, 2: between}.get(attempt)
+        return (kind, following) if following else None
 
-    found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper)
-    assert [(kind, own.confirmed) for kind, own in found.judged] == [("table", True), ("table", False)]
-    assert found.drawn == found.judged[0]
-    assert found.last("table") is found.judged[0][1]
-    assert asked == [True]
+    found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper, GAIN)
+    assert [(kind, own.confirmed) for kind, own in found.judged] == [("table", True), ("table", False), ("table", True)]
+    assert found.drawn == found.judged[2]
+    assert found.last("table") is found.judged[2][1]
+    assert asked == [(True, 1 - GAIN), (False, 1 - GAIN), (True, pytest.approx(0.9 * (1 - GAIN)))]
 
 
 def test_as_many_units_are_allowed_to_fail_as_leave_the_error(generator):

@@ -30,11 +30,11 @@ class Confirmed:
         return next((design for name, design in reversed(self.judged) if name == kind), None)
 
 
-Following = Callable[[str, VerifiedDesign, int], tuple[str, VerifiedDesign] | None]
-"""Makes of a kind, a judged design of it and its attempt what its search would try next, with the kind of that."""
+Following = Callable[[str, VerifiedDesign, int, float], tuple[str, VerifiedDesign] | None]
+"""Makes of a kind, a judged design of it and its attempt what its search would try next below a cost, with its kind."""
 
 
-def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: Following) -> Confirmed:
+def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: Following, gain: float) -> Confirmed:
     """Return the cheapest design that fresh units confirm.
 
     Parameters
@@ -45,28 +45,28 @@ def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: F
         Kind → design that its search holds for good.
     following
         Gives a cheaper design after a confirmed one, a safer one after any other; none where there is no such design.
+    gain
+        Relative gain of cost that a design must promise to be made once another one is confirmed [-].
 
     Notes
     -----
     The cheapest design that was not yet judged is judged next, those last that what was judged speaks against. After
-    one that is confirmed cheaper ones are tried, until the first miss.
+    one that is confirmed only cheaper ones are.
     """
     waiting, judged, doubtful = dict(candidates), list[tuple[str, VerifiedDesign]](), set[str]()
     drawn: tuple[str, VerifiedDesign] | None = None
     for attempt in range(1, ATTEMPTS + 1):
-        doubted = doubtful if drawn is None else set[str]()
-        kind = min(waiting, key=lambda own, late=doubted: (own in late, waiting[own].cost), default=None)  # type: ignore[misc]
+        kind = min(waiting, key=lambda own: (own in doubtful, waiting[own].cost), default=None)
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
         found = judge.judge(waiting.pop(kind), attempt)
         judged.append((kind, found))
         if found.confirmed:
             drawn = (kind, found)
-        elif drawn:
-            break
         else:
             doubtful |= {name for name, own in waiting.items() if _speaks_against(found, own)}
-        if attempt < ATTEMPTS and (after := following(kind, found, attempt)):
+        worth = (1 - gain) * drawn[1].cost if drawn else np.inf
+        if attempt < ATTEMPTS and (after := following(kind, found, attempt, worth)):
             name, design = after
             waiting[name] = design
             doubtful.discard(name)

@@ -48,8 +48,8 @@ from tolalloc.sensitivity.sobol_analysis import SobolIndices
 _REACH = 1.1
 """Factor by which a variable may change from a judged design to the next one [-]."""
 _MARGIN = 1.0
-"""How far inside what must be shown the next design is aimed, half as far again after each miss but the first [standard
-errors of what its units and those of the judged one say]."""
+"""How far inside what must be shown the next design is aimed, half as far again after each miss but the first while
+nothing is confirmed [standard errors of what its units and those of the judged one say]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -190,11 +190,11 @@ class DrawingQuestion:
         promising = {name: own for name, own in admitted.items() if own.met} or {
             name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
         }
-        result = confirm(judge, promising, partial(self._following, found, judge))
+        result = confirm(judge, promising, partial(self._following, found, judge), self.effort.gain)
         return found.with_confirmed(result, self.model.drawn_amounts)
 
     def _following(
-        self, found: Candidates, judge: Judge, kind: str, judged: VerifiedDesign, attempt: int
+        self, found: Candidates, judge: Judge, kind: str, judged: VerifiedDesign, attempt: int, worth: float
     ) -> tuple[str, VerifiedDesign] | None:
         """Return the design that the search of a judged one would try next, none where it would try no other.
 
@@ -203,7 +203,7 @@ class DrawingQuestion:
         searches = {ALONE: found.fixed, FREE: found.free}
         if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
             kind = FREE
-        margin = judge.margin(judged, _MARGIN * (1.0 if judged.confirmed else (1 + attempt) / 2))
+        margin = judge.margin(judged, _MARGIN * (1.0 if np.isfinite(worth) else (1 + attempt) / 2))
         seen = judge.foreseen(judged, attempt + 1)
         if kind == GRADES and found.graded:
             design = choice_beside(self.model.drawn_amounts, seen, found.graded.tried[1:], margin)
@@ -211,7 +211,6 @@ class DrawingQuestion:
             design = step_from(seen, search.tried, margin, _REACH)
         else:
             return None
-        worth = (1 - self.effort.gain) * judged.cost if judged.confirmed else np.inf
         if design is None or judged.space.cost(design) > worth:
             return None
         space = self.space if kind == FREE else judged.space
