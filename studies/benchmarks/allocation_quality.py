@@ -46,12 +46,23 @@ RIVALS = ("table", "proportional", *ALGORITHMS)
 
 
 def undercut(answer: AllocationAnswer) -> bool:
-    """Return whether a verified design of a report costs less than a bound printed there."""
+    """Return whether a verified design of a report costs less than a bound printed there.
+
+    What fresh units judged after its search, and did not confirm, is not verified.
+    """
+    tried = (*answer.free.tried, *(answer.graded.tried if answer.graded else ()))
+    refused = [own.design for own in tried if own.confirming is not None and not own.met]
     found = [(answer.bound, own) for own in answer.candidates.admitted().values()]
     found += [(answer.free.bound, own) for own in answer.free.tried]
     if answer.graded:
         found += [(answer.graded.bound, own) for own in answer.graded.tried[1:]]
-    return any(bound is not None and own.met and own.cost < bound * (1 - ROUNDING) for bound, own in found)
+    return any(
+        bound is not None
+        and own.met
+        and own.cost < bound * (1 - ROUNDING)
+        and not any(np.array_equal(own.design, design) for design in refused)
+        for bound, own in found
+    )
 
 
 def judged(

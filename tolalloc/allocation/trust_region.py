@@ -13,6 +13,8 @@ from tolalloc.allocation.verification import VerifiedDesign, Verifier
 
 _SIMILAR = (1.25, 1.0)
 """Ratio of scales, and difference of settings over ten steps of theirs, up to which designs share their models [-]."""
+_REPAIRS = 3
+"""Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
 _EXPLAINED = 2.0
 """Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
@@ -100,7 +102,7 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     start
         A verified design to start from.
     steps
-        Largest number of verified designs [-].
+        Largest number of verified designs, but for up to three that mend the last one [-].
     reach
         Factor by which a variable may change in the first step [-].
 
@@ -110,8 +112,10 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     """
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.sides)), space.process_positions(start.design)
-    for step in range(steps):
+    for step in range(steps + _REPAIRS):
         last = tried[-1]
+        if step >= steps and not _is_worth_mending(tried):
+            break
         stacks = aimed(last, tried)
         processes = programs.choose(stacks, processes)
         found = programs.step(stacks, processes, last.design, reach)
@@ -122,6 +126,12 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
         if not _explains(last, tried[-1]):
             reach = max(1.25, float(np.sqrt(reach)))
     return tuple(tried[1:])
+
+
+def _is_worth_mending(tried: list[VerifiedDesign]) -> bool:
+    """Return whether the last design keeps not all limits and is cheaper than every one that does."""
+    kept = [own.cost for own in tried if own.met]
+    return not tried[-1].met and tried[-1].cost < (1 - SETTLED) * min(kept, default=np.inf)
 
 
 def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
