@@ -34,7 +34,7 @@ from tolalloc.rv.equivalent.solvers.lanes import (
     store,
     subtract,
 )
-from tolalloc.rv.equivalent.solvers.tile import displace_nothing
+from tolalloc.rv.equivalent.solvers.tile import FOUR, displace_nothing
 
 _STEPS = 10
 _CURVED_STEPS = 16  # under a curved law, whose stiffness changes with every step
@@ -274,8 +274,9 @@ def settle(law, discs, tables, v, tile, done):
 
 
 @jit_within
-def solve_tile_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful):
-    """Solve the ``used`` samples of a tile at one node from the guesses in ``tile.q``; set which need more care."""
+def solve_tile_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, tile, careful):
+    """Solve the first samples of a tile at one node from the guesses in ``tile.q``; set which need more care."""
+    used = (samples + FOUR - 1) // FOUR * FOUR
     displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, tile)
     here = LaneTables(
         Common(tables.stiffness[at]),
@@ -285,7 +286,7 @@ def solve_tile_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, us
         Common(tables.contact_log_length[at]),
     )
     width = tile.q.shape[1]
-    for v in range(0, used, WIDTH):
+    for v in range(0, samples, WIDTH):
         bits = settle(law, discs, here, v, tile, 0)
         for lane in range(WIDTH):
             careful[v + lane] = (bits >> lane) & 1

@@ -104,7 +104,7 @@ def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, 
     guess = np.empty(size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
-        solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, used, tile, careful)
+        solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, tile, careful)
         _take_over(samples, angle, tile, turn)
         for s in range(samples):
             if finite[s] and (careful[s] or tilted[s]):
