@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tests.studies.test_allocate_command import script_with
 from tolalloc import kept_units
 from tolalloc.cli.progress import Lines
 from tolalloc.report import writer
+from tolalloc.report.folder import claimed
 
 COMPARED = ("summary.json", "allocation.csv", "tables/drawing.csv", "tables/front.csv")
 KEPT = ".tolalloc-units"
@@ -76,6 +78,29 @@ def test_a_report_fills_an_empty_folder_that_stands_there(tmp_path):
     result = tolalloc("te", "--reducer", "rv20e_liu2020", "--out", tmp_path / "mine")
     assert result.returncode == 0, result.stderr
     assert {"report.html", "manifest.json"} <= left(tmp_path / "mine")
+    assert left(tmp_path) == {"mine"}
+
+
+def test_what_a_killed_writer_left_is_cleared_by_the_next_one(tmp_path):
+    writing = f"""
+from pathlib import Path
+from tolalloc.report.folder import claimed
+with claimed(Path({str(tmp_path / "mine")!r})) as folder:
+    (folder / "report.html").write_text("half")
+    print("writing", flush=True)
+    input()
+"""
+    words = [sys.executable, "-c", writing]
+    with subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout.readline() == "writing\n"
+        with claimed(tmp_path / "mine") as other:  # the first writer lives, so what it has stays
+            (other / "whole").touch()
+            assert len(left(tmp_path)) == 3
+        running.kill()
+    (tmp_path / "mine" / "whole").unlink()
+    assert len(left(tmp_path)) == 2
+    with claimed(tmp_path / "mine"):
+        assert len(left(tmp_path)) == 2
     assert left(tmp_path) == {"mine"}
 
 

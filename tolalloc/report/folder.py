@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import platform
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +12,10 @@ from shutil import move, rmtree
 from tempfile import mkdtemp
 
 from tolalloc.exceptions import RunFolderError
+
+
+_UNFINISHED = ".unfinished"
+"""How the name of a folder ends that is being filled."""
 
 
 def require_usable(folder: Path | None) -> None:
@@ -38,7 +44,8 @@ def require_usable(folder: Path | None) -> None:
 def claimed(folder: Path) -> Iterator[Path]:
     """Give a folder beside the wanted one to fill, which takes its place once the work inside has succeeded.
 
-    The wanted folder is made before anything long runs; if the work fails, nothing of either is left.
+    The wanted folder is made before anything long runs; if the work fails, nothing of either is left. What a killed
+    process of this machine left beside the same folder is cleared.
 
     Raises
     ------
@@ -49,7 +56,9 @@ def claimed(folder: Path) -> Iterator[Path]:
     new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        beside = Path(mkdtemp(prefix=f".{folder.name}-", suffix=".unfinished", dir=folder.absolute().parent))
+        _clear_left(folder)
+        own = f".{folder.name}-{_machine()}-{os.getpid()}-"
+        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.absolute().parent))
     except OSError as error:
         raise RunFolderError(
             f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
@@ -70,6 +79,32 @@ def claimed(folder: Path) -> Iterator[Path]:
         if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         raise
+
+
+def _clear_left(folder: Path) -> None:
+    """Remove what processes of this machine that are no more left unfinished beside a folder."""
+    written = re.compile(rf"\.{re.escape(folder.name)}-{re.escape(_machine())}-(\d+)-\w+{re.escape(_UNFINISHED)}")
+    for path in folder.absolute().parent.iterdir():
+        if (found := written.fullmatch(path.name)) and _is_gone(int(found[1])):
+            rmtree(path, ignore_errors=True)
+
+
+def _is_gone(process: int) -> bool:
+    """Return whether a process has ended; where that cannot be asked nothing is said to have."""
+    if os.name != "posix":
+        return False
+    try:
+        os.kill(process, 0)  # asks and does no more
+    except ProcessLookupError:
+        return True
+    except OSError:  # somebody else's
+        return False
+    return False
+
+
+def _machine() -> str:
+    """Return the name of this machine; several may fill one folder."""
+    return re.sub(r"\W", "_", platform.node()) or "machine"
 
 
 def _umask() -> int:
