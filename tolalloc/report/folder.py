@@ -13,7 +13,6 @@ from tempfile import mkdtemp
 
 from tolalloc.exceptions import RunFolderError
 
-
 _UNFINISHED = ".unfinished"
 """How the name of a folder ends that is being filled."""
 
@@ -74,7 +73,9 @@ def claimed(folder: Path) -> Iterator[Path]:
             for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
                 move(path, folder / path.name)
             beside.rmdir()
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, OSError) and error.filename is None:
+            error.filename = str(folder)  # a full disk does not say where it is
         rmtree(beside, ignore_errors=True)
         if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
