@@ -48,6 +48,15 @@ def _write_commands(_: Any) -> None:
     subprocess.run([*typer, "--title", "Commands", "--output", str(page)], check=True, stdout=subprocess.DEVNULL)
 
 
+def _write_files(_: Any) -> None:
+    """Write the page of files beside it, from the records that read them."""
+    sys.path.insert(0, str(HERE))
+    from files_page import page
+
+    (HERE / "_made" / "files.md").write_text(page(), encoding="utf-8")
+
+
 def setup(app: Any) -> None:
     """Make the pages that no hand writes before Sphinx reads them."""
     app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
+    app.connect("builder-inited", _write_files, priority=101)

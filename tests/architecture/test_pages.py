@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import re
 import sys
@@ -12,6 +13,8 @@ from types import ModuleType
 import pytest
 
 import tolalloc as ta
+from tolalloc import exceptions
+from tolalloc.start.schema import KINDS, schema
 from tolalloc.study.prepared import Prepared
 
 ROOT = Path(__file__).parents[2]
@@ -97,3 +100,22 @@ def test_the_help_of_a_public_record_says_what_its_fields_are(record):
     stated = re.findall(r"^(\w+(?:, \w+)*)$", section, re.MULTILINE)
     named = {name for line in stated for name in line.split(", ")}
     assert {own.name for own in fields(record) if own.init} <= named
+
+
+def test_the_page_of_files_says_every_field_of_every_kind(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    page = importlib.import_module("files_page").page()
+    for kind in KINDS:
+        found = schema(kind)
+        for table in (found, *found.get("$defs", {}).values()):
+            for field in table.get("properties", {}):
+                assert f"| `{field}` |" in page
+    assert "| `crank_count` | whole number | 2 to 6 |  |" in page
+    assert "| `contact_angle_deg` | number | 0 or more, below 90 | `0.0` |" in page
+
+
+def test_the_page_of_public_names_lists_every_error():
+    page = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    for name, kind in vars(exceptions).items():
+        if inspect.isclass(kind) and issubclass(kind, exceptions.TolallocError):
+            assert re.search(rf"`[\w.]*{name}`", page)
