@@ -228,6 +228,17 @@ class ToleranceRow(Record):
             write=lambda source: source.over / MILLIMETRE if source.over else None,
         ),
     ] = None
+    drawing: Annotated[
+        str,
+        Column(
+            "number and revision of the drawing that states the zone; shown beside the id in tables of reports",
+            attribute="drawing",
+        ),
+    ] = ""
+    label: Annotated[
+        str,
+        Column("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
+    ] = ""
     note: Annotated[str, Column("carried through", attribute="note")] = ""
 
     @property

@@ -72,7 +72,8 @@ class Source:
         Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
     over
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
-    part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, note
+    part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, drawing,
+    label, note
         As `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may state.
     """
 
@@ -101,6 +102,8 @@ class Source:
     group: str = ""
     locked: bool = False
     grade: str = ""
+    drawing: str = ""
+    label: str = ""
     note: str = ""
 
     @cached_property

@@ -32,7 +32,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """Number that is a thousand times as large where the sign separates thousands."""
 
 
-_TEXTS = ("id", "part", "group", "process", "grade", "note", "sources", "label")
+_TEXTS = ("id", "part", "group", "process", "grade", "drawing", "label", "note", "sources")
 """Columns whose cells are no numbers, whatever they look like."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.files.no_formula` writes before a text."""

@@ -130,6 +130,28 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.Dat
     return pd.DataFrame(table_rows(sources, folder), columns=list(HEADERS.values()))
 
 
+def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
+    """Return a table with the drawing and the label of its rows behind their names, where the drawing states any.
+
+    Parameters
+    ----------
+    frame
+        A table.
+    named
+        Header of its column of names.
+    members
+        Name → its sources.
+    """
+    for field in ("label", "drawing"):
+        said = [
+            ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members.get(name, ())))))
+            for name in frame[named]
+        ]
+        if any(said):
+            frame.insert(list(frame.columns).index(named) + 1, field, said)
+    return frame
+
+
 def table_text(sources: Sequence[Source], folder: Path | None = None) -> str:
     """Return the sources as the CSV file that `load_tolerance_table` reads."""
     text = StringIO(newline="")

@@ -9,6 +9,7 @@ import pandas as pd
 
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.report.feature_frame import Frames
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
@@ -60,12 +61,13 @@ def ranking_table(answer: RankingAnswer) -> pd.DataFrame:
     frame = sobol_table(answer.indices)
     zones = dict(zip((source.name for source in answer.errors.active), answer.errors.zones / MICROMETRE, strict=False))
     sens = dict(zip(answer.local.sources, answer.local.root_mean_square, strict=True))
-    return frame.assign(
+    frame = frame.assign(
         **{
             "zone [µm]": [zones.get(name, np.nan) for name in frame["source"]],
             f"Sens, root mean square [{answer.unit}/µm]": [sens.get(name, np.nan) for name in frame["source"]],
         }
     )
+    return with_own_words(frame, "source", {own.name: (own,) for own in answer.errors.active})
 
 
 def dimensions_table(answer: RankingAnswer, found: SobolIndices) -> pd.DataFrame:
@@ -88,7 +90,7 @@ def dimensions_table(answer: RankingAnswer, found: SobolIndices) -> pd.DataFrame
                 "alone (first-order index) [%]": max(found.first[at], 0.0) * 100,
             }
         )
-    return pd.DataFrame(rows)
+    return with_own_words(pd.DataFrame(rows), "dimension", members)
 
 
 def pairs_table(answer: RankingAnswer) -> pd.DataFrame:

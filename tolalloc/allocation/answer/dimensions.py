@@ -10,6 +10,7 @@ import pandas as pd
 
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.report.feature_frame import FeatureFrame, Frames
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.wording import short, with_unit
@@ -63,7 +64,7 @@ def dimensions_table(answer: AllocationAnswer) -> pd.DataFrame:
                 "locked": first["locked"],
             }
         )
-    frame = pd.DataFrame(rows)
+    frame = with_own_words(pd.DataFrame(rows), "dimension", dimensions(answer))
     said = {"grade": "", "process before": "as today", "process": "as today", "locked": "no"}
     return frame.drop(columns=[name for name, nothing in said.items() if (frame[name].isin([nothing, ""])).all()])
 

@@ -13,7 +13,7 @@ from tolalloc.allocation.answer.dimensions import frames_of
 from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.drawings.fields import HEADERS
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.tolerance_table import table_frame
+from tolalloc.drawings.tolerance_table import table_frame, with_own_words
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.feature_frame import write_frames
 from tolalloc.report.wording import unit_of
@@ -91,7 +91,7 @@ def drawing_table(answer: AllocationAnswer) -> pd.DataFrame:
                 "locked": "yes" if before.locked else "no",
             }
         )
-    return pd.DataFrame(rows)
+    return with_own_words(pd.DataFrame(rows), "source", {own.name: (own,) for own in answer.space.errors.sources})
 
 
 def _slopes(answer: AllocationAnswer) -> dict[str, float]:

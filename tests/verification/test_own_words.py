@@ -1,0 +1,71 @@
+"""What a user's drawings call a source is kept from the table to the answers and back into a table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tolalloc as ta
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
+
+ZONE = {"plus": 20.0, "minus": -20.0, "unit": "µm", "min": 5.0, "max": 100.0, "cost": 1.0}
+ROWS = (
+    {"id": "a", "label": "Hülse Ø55", "drawing": "4711-B", "group": "sleeves", **ZONE},
+    {"id": "b", "drawing": "4711-B", "group": "sleeves", **ZONE},
+    {"id": "c", **ZONE},
+)
+
+
+def summed(a, b, c):
+    return a + b + c
+
+
+def study(rows) -> ta.Study:
+    return ta.Study(
+        ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",)),
+        ta.Drawing.of_rows(rows),
+        limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)},
+        questions=[ta.Allocation(front=False, what_if=False)],
+    )
+
+
+@pytest.fixture(scope="module")
+def answers():
+    asked = study(ROWS)
+    return asked.rank(effort="quick"), asked.allocate(effort="quick")
+
+
+def test_label_and_drawing_stand_beside_the_id(answers):
+    ranking, allocation = answers
+    for frame in (ranking.ranking, allocation.drawing_table):
+        found = frame.set_index("source")
+        at = list(frame.columns).index("source")
+        assert list(frame.columns[at : at + 3]) == ["source", "drawing", "label"]
+        assert found.loc["a", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
+        assert found.loc["b", ["drawing", "label"]].tolist() == ["4711-B", ""]
+        assert found.loc["c", ["drawing", "label"]].tolist() == ["", ""]
+    dimensions = allocation.dimensions_table.set_index("dimension")
+    assert dimensions.loc["sleeves", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
+
+
+def test_they_are_in_the_written_drawing_and_read_back(answers, tmp_path):
+    allocation = answers[1]
+    allocation.save(tmp_path / "found")
+    written = load_tolerance_table(tmp_path / "found" / "allocation.csv")
+    assert [(source.drawing, source.label) for source in written] == [("4711-B", "Hülse Ø55"), ("4711-B", ""), ("", "")]
+    page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
+    assert page.count("Hülse Ø55") >= 2
+    book = pd.read_excel(tmp_path / "found" / "drawing.xlsx", sheet_name=None, header=None, dtype=str)
+    assert any(np.any(sheet.to_numpy() == "Hülse Ø55") for sheet in book.values())
+
+
+def test_a_number_of_a_drawing_stays_a_text(tmp_path):
+    text = table_text(study(ROWS).drawing.sources).replace("4711-B", "0815")
+    (tmp_path / "zones.csv").write_text(text, encoding="utf-8")
+    assert [source.drawing for source in load_tolerance_table(tmp_path / "zones.csv")] == ["0815", "0815", ""]
+
+
+def test_a_table_without_them_has_no_empty_columns():
+    bare = [{name: value for name, value in row.items() if name not in ("label", "drawing")} for row in ROWS]
+    assert not {"label", "drawing"} & {*study(bare).rank(effort="quick").ranking.columns}
