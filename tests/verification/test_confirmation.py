@@ -13,6 +13,7 @@ import tolalloc as ta
 from tolalloc.allocation.confirmation import ATTEMPTS, confirm
 from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.judging import Judge, confidence_of_fewer, error_of
+from tolalloc.allocation.searches import _still_kept
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree
@@ -210,3 +211,18 @@ def test_quick_answers_do_not_lose_a_drawing_that_is_just_good_enough():
     )
     met = [replace(study, seed=seed).allocate(effort="quick").met for seed in range(1, 25)]
     assert sum(met) >= 22  # 18 where four nearly equal designs were judged one after the other
+
+
+def test_after_a_miss_a_design_counts_that_stays_inside_with_what_the_missed_one_says():
+    study = prepared({GAP: ta.Limit(upper=at(TARGET), show=SHOWN)})
+    cheap, seeds = designed(study), SeedTree(8)
+    known = {"space": study.space, "model": study.model, "requirements": study.requirements}
+    verifier = Verifier(**known, seeds=seeds, units=1200)
+    inside = verifier.verify(0.6 * cheap.design, "inside")
+    wider = verifier.verify(1.4 * cheap.design, "wider")
+    assert (inside.met, wider.met) == (True, False)
+    assert _still_kept((inside, wider), cheap) == (inside,)
+    # What a judged one says with a small error, that all near it lie far beyond the limit, counts more.
+    (side,) = cheap.sides
+    beyond = replace(side, stack=replace(side.stack, budget=side.stack.budget - 100.0), standard_error=1e-6)
+    assert not _still_kept((inside,), replace(cheap, checks=(replace(cheap.checks[0], sides=(beyond,)),)))
