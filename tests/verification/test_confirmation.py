@@ -12,8 +12,8 @@ from scipy.stats import binom, norm
 import tolalloc as ta
 from tolalloc.allocation.confirmation import ATTEMPTS, confirm
 from tolalloc.allocation.effort import AllocationEffort
+from tolalloc.allocation.following import _still_kept
 from tolalloc.allocation.judging import Judge, confidence_of_fewer, error_of
-from tolalloc.allocation.searches import _still_kept
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree

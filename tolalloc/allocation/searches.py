@@ -10,16 +10,16 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.candidates import ALIKE, ALONE, FREE, GRADES, TABLE, Candidates
+from tolalloc.allocation.candidates import ALONE, FREE, GRADES, Candidates
 from tolalloc.allocation.confirmation import confirm
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
+from tolalloc.allocation.following import NextDesign
 from tolalloc.allocation.fronts import Fronts, exact_front, searched_front
 from tolalloc.allocation.graded import (
     GradedAllocation,
     allocate_grades,
-    choice_beside,
     group_options,
     with_shared_zones,
 )
@@ -31,8 +31,8 @@ from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.robustness import Robustness, robustness
 from tolalloc.allocation.search import ZoneAllocation, allocate, require_groups
 from tolalloc.allocation.trade import SettingTrade, setting_trade
-from tolalloc.allocation.trust_region import kept_stacks, step_from
-from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
+from tolalloc.allocation.trust_region import kept_stacks
+from tolalloc.allocation.verification import Verifier, answer
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import Experiment
@@ -45,11 +45,6 @@ from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
-_REACH = 1.1
-"""Factor by which a variable may change from a judged design to the next one [-]."""
-_MARGIN = 1.0
-"""How far inside what must be shown the next design is aimed while nothing is confirmed, half as far again after each
-miss but the first [standard errors of what its units and those of the judged one say]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -190,47 +185,15 @@ class DrawingQuestion:
         promising = {name: own for name, own in admitted.items() if own.met} or {
             name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
         }
-        result = confirm(judge, promising, partial(self._following, found, judge), self.effort.gain)
+        following = NextDesign(
+            found=found,
+            judge=judge,
+            drawn=self.model.drawn_amounts,
+            space=self.space,
+            verifier=partial(self.verifier, "confirmation"),
+        )
+        result = confirm(judge, promising, following, self.effort.gain)
         return found.with_confirmed(result, self.model.drawn_amounts)
-
-    def _following(
-        self, found: Candidates, judge: Judge, kind: str, judged: VerifiedDesign, attempt: int, worth: float
-    ) -> tuple[str, VerifiedDesign] | None:
-        """Return the design that the search of a judged one would try next, none where it would try no other.
-
-        After a miss that may be one that the search has tried, where it is cheaper than what the models make.
-
-        From a drawing that no search made and that is not good enough, the search for free zones goes on.
-        """
-        searches = {ALONE: found.fixed, FREE: found.free}
-        if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
-            kind = FREE
-        margin = judge.margin(judged, self._errors_inside(judged, attempt, worth))
-        seen = judge.foreseen(judged, attempt + 1)
-        if kind == GRADES and found.graded:
-            tried = found.graded.tried[1:]
-            design = choice_beside(self.model.drawn_amounts, seen, tried, margin)
-        elif search := searches.get(kind):
-            tried = search.tried
-            design = step_from(seen, tried, margin, _REACH)
-        else:
-            return None
-        known = () if judged.confirmed else _still_kept(tried, seen)
-        cheapest = min(known, key=lambda own: own.cost, default=None)
-        if cheapest and cheapest.cost <= worth and (design is None or cheapest.cost < judged.space.cost(design)):
-            return kind, cheapest
-        if design is None or judged.space.cost(design) > worth:
-            return None
-        space = self.space if kind == FREE else judged.space
-        return kind, self.verifier("confirmation", space).verify(design, f"beside attempt {attempt}")
-
-    def _errors_inside(self, judged: VerifiedDesign, attempt: int, worth: float) -> float:
-        """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""
-        if np.isinf(worth):  # nothing is confirmed
-            return _MARGIN * (1 + attempt) / 2
-        # A miss costs nothing then, so at even odds the next one is aimed at the limit itself, but after a miss.
-        errors = _MARGIN * 2 * (0.5 - self.effort.error)
-        return errors if judged.confirmed else max(errors, _MARGIN / 2)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -296,23 +259,6 @@ class DrawingQuestion:
             SobolEffort(start=blocks, limit=blocks),
             factor_groups=factor_groups,
         ).of(leading)
-
-
-def _still_kept(tried: tuple[VerifiedDesign, ...], judged: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
-    """Return the designs of a search that were met, and still are with what a judged one says of them.
-
-    What both say is weighed by their variances.
-    """
-    return tuple(
-        own
-        for own in tried
-        if own.met
-        and own.confirming is None
-        and all(
-            side.excess * other.standard_error**2 + other.predicted(own.design) * side.standard_error**2 <= 0
-            for side, other in zip(own.sides, judged.sides, strict=True)
-        )
-    )
 
 
 def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
