@@ -221,7 +221,7 @@ def test_after_a_miss_a_design_counts_that_stays_inside_with_what_the_missed_one
     inside = verifier.verify(0.6 * cheap.design, "inside")
     wider = verifier.verify(1.4 * cheap.design, "wider")
     assert (inside.met, wider.met) == (True, False)
-    assert _still_kept((inside, wider), cheap) == (inside,)
+    assert _still_kept((inside, wider, cheap), cheap) == (inside,)  # and never the judged one again
     # What a judged one says with a small error, that all near it lie far beyond the limit, counts more.
     (side,) = cheap.sides
     beyond = replace(side, stack=replace(side.stack, budget=side.stack.budget - 100.0), standard_error=1e-6)

@@ -74,15 +74,15 @@ class NextDesign:
 
 
 def _still_kept(tried: tuple[VerifiedDesign, ...], judged: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
-    """Return the designs of a search that were met, and still are with what a judged one says of them.
+    """Return the dearer designs of a search that were met, and still are with what a judged one says of them.
 
-    What both say is weighed by their variances.
+    What both say is weighed by their variances. A design that was judged before is no dearer than the one after it.
     """
     return tuple(
         own
         for own in tried
         if own.met
-        and own.confirming is None
+        and own.cost > judged.cost
         and all(
             side.excess * other.standard_error**2 + other.predicted(own.design) * side.standard_error**2 <= 0
             for side, other in zip(own.sides, judged.sides, strict=True)
