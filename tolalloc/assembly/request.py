@@ -19,7 +19,7 @@ from tolalloc.assembly.orientations import transmission_effect
 from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
@@ -78,8 +78,7 @@ def prepare_assembly(
     InputError, UnknownNameError
         The argument, or the file, row, field and value that are not allowed.
     """
-    if seed < 0:
-        raise InputError.of_argument("assembly", "seed", seed, "0 or a positive integer")
+    require_seed("assembly", seed)
     if precision is not None and not 0 <= precision <= LARGEST_PRECISION:
         raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_PRECISION:g}")
     plan = load_plan(chain)

@@ -8,7 +8,7 @@ from pathlib import Path
 from tolalloc.assembly.mounting.answer import MountingAnswer
 from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.stock import PartStock, load_parts
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
@@ -44,8 +44,7 @@ def prepare_mounting(
     InputError, UnknownNameError
         The argument, or the file, row, field and value that are not allowed.
     """
-    if seed < 0:
-        raise InputError.of_argument("mounting", "seed", seed, "0 or a positive integer")
+    require_seed("mounting", seed)
     if not 1 <= starts <= MOST_STARTS:
         raise InputError.of_argument("mounting", "starts", starts, f"1 to {MOST_STARTS}")
     design = load_reducer(reducer)

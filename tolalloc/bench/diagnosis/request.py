@@ -14,7 +14,7 @@ from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.bench.measurement.readings import ANGLE, TRANSMISSION_ERROR, load_readings
 from tolalloc.blas import one_blas_thread
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress, RunRecord
 from tolalloc.report.answer import Header
@@ -56,10 +56,10 @@ class DiagnosisRequest:
             ("discrepancy_arcsec", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
             ("angle_offset_deg", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
             ("level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
-            ("seed", self.seed, self.seed >= 0, "0 or a positive integer"),
         ):
             if not good:
                 raise InputError.of_argument(PLACE, name, value, allowed)
+        require_seed(PLACE, self.seed)
 
 
 def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAnswer:

@@ -17,7 +17,7 @@ from tolalloc.bench.identification.problem import IdentificationProblem, require
 from tolalloc.bench.identification.profile import estimates, profile
 from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoice, bootstrap, judged, simplest
 from tolalloc.bench.measurement.files import Measurements
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.progress import Progress
 from tolalloc.report.answer import Header
@@ -53,8 +53,7 @@ class IdentificationRequest:
         for name in names:
             if names.count(name) > 1:
                 raise InputError.of_argument(place, "parameters", name, "each parameter once")
-        if self.seed < 0:
-            raise InputError.of_argument(place, "seed", self.seed, "0 or a positive integer")
+        require_seed(place, self.seed)
 
 
 def identify(
