@@ -19,8 +19,8 @@ TITLES = {
 }
 HEAD = """# Files
 
-The TOML files that you write, field by field. A name ends in its unit; springs without one are in N/m
-and N·m/rad. What is not listed is refused by name, and the
+The TOML files that you write, field by field. A name ends in its unit; springs without one are in N/m.
+What is not listed is refused by name, and the
 nearest field is offered. `tolalloc schema KIND` prints the same for an editor, which then offers the fields. Tables of
 tolerances are explained in [the first study](../first-study.md).
 
@@ -92,6 +92,8 @@ def _allowed(field: dict[str, Any]) -> str:
 
 def _default(field: dict[str, Any]) -> str:
     """Return what counts where a field is left out."""
+    if "description" in field:
+        return str(field["description"]).removesuffix(", unless given")
     value = field.get("default")
     if isinstance(value, dict):
         return "as its fields say"

@@ -67,6 +67,8 @@ def schema(kind: str) -> dict[str, Any]:
     for table in (found, *found.get("$defs", {}).values()):
         for own in table.get("properties", {}).values():
             own.pop("title", None)  # pydantic's, the name once more
-        table.get("properties", {}).get("disc_spacing_mm", {}).pop("default", None)  # the face width, unless given
+        if spacing := table.get("properties", {}).get("disc_spacing_mm"):
+            del spacing["default"]
+            spacing["description"] = "the face width, unless given"
     title = f"{kind} file of tolalloc"
     return {**found, "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
