@@ -69,8 +69,8 @@ class InputError(TolallocError):
 
     def as_option(self, command: str, option: str) -> InputError:
         """Return the error as somebody needs it who gave an option of a command."""
-        _, _, said = str(self).partition(self.argument)
-        return InputError(f"{command}: {option}{said}")
+        _, _, said = str(self).partition(f": {self.argument} is ")
+        return InputError(f"{command}: {option} is {said}")
 
 
 class UnknownNameError(TolallocError):

@@ -13,12 +13,8 @@ import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
 from tests.studies.scripts import study_script
-from tolalloc.bench.diagnosis.request import DiagnosisRequest
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.exceptions import InputError
-from tolalloc.rv.reducer.files import load_reducer
 
 STUDY = ROOT / "studies" / "rv20e_allocation.py"
 PEAK = "peak-to-peak transmission error [arcsec]"
@@ -410,27 +406,3 @@ def test_the_script_runs_by_itself(tmp_path):
     command = [sys.executable, str(copy), "--quick", "--out", str(tmp_path / "busy")]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     refused(result, "busy", "not empty")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["diagnose", "x.csv", "--noise", "70"], "tolalloc diagnose: --noise is 70.0; allowed is above 0 up to 60."),
-        (["modify", "li2018", "--radial", "-5"], "tolalloc modify: --radial is '-5 µm'; allowed is 0 to 1000 µm."),
-        (["simulate", "--torque", "5"], "tolalloc simulate: --torque is 5.0"),
-        (["assemble", "rv20e", "--seed", "-1"], "tolalloc assemble: --seed is -1"),
-    ],
-)
-def test_a_command_says_its_option_where_the_package_says_an_argument(words, said):
-    refused(tolalloc(*words), said)
-
-
-def test_the_package_says_its_argument():
-    with pytest.raises(InputError, match=r"^diagnosis: noise_arcsec is 70; allowed is above 0 up to 60\.$") as error:
-        DiagnosisRequest(
-            curve=Path("x.csv"),
-            reducer=load_reducer("rv20e"),
-            errors=ErrorModel(load_tolerance_table("rv20e_baseline")),
-            noise_arcsec=70,
-        )
-    assert error.value.argument == "noise_arcsec"
