@@ -37,9 +37,8 @@ class NextDesign:
     ) -> tuple[str, VerifiedDesign] | None:
         """Return the design that the search of a judged one would try next, none where it would try no other.
 
-        After a miss that may be one that the search has tried, where it is cheaper than what the models make.
-
-        From a drawing that no search made and that is not good enough, the search for free zones goes on.
+        After a miss that may be one that the search has tried, where it is cheaper than what the models make. From a
+        drawing that no search made and that is not good enough, the search for free zones goes on.
         """
         found = self.found
         searches = {ALONE: found.fixed, FREE: found.free}
@@ -76,7 +75,7 @@ class NextDesign:
 def _still_kept(tried: tuple[VerifiedDesign, ...], judged: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
     """Return the dearer designs of a search that were met, and still are with what a judged one says of them.
 
-    What both say is weighed by their variances. A design that was judged before is no dearer than the one after it.
+    What both say is weighed by their variances. The judged one itself is none of them.
     """
     return tuple(
         own

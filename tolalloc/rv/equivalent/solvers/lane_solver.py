@@ -41,7 +41,7 @@ _CURVED_STEPS = 16  # under a curved law, whose stiffness changes with every ste
 DEEPEST = 2.5
 """ln(λ/depth) of the deepest line contact that is solved here; no pin is pressed nearly so far [-]."""
 _FITTED = (5.0, 40.0)
-"""The same, between which w is a quotient of two polynomials; elsewhere are contacts that hardly touch [-]."""
+"""The same, between which w is a quotient of two polynomials; contacts elsewhere hardly touch, or bend [-]."""
 # Polynomials in ln(λ/depth) whose quotient is w within 3e-15 of it; the highest power first
 _ABOVE = (
     5.672391747372849e-07,
