@@ -10,10 +10,11 @@ import pytest
 from scipy.stats import binom, norm
 
 import tolalloc as ta
+from tolalloc.allocation.attempts import FIRST
 from tolalloc.allocation.confirmation import ATTEMPTS, confirm
 from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.following import _still_kept
-from tolalloc.allocation.judging import Judge, confidence_of_fewer, error_of
+from tolalloc.allocation.judging import Judge, confidence_of_fewer
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree
@@ -92,20 +93,42 @@ def test_of_designs_just_at_their_limit_no_more_than_the_stated_error_are_drawn(
     assert drawn > 0
 
 
-def test_the_errors_of_all_designs_add_up_to_less_than_the_one_stated():
-    spent = [error_of(ERROR, attempt) for attempt in range(1, ATTEMPTS + 1)]
+@pytest.mark.slow
+def test_a_confirmed_design_gives_its_error_back_and_no_more_answers_are_wrong():
+    """Of 400 answers, each with a design well inside and then as many just at the limit as it may judge."""
+    study = prepared(*ON_THE_LIMIT["one limit"])
+    at_limit = designed(study)
+    inside = replace(at_limit, design=0.5 * at_limit.design, cost=100.0)
+
+    def another(kind, judged, attempt, worth):
+        return kind, replace(at_limit, cost=10.0 - attempt.number)
+
+    answers = [confirm(judge_of(study, seed), {"inside": inside}, another, GAIN) for seed in range(ANSWERS)]
+    assert all(found.judged[0][1].confirmed for found in answers)
+    second = {found.judged[1][1].confidence for found in answers if found.judged[1][1].confirmed}
+    assert second == {1 - FIRST.error(ERROR)}
+    wrong = sum(found.drawn[1].cost < inside.cost for found in answers)
+    assert 0 < wrong <= ERROR * ANSWERS + 3 * np.sqrt(ERROR * (1 - ERROR) * ANSWERS)
+
+
+def test_the_errors_of_designs_that_are_not_confirmed_add_up_to_less_than_the_one_stated():
+    attempt, spent = FIRST, []
+    for confirmed in (False, True, True, False, False, False):
+        spent.append(0.0 if confirmed else attempt.error(ERROR))
+        attempt = attempt.after(confirmed=confirmed)
     assert 0.99 * ERROR < sum(spent) < ERROR
+    assert (attempt.number, attempt.missed) == (7, 4)
 
 
 def test_a_design_well_inside_is_confirmed_and_one_far_beyond_given_up_early():
     inside = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
     beyond = prepared({GAP: ta.Limit(upper=at(0.85), show=SHOWN)})
-    found, lost = (judge_of(study, 1).judge(designed(study), 1) for study in (inside, beyond))
+    found, lost = (judge_of(study, 1).judge(designed(study), FIRST) for study in (inside, beyond))
     assert (found.confirmed, lost.confirmed) == (True, False)
     # Few units are near the wide limit, so as many are drawn as may be; a quarter of all finds the other one hopeless.
     assert found.achieved.units == 8 * UNITS
     assert (len(found.sample.x), len(lost.sample.x)) == (308, 77)
-    assert found.confidence == 1 - error_of(ERROR, 1)
+    assert found.confidence == 1 - FIRST.error(ERROR)
     assert lost.confidence == confidence_of_fewer(found.confidence, 77, 308)
     assert lost.confidence == pytest.approx(norm.cdf(norm.ppf(found.confidence) / 2))
     for side in (*found.sides, *lost.sides):
@@ -119,7 +142,7 @@ def test_with_the_full_effort_designs_two_percent_inside_are_confirmed_in_most_c
     limit = at(target) / 0.98
     study = prepared({GAP: ta.Limit(upper=limit, show=ta.AtYield(target))})
     design = designed(study)
-    confirmed = [judge_of(study, seed, effort.confirmation_units).judge(design, 1).confirmed for seed in range(100)]
+    confirmed = [judge_of(study, seed, effort.confirmation_units).judge(design, FIRST).confirmed for seed in range(100)]
     assert np.mean(confirmed) > 0.8
 
 
@@ -132,7 +155,7 @@ def test_after_a_confirmed_design_cheaper_ones_are_tried_and_a_miss_costs_nothin
 
     def cheaper(kind, judged, attempt, worth):
         asked.append((judged.confirmed, worth / design.cost))
-        following = {1: beyond, 2: between}.get(attempt)
+        following = {2: beyond, 3: between}.get(attempt.number)
         return (kind, following) if following else None
 
     found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper, GAIN)

@@ -10,6 +10,7 @@ from scipy.stats import multinomial
 
 from tests.verification.test_confirmation import GAP, SHOWN, TARGET, at, designed, judge_of, prepared
 from tolalloc.allocation import judging
+from tolalloc.allocation.attempts import FIRST
 from tolalloc.allocation.screen import Screen
 from tolalloc.capability.monte_carlo import allowed_rejections, proportion
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
@@ -88,6 +89,6 @@ def test_a_screen_that_knows_nothing_fools_nobody(call, monkeypatch):
     called = (lambda x: np.zeros(len(x), bool)) if call == "nothing near" else (lambda x: (x[:, 1] * 1e7) % 1 < share)
     monkeypatch.setattr(judging.Screen, "of", lambda _: blind)
     monkeypatch.setattr(judging.Screen, "__call__", lambda _, x: called(x))
-    confirmed = sum(judge_of(study, seed).judge(design, 1).confirmed for seed in range(400))
-    error = judging.error_of(0.05, 1)
+    confirmed = sum(judge_of(study, seed).judge(design, FIRST).confirmed for seed in range(400))
+    error = FIRST.error(0.05)
     assert confirmed <= 400 * error + 3 * np.sqrt(400 * error * (1 - error))

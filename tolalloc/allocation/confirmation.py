@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tolalloc.allocation.attempts import FIRST, Attempt
 from tolalloc.allocation.judging import Judge
 from tolalloc.allocation.verification import VerifiedDesign
 
@@ -30,8 +31,9 @@ class Confirmed:
         return next((design for name, design in reversed(self.judged) if name == kind), None)
 
 
-Following = Callable[[str, VerifiedDesign, int, float], tuple[str, VerifiedDesign] | None]
-"""Makes of a kind, a judged design of it and its attempt what its search would try next below a cost, with its kind."""
+Following = Callable[[str, VerifiedDesign, Attempt, float], tuple[str, VerifiedDesign] | None]
+"""Makes of a kind and a judged design of it what its search would try next, as which attempt, below a cost; with its
+kind."""
 
 
 def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: Following, gain: float) -> Confirmed:
@@ -55,7 +57,8 @@ def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: F
     """
     waiting, judged, doubtful = dict(candidates), list[tuple[str, VerifiedDesign]](), set[str]()
     drawn: tuple[str, VerifiedDesign] | None = None
-    for attempt in range(1, ATTEMPTS + 1):
+    attempt = FIRST
+    while attempt.number <= ATTEMPTS:
         kind = min(waiting, key=lambda own: (own in doubtful, waiting[own].cost), default=None)
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
@@ -66,7 +69,8 @@ def confirm(judge: Judge, candidates: Mapping[str, VerifiedDesign], following: F
         else:
             doubtful |= {name for name, own in waiting.items() if _speaks_against(found, own)}
         worth = (1 - gain) * drawn[1].cost if drawn else np.inf
-        if attempt < ATTEMPTS and (after := following(kind, found, attempt, worth)):
+        attempt = attempt.after(confirmed=found.confirmed)
+        if attempt.number <= ATTEMPTS and (after := following(kind, found, attempt, worth)):
             name, design = after
             waiting[name] = design
             doubtful.discard(name)

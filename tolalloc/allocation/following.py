@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tolalloc.allocation.attempts import Attempt
 from tolalloc.allocation.candidates import ALIKE, ALONE, FREE, GRADES, TABLE, Candidates
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import choice_beside
@@ -33,7 +34,7 @@ class NextDesign:
     verifier: Callable[[DesignSpace], Verifier]  # Returns what makes the models of a design
 
     def __call__(
-        self, kind: str, judged: VerifiedDesign, attempt: int, worth: float
+        self, kind: str, judged: VerifiedDesign, attempt: Attempt, worth: float
     ) -> tuple[str, VerifiedDesign] | None:
         """Return the design that the search of a judged one would try next, none where it would try no other.
 
@@ -45,7 +46,7 @@ class NextDesign:
         if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
             kind = FREE
         margin = self.judge.margin(judged, self._errors_inside(judged, attempt, worth))
-        seen = self.judge.foreseen(judged, attempt + 1)
+        seen = self.judge.foreseen(judged, attempt)
         if kind == GRADES and found.graded:
             tried = found.graded.tried[1:]
             design = choice_beside(self.drawn, seen, tried, margin)
@@ -61,12 +62,12 @@ class NextDesign:
         if design is None or judged.space.cost(design) > worth:
             return None
         space = self.space if kind == FREE else judged.space
-        return kind, self.verifier(space).verify(design, f"beside attempt {attempt}")
+        return kind, self.verifier(space).verify(design, f"attempt {attempt.number}")
 
-    def _errors_inside(self, judged: VerifiedDesign, attempt: int, worth: float) -> float:
+    def _errors_inside(self, judged: VerifiedDesign, attempt: Attempt, worth: float) -> float:
         """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""
         if np.isinf(worth):  # nothing is confirmed
-            return _MARGIN * (1 + attempt) / 2
+            return _MARGIN * (1 + attempt.missed) / 2
         # A miss costs nothing then, so at even odds the next one is aimed at the limit itself, but after a miss.
         errors = _MARGIN * 2 * (0.5 - self.judge.error)
         return errors if judged.confirmed else max(errors, _MARGIN / 2)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from tolalloc.allocation.attempts import Attempt
 from tolalloc.allocation.guarantee import AtYield, Level, Sampled, reached
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check
@@ -21,8 +22,6 @@ from tolalloc.models import Evaluation, Model, Response
 
 AS_GOOD_AS = 4
 """Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""
-_SPENT = 0.75
-"""Share of the error left that a design may spend [-]."""
 _LOOKS = (0.25, 0.5, 1.0)
 """Shares of the units after which a design may be given up; it is confirmed after the last one alone [-]."""
 _WHATEVER = 0.6
@@ -30,19 +29,6 @@ _WHATEVER = 0.6
 _MOST_DRAWN = 8
 """Drawn units for each solved one, at most; more would hardly place the limit better [-]."""
 _EVEN_ODDS = 0.5
-
-
-def error_of(error: float, attempt: int) -> float:
-    """Return the error that one design may spend [-].
-
-    Parameters
-    ----------
-    error
-        Probability with which an answer may be wrong [-].
-    attempt
-        Number of the design, from 1; each may spend three quarters of what those before it left [-].
-    """
-    return error * _SPENT * (1 - _SPENT) ** (attempt - 1)
 
 
 def confidence_of_fewer(confidence: float, units: int, final: int) -> float:
@@ -63,10 +49,9 @@ class Judge:
 
     Notes
     -----
-    Every design has fresh units, their number fixed beforehand, and an error of its own; the errors add up to less than
-    the one stated (Bonferroni), however the designs were found and whichever is taken in the end. All requirements must
-    be shown, each with the whole error of the design: one that misses a requirement is wrongly confirmed only if that
-    one is wrongly shown.
+    Every design has fresh units, their number fixed beforehand, and an error of its own
+    (`tolalloc.allocation.attempts`). All requirements must be shown, each with the whole error of the design: one that
+    misses a requirement is wrongly confirmed only if that one is wrongly shown.
 
     Where yields are asked for, many more units are drawn than solved: what lies near a limit is solved, of the others
     only some (`tolalloc.capability.near_limit`).
@@ -78,7 +63,7 @@ class Judge:
     error: float  # Probability with which the answer may be wrong [-]
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
 
-    def judge(self, design: VerifiedDesign, attempt: int) -> VerifiedDesign:
+    def judge(self, design: VerifiedDesign, attempt: Attempt) -> VerifiedDesign:
         """Return a design with what its fresh units say of it.
 
         Parameters
@@ -86,7 +71,7 @@ class Judge:
         design
             A design with the local models of its search.
         attempt
-            Number of designs judged for this answer, with this one [-].
+            Which of the answer's designs it is.
 
         Raises
         ------
@@ -100,7 +85,11 @@ class Judge:
         """
         with one_blas_thread():  # the same units are near for any number of threads
             screen = Screen.of(design)
-        final, seeds, found = self._drawn(design, screen, attempt), self.seeds.child(f"attempt {attempt}"), design
+        final, seeds, found = (
+            self._drawn(design, screen, attempt),
+            self.seeds.child(f"attempt {attempt.number}"),
+            design,
+        )
         if final.whatever == final.units:
             screen = None
         solved: list[_Solved] = []
@@ -109,17 +98,17 @@ class Judge:
             solved.append(self._solved(design, screen, seeds.child(f"look {look}"), _more(wanted, solved)))
             together = _joined(solved)
             require_few_failures(together.plain, f"{design.name}, confirmation", self.largest_failed_share)
-            confidence = confidence_of_fewer(1 - error_of(self.error, attempt), wanted.whatever, final.whatever)
+            confidence = confidence_of_fewer(1 - attempt.error(self.error), wanted.whatever, final.whatever)
             found = _judged(design, together, confidence)
             if _is_hopeless(found):
                 break
         return replace(found, confirmed=found.met and wanted == final)
 
-    def foreseen(self, judged: VerifiedDesign, attempt: int) -> VerifiedDesign:
+    def foreseen(self, judged: VerifiedDesign, attempt: Attempt) -> VerifiedDesign:
         """Return a judged design as its units stand against the limits at the error of another attempt."""
         if judged.confirming is None:
             return judged
-        return replace(judged, checks=_checks(judged, judged.confirming, 1 - error_of(self.error, attempt)))
+        return replace(judged, checks=_checks(judged, judged.confirming, 1 - attempt.error(self.error)))
 
     def margin(self, judged: VerifiedDesign, errors: float) -> float:
         """Return how far inside a limit the next design must be aimed [standard errors of the judged one].
@@ -133,7 +122,7 @@ class Judge:
         final = self.units if solved.whatever == solved.units else np.ceil(_WHATEVER * self.units)
         return float(errors * np.sqrt(1.0 + solved.whatever / final))
 
-    def _drawn(self, design: VerifiedDesign, screen: Screen | None, attempt: int) -> Drawn:
+    def _drawn(self, design: VerifiedDesign, screen: Screen | None, attempt: Attempt) -> Drawn:
         """Return how many units are drawn for a design, and how many of them are solved whatever is predicted.
 
         All, where so many plain units show as much: few units leave little to protect from a wrong prediction.
@@ -144,7 +133,7 @@ class Judge:
         whatever = int(np.ceil(_WHATEVER * self.units))
         near = int((self.units - whatever) / max(screen.share, 1 / self.units))
         many = Drawn(units=min(whatever + near, _MOST_DRAWN * self.units), whatever=whatever)
-        confidence = 1 - error_of(self.error, attempt)
+        confidence = 1 - attempt.error(self.error)
         guarantees = (check.requirement.guarantee for check in design.checks)
         strictest = max(own.target for own in guarantees if isinstance(own, AtYield))
         shares = [own.allowed(strictest, confidence) / own.units for own in (many, plain)]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.attempts import FIRST
 from tolalloc.allocation.candidates import ALONE, FREE, GRADES, Candidates
 from tolalloc.allocation.confirmation import confirm
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
@@ -23,7 +24,7 @@ from tolalloc.allocation.graded import (
     group_options,
     with_shared_zones,
 )
-from tolalloc.allocation.judging import AS_GOOD_AS, Judge, confidence_of_fewer, error_of
+from tolalloc.allocation.judging import AS_GOOD_AS, Judge, confidence_of_fewer
 from tolalloc.allocation.pareto.answers import Checkpoint
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
@@ -77,7 +78,7 @@ class DrawingQuestion:
     @property
     def search_confidence(self) -> float:
         """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
-        shown, units = 1 - error_of(self.effort.error, 1), self.effort.verification_units
+        shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
         return confidence_of_fewer(shown, units, AS_GOOD_AS * self.effort.confirmation_units)
 
     def seeds(self, name: str) -> SeedTree:
@@ -99,7 +100,7 @@ class DrawingQuestion:
             leading = self.requirements[0].output
             raise InputError(f"{self.place}: unit_price needs one upper limit above 0 on {leading}, the first limit.")
         asked = {
-            "confirmation_units": (self.effort.confirmation_units, 1 - error_of(self.effort.error, 1)),
+            "confirmation_units": (self.effort.confirmation_units, 1 - FIRST.error(self.effort.error)),
             "verification_units": (self.effort.verification_units, self.search_confidence),
         }
         if self.what_if and self.model.uncertain:
