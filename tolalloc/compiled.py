@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numba as nb
+import numpy as np
 
 _HERE = Path(__file__)
 _FILES = [_HERE, *sorted(_HERE.parent.glob("**/solvers/*.py"))]
@@ -29,11 +30,14 @@ def is_kept(module: str) -> bool:
     return any(_KEPT.glob(f"*/{module}.*.nbi"))
 
 
-def processor() -> tuple[str, ...]:
-    """Return what tells the processor from others: its kind, name and features, as numba tells what it has kept."""
+def processor() -> dict[str, str]:
+    """Return what tells the processor from others: as numba tells what it has kept, and what NumPy makes use of."""
     from numba.core.registry import cpu_target
 
-    return tuple(map(str, cpu_target.target_context.codegen().magic_tuple()))
+    told = cpu_target.target_context.codegen().magic_tuple()
+    numpy = np.show_config(mode="dicts")["SIMD Extensions"]
+    known = dict(zip(("kind", "name", "features"), map(str, told), strict=True))
+    return known | {"NumPy's features": ",".join(numpy["baseline"] + numpy.get("found", []))}
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:

@@ -136,7 +136,7 @@ def _machine() -> bytes:
     """Return what answers follow from beside the question: code, libraries and kind of processor."""
     from tolalloc.compiled import processor
 
-    return "\n".join([code_digest(), *processor()]).encode()
+    return "\n".join([code_digest(), *processor().values()]).encode()
 
 
 class _Pickler(pickle.Pickler):

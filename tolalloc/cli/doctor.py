@@ -27,7 +27,7 @@ def doctor(as_json: AsJson = False) -> None:
     found = {
         "versions": versions(),
         "platform": platform.platform(),
-        "processor": " ".join(processor()[:2]),
+        "processor": "{kind} {name}".format_map(processor()),
         "threads": thread_count(),
         "BLAS": blas_libraries(),
         "kernel compiled before": is_kept("turn"),

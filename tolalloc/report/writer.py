@@ -15,7 +15,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup, escape
 
-from tolalloc.compiled import thread_count
+from tolalloc.compiled import processor, thread_count
 from tolalloc.files import no_formula
 from tolalloc.report.charts import chart
 from tolalloc.report.document import Document
@@ -74,7 +74,8 @@ def write_document(document: Document, folder: Path) -> None:
         save_png(figure, figures / f"{name}.png")
     write_json(document.summary, folder / "summary.json")
     known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
-    write_json({**known, "threads": thread_count(), "versions": versions()}, folder / "manifest.json")
+    machine = {"processor": processor(), "threads": thread_count(), "versions": versions()}
+    write_json({**known, **machine}, folder / "manifest.json")
 
 
 def write_csv(frame: pd.DataFrame, path: Path) -> None:
