@@ -82,6 +82,13 @@ def _known_unit(text: str) -> str:
     return unit
 
 
+def _no_comment(text: str) -> str:
+    """Return a first cell that no reader of the table takes for a comment."""
+    if text.startswith("#"):
+        raise ValueError("allowed is a name that does not begin with #, which makes the row a comment")
+    return text
+
+
 def _micrometres(length: float) -> float:
     """Return a length as a table writes it [µm]."""
     return round(length / MICROMETRE, _WRITTEN_DECIMALS)
@@ -93,6 +100,7 @@ class ToleranceRow(Record):
     id: Annotated[
         str,
         Field(min_length=1),
+        AfterValidator(_no_comment),
         Column("name of the source; `check` offers the nearest one if it is not known", attribute="name"),
     ]
     part: Annotated[str, Column("part that carries it; the id unless given", attribute="part")] = ""
