@@ -11,6 +11,7 @@ import pytest
 
 from tests.studies.command import ROOT, process, refused
 from tests.studies.paper import can_print, lost
+from tolalloc.report import pdf
 
 STUDIES = sorted((ROOT / "studies").glob("*.py"))
 
@@ -66,8 +67,8 @@ def test_a_study_runs_and_writes_its_report(script, tmp_path):
     assert result.returncode == 0, result.stderr
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page
-    if can_print():
-        assert not lost(folder / "report.html", tmp_path)
+    for paper in pdf.PAPERS if can_print() else ():
+        assert not lost(folder / "report.html", tmp_path, paper)
     summary = (folder / "summary.json").read_text(encoding="utf-8")
     assert page.count("<h2>") >= (3 if script.stem in SECTIONED else 0)
     assert script.stem not in SECTIONED or "nan" not in summary.lower()
