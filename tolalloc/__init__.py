@@ -13,6 +13,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tolalloc.allocation.classical_guarantee import RootSumSquare as RootSumSquare
+    from tolalloc.allocation.classical_guarantee import WorstCase as WorstCase
     from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
     from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
     from tolalloc.allocation.effort import AllocationEffort as AllocationEffort
@@ -20,8 +22,6 @@ if TYPE_CHECKING:
     from tolalloc.allocation.effort import SearchEffort as SearchEffort
     from tolalloc.allocation.guarantee import AtCpk as AtCpk
     from tolalloc.allocation.guarantee import AtYield as AtYield
-    from tolalloc.allocation.guarantee import RootSumSquare as RootSumSquare
-    from tolalloc.allocation.guarantee import WorstCase as WorstCase
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
@@ -94,7 +94,7 @@ _WHERE = {
     "RADIAL_CLEARANCE": "rv",
     "Ranking": "study.questions",
     "RankingEffort": "sensitivity.effort",
-    "RootSumSquare": "allocation.guarantee",
+    "RootSumSquare": "allocation.classical_guarantee",
     "RunFolderError": "exceptions",
     "SamplingDesign": "drawings.seeds",
     "SearchEffort": "allocation.effort",
@@ -109,7 +109,7 @@ _WHERE = {
     "TolallocError": "exceptions",
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
-    "WorstCase": "allocation.guarantee",
+    "WorstCase": "allocation.classical_guarantee",
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "function_model",
     "model": ("function_model", "model"),

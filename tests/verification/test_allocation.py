@@ -11,11 +11,12 @@ from scipy.stats import kurtosis, norm, skew
 from tests.prepared import prepared as baseline
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
+from tolalloc.allocation.classical_guarantee import WorstCase
 from tolalloc.allocation.cost.closed_forms import Reciprocal
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.effort import SearchEffort
 from tolalloc.allocation.fronts import exact_front
-from tolalloc.allocation.guarantee import AtCpk, AtYield, WorstCase
+from tolalloc.allocation.guarantee import AtCpk, AtYield
 from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.proportional import scale_in_proportion

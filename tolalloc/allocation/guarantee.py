@@ -1,4 +1,4 @@
-"""What must be shown of a limited output: a yield, a capability index, or the worst unit inside the zones."""
+"""What must be shown of a limited output by random units: a yield, or a capability index."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import ClassVar, Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.local_model import Side, root_sum_square_stack, worst_case_stack
+from tolalloc.allocation.level import Level, order_statistic, reached, side_name, side_scale
+from tolalloc.allocation.local_model import Side, root_sum_square_stack
 from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
@@ -19,23 +20,6 @@ from tolalloc.named_fields import NamedFields, is_number
 
 USUAL_YIELD = 0.9973
 """Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
-_MISSED = 0.005
-"""Share of a worst case by which an ascent may have missed it [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Level:
-    """What units say of one limited side."""
-
-    sign: Literal[1, -1]  # 1 for an upper limit, −1 for a lower one [-]
-    limit: float  # The limit [unit of the output]
-    value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
-    standard_error: float  # Standard error of the value [unit of the output]
-
-    @property
-    def excess(self) -> float:
-        """How far the value lies beyond the limit, negative inside [unit of the output]."""
-        return self.sign * (self.value - self.limit)
 
 
 @runtime_checkable
@@ -128,7 +112,7 @@ class AtYield(NamedFields):
         """Return what units show of every limited side."""
         excess = np.max([sign * (values - limit) for sign, limit in limits.turned], axis=0)
         beyond = units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), self.target, confidence)
-        return tuple(_order_statistic(values, units, sign, limit, beyond) for sign, limit in limits.turned)
+        return tuple(order_statistic(values, units, sign, limit, beyond) for sign, limit in limits.turned)
 
 
 @dataclass(frozen=True)
@@ -212,140 +196,10 @@ class AtCpk(NamedFields):
         return float(needed), float(np.sqrt(variance))
 
 
-@dataclass(frozen=True, kw_only=True)
-class WorstCase:
-    """No unit inside its zones lies beyond a limit, as far as an ascent from many starts can tell."""
-
-    @property
-    def words(self) -> str:
-        """What must be shown, in words."""
-        return "worst case found"
-
-    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
-        """Accept every number of units; none is asked."""
-
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
-        """Return every limited side."""
-        return tuple(self._side(trial, sign, limit) for sign, limit in limits.turned)
-
-    def _side(self, trial: OutputTrial, sign: Literal[1, -1], limit: float) -> Side:
-        value, gradient = trial.worst(sign)
-        stack = worst_case_stack(
-            _name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
-        )
-        return Side(
-            sign=sign,
-            limit=limit,
-            value=value,
-            standard_error=_MISSED * abs(value),
-            scale=_scale(trial, limit),
-            stack=stack,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RootSumSquare:
-    """Nominal value and root-sum-square of what every source adds at its limit, to first order, lie inside the limits.
-
-    Notes
-    -----
-    The classical stack: √Σ(Dᵢtᵢ)² with the derivatives Dᵢ at nominal and tᵢ half the zone. It takes sizes and
-    positions, needs no sample and knows neither distributions nor what the model bends, so the report shows the yield
-    of fresh units beside it.
-    """
-
-    @property
-    def words(self) -> str:
-        """What must be shown, in words."""
-        return "root-sum-square"
-
-    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
-        """Accept every number of units; none is asked."""
-
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
-        """Return every limited side.
-
-        Raises
-        ------
-        InputError
-            A source that is neither a size nor a position.
-        """
-        value, locked, added, by_setting = trial.linear()
-        spread = float(np.hypot(locked, np.linalg.norm(added)))
-        scales, settings = trial.design[: trial.groups], trial.design[trial.groups :]
-        return tuple(
-            Side(
-                sign=sign,
-                limit=limit,
-                value=value + sign * spread,
-                standard_error=0.0,
-                scale=_scale(trial, limit),
-                stack=Stack(
-                    name=_name(trial, sign),
-                    worst_case=np.zeros(trial.groups),
-                    root_sum_square=added / scales,
-                    # Locked zones take their part of the quadrature: the free ones may fill what it leaves.
-                    budget=_left(sign * (limit - value), locked) + float(sign * by_setting @ settings),
-                    slopes=sign * by_setting,
-                ),
-            )
-            for sign, limit in limits.turned
-        )
-
-
-def _left(distance: float, locked: float) -> float:
-    """Return what locked zones leave of the distance to a limit, less than nothing beyond it [unit of the output]."""
-    return float(np.sqrt(max(distance**2 - locked**2, 0.0))) if distance > locked else distance - locked
-
-
-def _scale(trial: OutputTrial, limit: float) -> float:
-    """Return what an excess is compared with; a limit of zero says nothing of its size [unit of the output]."""
-    return max(abs(limit), float(trial.values.std())) or 1.0
-
-
-def _name(trial: OutputTrial, sign: int) -> str:
-    return f"{trial.output}, {'upper' if sign > 0 else 'lower'} limit"
-
-
 def _solved(trial: OutputTrial) -> tuple[Float[np.ndarray, " solved"], SolvedUnits]:
     """Return the output of the units of a search, which solves all of them, not a number where one has none."""
     values = np.append(trial.values, np.full(trial.failed, np.nan))
     return values, SolvedUnits.all_of(values.size)
-
-
-def _order_statistic(
-    values: Float[np.ndarray, " solved"], units: SolvedUnits, sign: Literal[1, -1], limit: float, beyond: float
-) -> Level:
-    """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown."""
-    turned = np.where(np.isfinite(values), sign * values, np.inf)
-    order = np.argsort(turned, kind="stable")
-    inside = max(int(np.count_nonzero(turned - sign * limit <= beyond)), 1)
-    return Level(
-        sign=sign,
-        limit=limit,
-        value=sign * (float(turned[order[inside - 1]]) if np.isfinite(beyond) else np.inf),
-        standard_error=_order_statistic_error(turned[order], units.stand_for[order], inside),
-    )
-
-
-def _order_statistic_error(
-    ordered: Float[np.ndarray, " unit"], stand_for: Float[np.ndarray, " unit"], rank: int
-) -> float:
-    """Return the standard error of the value at a rank, counted from 1 [unit of the output].
-
-    Exact bootstrap: the rank's value of a resample is that of unit i with a probability of the incomplete beta function
-    (Maritz & Jarrett 1978). Where units stand for different numbers of others, it is that of as many equal units as
-    have the variance of those above the rank.
-    """
-    from scipy.stats import beta
-
-    above = stand_for[rank:] if rank < ordered.size else stand_for[-1:]
-    equal = stand_for.sum() * above.sum() / (above @ above)
-    places = np.append(0.0, np.cumsum(stand_for)) / stand_for.sum()
-    at = equal * places[rank]
-    weights, finite = np.diff(beta.cdf(places, at, equal - at + 1)), np.isfinite(ordered)
-    weights, ordered = weights[finite], ordered[finite]
-    return float(np.sqrt(weights @ (ordered - weights @ ordered) ** 2))
 
 
 def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...]) -> tuple[Side, ...]:
@@ -356,16 +210,11 @@ def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...]) -> tuple[Side, 
             limit=level.limit,
             value=level.value,
             standard_error=level.standard_error,
-            scale=_scale(trial, level.limit),
+            scale=side_scale(trial, level.limit),
             stack=_root_sum_square(trial, level.sign, level.limit, reached(level, trial.values)),
         )
         for level in levels
     )
-
-
-def reached(level: Level, values: Float[np.ndarray, " good"]) -> float:
-    """Return the turned value of a level, the outermost unit's where it is infinite [unit of the output]."""
-    return min(level.sign * level.value, float((level.sign * values).max()))
 
 
 def _root_sum_square(trial: OutputTrial, sign: int, limit: float, value: float) -> Stack:
@@ -374,4 +223,4 @@ def _root_sum_square(trial: OutputTrial, sign: int, limit: float, value: float) 
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
     standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
     gradient = sign * (1.0 + spread * standard) @ derivative / known.size
-    return root_sum_square_stack(_name(trial, sign), trial.design, value - sign * limit, gradient, trial.groups)
+    return root_sum_square_stack(side_name(trial, sign), trial.design, value - sign * limit, gradient, trial.groups)

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.attempts import Attempt
-from tolalloc.allocation.guarantee import AtYield, Level, Sampled, reached
+from tolalloc.allocation.guarantee import AtYield, Sampled
+from tolalloc.allocation.level import Level, reached
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.screen import Screen
