@@ -13,6 +13,8 @@ import pytest
 from tests.prepared import prepared
 from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
+from tolalloc.report.excel import write_sheets
 from tolalloc.units import ARCSECOND
 
 REPORT = ("--reducer", "rv20e_liu2020", "--out")
@@ -105,6 +107,22 @@ def test_bad_options_are_refused_in_one_sentence(bench, tmp_path, options, words
     for word in words:
         assert word in result.stderr
     assert not (tmp_path / "report").exists()
+
+
+def test_a_sheet_of_the_workbook_may_be_named(bench, tmp_path):
+    workbook = tmp_path / "zones.xlsx"
+    table = table_frame(load_tolerance_table("rv20e_baseline"))
+    write_sheets({"Rev A": table.assign(id="twice"), "Rev B": table}, workbook)
+    words = {
+        "Rev A": "twice",
+        "Rev B": "--noise is 0",  # the table is in order, so the next fault is told
+        "Rev C": "sheet is 'Rev C'; allowed is one of 'Rev A', 'Rev B'",
+    }
+    for sheet, said in words.items():
+        options = ("--reducer", "rv20e_liu2020", "--tolerances", workbook, "--sheet", sheet, "--noise", "0")
+        result = tolalloc("diagnose", bench.curve, *options)
+        assert result.returncode == 2
+        assert said in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ def diagnose(
     curve: Annotated[Path, typer.Argument(help="CSV: columns 'angle [deg]', 'transmission error [arcsec]'.")],
     reducer: ReducerOption = None,
     tolerances: Annotated[str, typer.Option(help="Tolerance table: shipped name, CSV or XLSX.")] = "rv20e_baseline",
+    sheet: Annotated[str, typer.Option(help="Sheet of a workbook that holds the table; the first unless given.")] = "",
     torque: TestTorqueOption = None,
     noise: Annotated[float, typer.Option(help="Standard deviation of one reading [arcsec].")] = 0.5,
     discrepancy: Annotated[float, typer.Option(help="Standard deviation of what the model leaves out [arcsec].")] = 0.5,
@@ -30,21 +31,17 @@ def diagnose(
     """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.bench.diagnosis.request import DiagnosisRequest, diagnose_unit
-    from tolalloc.drawings.correlation import Correlation, load_correlations
-    from tolalloc.drawings.error_model import ErrorModel
-    from tolalloc.drawings.tolerance_table import load_tolerance_table
+    from tolalloc.drawings.drawing import load_drawing
     from tolalloc.report.folder import require_usable
     from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 
     design = load_reducer(named_reducer(reducer, out))
     if stiffness:
         design = with_stiffness(design, load_identified_stiffness(stiffness))
-    sources = load_tolerance_table(tolerances)
-    correlation = load_correlations(correlations, sources) if correlations else Correlation()
     asked = DiagnosisRequest(
         curve=curve,
         reducer=design,
-        errors=ErrorModel(sources, correlation=correlation),
+        errors=load_drawing(tolerances, correlations=correlations, sheet=sheet).errors,
         torque_nm=torque,
         noise_arcsec=noise,
         discrepancy_arcsec=discrepancy,
