@@ -20,7 +20,7 @@ LOCAL = "local"
 """What stands for workers on this machine, one per core."""
 _PATIENCE = 20
 """Time that a scheduler has to answer [s]."""
-_AHEAD = 3
+AHEAD = 3
 """Chunks per worker that are under way, so that neither workers nor the scheduler's memory wait for each other [-]."""
 
 
@@ -55,7 +55,7 @@ class Workers:
         """
         under_way: deque[Any] = deque()
         for chunk in chunks:
-            if len(under_way) >= _AHEAD * max(len(self.client.nthreads()), 1):
+            if len(under_way) >= AHEAD * max(len(self.client.nthreads()), 1):
                 yield self._taken(under_way.popleft())
             under_way.append(self.client.submit(solve, chunk, pure=False))
         while under_way:

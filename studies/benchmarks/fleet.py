@@ -3,8 +3,8 @@
     python studies/benchmarks/fleet.py [--units 100000] [--json]
 
 A scheduler and two workers, a process each, solve random RV-20E units, peak-to-peak. Measured are the seconds of a
-chunk on a worker, those that this process spends on one (chunks that nobody solves, sent there and back),
-and the largest memory of the scheduler. More workers than two cores hold are simulated from these two times: chunks
+chunk on a worker, those that this process spends on one (chunks that nobody solves, sent there and back), and
+the largest memory of the scheduler. More workers than two cores hold are simulated from these two times: chunks
 are handed out one after the other, three a worker are under way, their answers are taken in order.
 """
 
@@ -34,12 +34,12 @@ from tests.prepared import prepared
 from tolalloc.chunks import SAMPLES_AT_ONCE
 from tolalloc.compiled import use_threads
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.workers import workers_at
+from tolalloc.workers import AHEAD, workers_at
 
 WORKERS = 2
-ADDRESS = "tcp://127.0.0.1:8799"
+PORT = 8799
+ADDRESS = f"tcp://127.0.0.1:{PORT}"
 SIMULATED = (2, 4, 8, 16, 32, 64, 128, 256)
-AHEAD = 3
 MEBIBYTE = 2**20
 
 
@@ -104,7 +104,7 @@ def measured(units: int) -> dict[str, Any]:
     study.model.reading(reading)(x[:SAMPLES_AT_ONCE])
     with ExitStack() as stack:
         place = Path(stack.enter_context(TemporaryDirectory()))
-        own = ("distributed.cli.dask_scheduler", "--port", "8799", "--no-dashboard", "--no-show")
+        own = ("distributed.cli.dask_scheduler", "--port", str(PORT), "--no-dashboard", "--no-show")
         scheduler = stack.enter_context(running(*own))
         for _ in range(WORKERS):
             where = ("--local-directory", str(place), "--nthreads", "1", "--no-dashboard")
@@ -151,6 +151,8 @@ def main() -> None:
     parser.add_argument("--units", type=int, default=100_000, help="units that are solved")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     asked = parser.parse_args()
+    if asked.units < 8 * SAMPLES_AT_ONCE:
+        parser.error(f"--units is {asked.units}; allowed is {8 * SAMPLES_AT_ONCE} or more.")
     found = measured(asked.units)
     if asked.json:
         print(json.dumps(found, indent=2))

@@ -139,6 +139,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the moments")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     asked = parser.parse_args()
+    if asked.kills < 1:
+        parser.error(f"--kills is {asked.kills}; allowed is 1 or more.")
     with TemporaryDirectory() as place:
         folder = Path(place) / "mine"
         new = ["new", str(folder), "--like", "rv40e", "--cranks", "3", "--with", "bench,assembly"]

@@ -82,7 +82,7 @@ class Judge:
         Notes
         -----
         Units that find the design beyond a limit by more than a standard error before all are solved end the attempt:
-        giving up spends no error.
+        giving up adds no error, and counts as not confirmed.
         """
         with one_blas_thread():  # the same units are near for any number of threads
             screen = Screen.of(design)
