@@ -183,8 +183,8 @@ class AllocationEffort(NamedFields):
 
 
 QUICK_ALLOCATION = AllocationEffort(
-    verification_units=1152,
-    confirmation_units=2304,
+    verification_units=2304,
+    confirmation_units=4608,
     shared_units=48,
     search=SearchEffort(
         steps=2,
