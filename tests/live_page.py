@@ -72,7 +72,7 @@ def browser() -> Any:
     ):
         options.add_argument(argument)
     driver = Chrome(options=options, service=Service(DRIVER))
-    driver.set_script_timeout(60)
+    driver.set_script_timeout(300)
     return driver
 
 

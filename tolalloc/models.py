@@ -201,6 +201,11 @@ class Model(ABC):
         return {}
 
     @property
+    def operating_conditions(self) -> tuple[Setting, ...]:
+        """Those of its conditions that a user may vary, which change no part: a torque and not a name."""
+        return ()
+
+    @property
     def facts(self) -> Mapping[str, Any]:
         """What is worth knowing of the model itself, units in the names."""
         return {}
@@ -364,7 +369,7 @@ class ModelSource(Protocol):
         ...
 
     def set_to(self, settings: Mapping[str, float]) -> ModelSource:
-        """Return the same at other values of its settings [units of their names].
+        """Return the same at other values of its settings and operating conditions [units of their names].
 
         Raises
         ------

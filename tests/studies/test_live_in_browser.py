@@ -106,18 +106,35 @@ def test_a_slider_moves_cost_curve_and_yield_of_the_reducer_at_once(driver, redu
     assert silent(driver)
 
 
-def test_two_hundred_moves_and_twenty_steps_back_leave_no_error_and_no_rubbish(driver, study):
+def test_the_curve_follows_the_torque_and_the_picture_a_swept_error(driver, reducer):
+    shown(driver, reducer, 1024)
+    path = "return document.querySelector('#curves svg path').getAttribute('d')"
+    before = driver.execute_script(path)
+    driver.find_element("css selector", "input[type=range][aria-label^='torque']").send_keys("\ue014" * 90)
+    until(lambda: driver.execute_script(path) != before)
+    counted(driver, 1024)
+    picture = "return document.querySelector('#mechanism .mechanism-stated')?.textContent"
+    until(lambda: driver.execute_script(picture))
+    driver.find_element("css selector", "[aria-label^='effect of']").click()
+    until(lambda: by_id(driver, "effect").is_displayed())
+    still = until(lambda: driver.execute_script(picture))
+    by_id(driver, "effect-share").send_keys("\ue014" * 4)
+    until(lambda: driver.execute_script(picture) != still)
+    assert silent(driver)
+
+
+def test_a_thousand_moves_and_fifty_steps_back_leave_no_error_and_no_rubbish(driver, study):
     shown(driver, study)
     fields = "return [...document.querySelectorAll('.row input[type=number]')].map((own) => own.value)"
     size = "return [document.querySelectorAll('*').length, performance.memory.usedJSHeapSize / 1e6]"
-    driver.execute_async_script(MOVE, 180, 3)
+    driver.execute_async_script(MOVE, 950, 3)
     before, (elements, _) = driver.execute_script(fields), driver.execute_script(size)
-    driver.execute_async_script(MOVE, 20, 5)
+    driver.execute_async_script(MOVE, 50, 5)
     moved = driver.execute_script(fields)
-    for _ in range(20):
+    for _ in range(50):
         by_id(driver, "undo").click()
     assert driver.execute_script(fields) == before
-    for _ in range(20):
+    for _ in range(50):
         by_id(driver, "redo").click()
     assert driver.execute_script(fields) == moved
     counted(driver, 256)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import shutil
 import signal
 import socket
 import subprocess
@@ -23,6 +24,7 @@ from tolalloc.live.design import LiveDesign
 from tolalloc.live.desk import Desk
 from tolalloc.live.server import LARGEST, MOST_CONNECTIONS, LiveServer
 from tolalloc.live.session import Session
+from tolalloc.rv import TORQUE
 from tolalloc.study.prepared import Prepared
 
 
@@ -77,6 +79,39 @@ def test_the_page_says_the_digits_of_whatif_on_a_reducer():
     curve = drawn["figures"][0]["series"][-1]["y"]
     # the command's peak-to-peak is searched between the angles of the curve
     assert max(curve) - min(curve) == pytest.approx(answer.values[1].max(), rel=5e-3)
+
+
+def test_another_torque_says_the_digits_of_a_study_at_that_torque(tmp_path):
+    shutil.copy(ROOT / "studies" / "rv20e_allocation.py", tmp_path)
+    script = tmp_path / "rv20e_allocation.py"
+    desk = desk_of(script)
+    design = {"zones": {"pin.diameter": 3.0}, "settings": {TORQUE: 167.0}}
+    found, one = ask(desk, "units", design=design, units=64), ask(desk, "design", design=design, unit=5)
+    assert found["outputs"] != ask(desk, "units", design={"zones": design["zones"]}, units=64)["outputs"]
+    ask(desk, "save", design=design, name="loaded")
+    saved = desk_of(tmp_path / "loaded.py")
+    assert saved.session.described["conditions"] == [[TORQUE, 167.0]]
+    assert ask(saved, "units", design={}, units=64) == found
+    again = ask(saved, "design", design={}, unit=5)
+    assert [again[key] for key in ("values", "figures")] == [one[key] for key in ("values", "figures")]
+    for torque, allowed in ((0.0, "but not 0"), (400.0, "-334 to 334")):
+        with pytest.raises(InputError, match=allowed):
+            ask(desk, "design", design={"settings": {TORQUE: torque}})
+
+
+def test_the_picture_follows_a_swept_error():
+    desk = desk_of(ROOT / "studies" / "rv20e_allocation.py")
+    swept = ask(desk, "sweep", unit=3, source="disc1.runout")
+    scenes = [ask(desk, "scene", unit=3, source="disc1.runout", share=share)["scene"] for share in (-1.0, 1.0)]
+    curves = [scene["forward"]["transmission_error"]["data"] for scene in scenes]
+    assert curves[0] != curves[1] != ask(desk, "scene", unit=3)["scene"]["forward"]["transmission_error"]["data"]
+    assert len(swept["curves"]) == len(swept["figure"]["series"][0]["x"])
+    for sent, said in (
+        ({"share": 1.5, "source": "disc1.runout"}, "from -1 to 1"),
+        ({"source": "disc"}, "disc2.runout"),
+    ):
+        with pytest.raises((InputError, UnknownNameError), match=said):
+            ask(desk, "scene", unit=3, **sent)
 
 
 def test_a_yield_is_one_of_all_limits_with_its_interval(desk):

@@ -21,7 +21,7 @@ _SMALLEST = 10.0**-_DECIMALS
 
 @dataclass(frozen=True)
 class LiveDesign:
-    """Zones that differ from the drawing's, and the values of the model's settings.
+    """Zones that differ from the drawing's, the values of the model's settings, and under which conditions it is asked.
 
     Parameters
     ----------
@@ -29,14 +29,19 @@ class LiveDesign:
         Source and its zone [m], by name.
     settings
         Values of all settings, in the model's order [units of their names].
+    operating
+        Operating condition and its value, by name, where it differs from the study's [units of their names].
     """
 
     zones: tuple[tuple[str, float], ...]
     settings: tuple[float, ...]
+    operating: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def read(cls, sent: Any, prepared: Prepared) -> LiveDesign:
         """Return the design of a record ``{"zones": {source: µm}, "settings": {name: value}}``.
+
+        Operating conditions stand among the settings.
 
         Raises
         ------
@@ -56,9 +61,15 @@ class LiveDesign:
             for name, zone in zones.items()
             if zone != shown_zone(present[name])
         }
-        require_settings("page", prepared.model.settings, settings)
-        values = tuple(float(settings.get(own.name, own.value)) for own in prepared.model.settings)
-        return cls(zones=tuple(sorted(told.items())), settings=values)
+        model = prepared.model
+        require_settings("page", (*model.settings, *model.operating_conditions), settings)
+        values = tuple(float(settings.get(own.name, own.value)) for own in model.settings)
+        operating = tuple(
+            (own.name, float(settings[own.name]))
+            for own in model.operating_conditions
+            if settings.get(own.name, own.value) != own.value
+        )
+        return cls(zones=tuple(sorted(told.items())), settings=values, operating=operating)
 
 
 def shown_zone(zone: float) -> float:

@@ -79,7 +79,8 @@ class Desk:
         return {"sentences": self.session.examined(self._read(sent))}
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
-        return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0))
+        swept = (str(sent["source"]), sent.get("share", 0.0)) if "source" in sent else None
+        return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0), swept)
 
     def _sweep(self, sent: dict[str, Any]) -> dict[str, Any]:
         return LiveUnits(session=self.session).swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))

@@ -83,9 +83,9 @@ class Saving:
             raise
 
     def _settings(self, design: LiveDesign) -> dict[str, float]:
-        """Return the settings that differ from the study's own."""
+        """Return the settings and operating conditions that differ from the study's own."""
         known = zip(self.session.prepared.model.settings, design.settings, strict=True)
-        return {own.name: value for own, value in known if value != own.value}
+        return {own.name: value for own, value in known if value != own.value} | dict(design.operating)
 
 
 def _with_range(source: Source) -> Source:

@@ -9,21 +9,18 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.difference import limited_shares
 from tolalloc.allocation.repricing import cheapest, repriced
 from tolalloc.allocation.requirement import Requirement
-from tolalloc.capability.indices import quantile_interval
-from tolalloc.capability.monte_carlo import proportion
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError
 from tolalloc.live.design import LiveDesign, shown_zone
-from tolalloc.report.charts import numbers, shares
-from tolalloc.report.figure import BINS
-from tolalloc.report.wording import short, unit_of
+from tolalloc.live.judged import judged
+from tolalloc.models import Model
+from tolalloc.settings import Setting
 from tolalloc.study.prepared import Prepared
 from tolalloc.units import MICROMETRE
 
@@ -33,6 +30,8 @@ _LOOK = 128
 """Units that are solved between two looks whether somebody still wants them [-]."""
 MOST = 6144
 """Most units of one design [-]."""
+_STEPS = 400
+"""Steps of the slider of a setting [-]."""
 _REMEMBERED = 24
 """Designs whose solved units are remembered [-]."""
 
@@ -65,6 +64,20 @@ class Session:
     def outputs(self) -> tuple[str, ...]:
         """Names of the limited outputs."""
         return tuple(dict.fromkeys(own.output for own in self.requirements))
+
+    def model(self, design: LiveDesign) -> Model:
+        """Return the model at the settings and under the conditions of a design.
+
+        Raises
+        ------
+        InputError
+            A condition that is not allowed, such as a torque of 0.
+        """
+        prepared, source = self.prepared, self.prepared.study.model
+        model = prepared.model
+        if design.operating and source is not None:
+            model = source.set_to(dict(design.operating)).bound(prepared.errors, "page").mapped(prepared.mapper)
+        return model.at(np.array(design.settings))
 
     def sources(self, design: LiveDesign) -> tuple[Source, ...]:
         """Return the sources that vary, at the zones of a design and with their costs.
@@ -107,7 +120,7 @@ class Session:
         if not (type(count) is int and 1 <= count <= MOST):
             raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
         values = self._solved(design, count, wanted)
-        return None if values is None else self.judged(values[:count])
+        return None if values is None else judged(self.prepared, self.outputs, values[:count])
 
     def _solved(
         self, design: LiveDesign, count: int, wanted: Callable[[], bool]
@@ -115,7 +128,7 @@ class Session:
         """Return the outputs of the first units, of which those that are known are not solved again."""
         with self._lock:
             values = self._known.get(design, np.empty((0, len(self.outputs))))
-        response = self.prepared.model.at(np.array(design.settings)).reading(self.outputs)
+        response = self.model(design).reading(self.outputs)
         while len(values) < count and wanted():
             evaluation = response(self.deviations(design, slice(len(values), min(len(values) + _LOOK, count))))
             good = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
@@ -131,52 +144,9 @@ class Session:
             while len(self._known) > _REMEMBERED:
                 self._known.pop(next(iter(self._known)))
 
-    def judged(self, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
-        """Return the yield of all limits, and of each output its quantile, its share and its histogram."""
-        kept = np.all([own.limits.kept_by(self._of(own, values)) for own in self.requirements], axis=0)
-        found = proportion(len(values), int(np.count_nonzero(~kept)))
-        return {
-            "units": len(values),
-            "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
-            "yield": [found.estimate, found.low, found.high],
-            "target": self.prepared.target,
-            "broken": self._broken(values),
-            "outputs": [self._output(own, self._of(own, values), kept) for own in self.requirements],
-        }
-
-    def _broken(self, values: Float[np.ndarray, "unit output"]) -> dict[str, float]:
-        """Return the share of units that do not work at all, for every limit that the model has of its own [-]."""
-        own = [own for own in self.requirements if own.output in self.prepared.model.own_limits]
-        return {item.output: float((~item.limits.kept_by(self._of(item, values))).mean()) for item in own}
-
-    def _of(self, requirement: Requirement, values: Float[np.ndarray, "unit output"]) -> Float[np.ndarray, " unit"]:
-        return values[:, self.outputs.index(requirement.output)]
-
-    def _output(
-        self, requirement: Requirement, values: Float[np.ndarray, " unit"], kept: Bool[np.ndarray, " unit"]
-    ) -> dict[str, Any]:
-        limits, known = requirement.limits, values[np.isfinite(values)]
-        inside = proportion(len(values), int(np.count_nonzero(~limits.kept_by(values))))
-        low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
-        order = np.argsort(np.where(np.isfinite(values), values, -np.inf))
-        return {
-            "name": short(requirement.output),
-            "output": requirement.output,
-            "unit": unit_of(requirement.output),
-            "lower": limits.lower,
-            "upper": limits.upper,
-            "quantiles": [_quantile(known, share) for share in limited_shares(requirement)],
-            "inside": [inside.estimate, inside.low, inside.high],
-            "histogram": shares(known, low, (high - low) / BINS or 1.0),
-            "worst": int(order[-1]) + 1,
-            "median": int(order[len(order) // 2]) + 1,
-            "reject": int(np.flatnonzero(~kept)[0]) + 1 if not kept.all() else None,
-        }
-
     def examined(self, design: LiveDesign) -> list[str]:
         """Return what a check of the study says of the first random units, such as how many of them are jammed."""
-        model = self.prepared.model.at(np.array(design.settings))
-        return list(model.examined(self.deviations(design, slice(0, FIRST))))
+        return list(self.model(design).examined(self.deviations(design, slice(0, FIRST))))
 
     @property
     def described(self) -> dict[str, Any]:
@@ -189,23 +159,21 @@ class Session:
             "most": MOST,
             "first": FIRST,
             "conditions": [[name, value] for name, value in model.conditions.items()],
-            "settings_word": model.settings_word,
             "sources": [
                 _described(own, self.prepared.space.processes.get(own.name, ())) for own in self.prepared.errors.active
             ],
             "settings": [
-                {"name": own.name, "value": own.value, "lower": own.lower, "upper": own.upper} for own in model.settings
+                *(_setting(own, model.settings_word) for own in model.settings),
+                # an odd number of steps leaves out the middle, a torque of 0, at which play leaves all undetermined
+                *(_setting(own, "operating condition", _STEPS + 1) for own in model.operating_conditions),
             ],
             "limits": [own.sentence for own in self.requirements],
         }
 
 
-def _quantile(values: Float[np.ndarray, " known"], share: float) -> dict[str, Any]:
-    """Return a quantile with its 95 % interval, whose ends are unknown where the units are too few."""
-    if not values.size:
-        return {"share": share, "value": None, "interval": [None, None]}
-    found = quantile_interval(values, share)
-    return {"share": share, "value": found.estimate, "interval": numbers([found.low, found.high])}
+def _setting(own: Setting, word: str, steps: int = _STEPS) -> dict[str, Any]:
+    step = (own.upper - own.lower) / steps
+    return {"name": own.name, "value": own.value, "lower": own.lower, "upper": own.upper, "step": step, "word": word}
 
 
 def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]:
@@ -214,6 +182,7 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
     return {
         "name": source.name,
         "part": source.part,
+        "label": ", ".join(filter(None, (source.label, source.drawing))),
         "feature": source.feature.value,
         "meaning": source.feature.zone_meaning,
         "zone": shown_zone(source.zone),

@@ -13,6 +13,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.live.design import LiveDesign
 from tolalloc.live.session import MOST, Session
+from tolalloc.named_fields import is_number
 from tolalloc.report.charts import chart, numbers
 from tolalloc.report.figure import Figure, Series
 from tolalloc.report.wording import short, unit_of
@@ -38,7 +39,7 @@ class LiveUnits:
         x = self._columns(design, number)
         values = self._values(design, x[np.newaxis])[0]
         label = f"unit {number}" if number else "exact parts"
-        figures = self.session.prepared.model.pictured({label: (np.array(design.settings), x)})
+        figures = self.session.model(design).pictured({label: (np.array(design.settings), x)})
         return {
             "unit": number,
             "values": [
@@ -48,20 +49,33 @@ class LiveUnits:
             "figures": [chart(figure) for figure in figures],
         }
 
-    def scene(self, design: LiveDesign, number: int) -> dict[str, Any]:
+    def scene(self, design: LiveDesign, number: int, swept: tuple[str, float] | None = None) -> dict[str, Any]:
         """Return a unit as a moving picture needs it; nothing where the model has none.
+
+        Parameters
+        ----------
+        design
+            The design.
+        number
+            Number of the unit [-].
+        swept
+            A source and where its error stands in its zone, from -1 to 1; as the unit has it unless given [-].
 
         Raises
         ------
-        InputError
-            There is no such unit.
+        InputError, UnknownNameError
+            There is no such unit or source.
         SolveError
             It does not come to rest somewhere.
         """
         names = tuple(own.name for own in self.session.prepared.errors.active)
-        x = self._columns(design, number)
-        label = f"unit {number}" if number else "exact parts"
-        return {"scene": self.session.prepared.model.scene(np.array(design.settings), x, label, names)}
+        x, label = self._columns(design, number), f"unit {number}" if number else "exact parts"
+        if swept:
+            source, share = swept
+            if not (is_number(share) and abs(share) <= 1):
+                raise InputError.at("page", "share", share, "a number from -1 to 1")
+            x, label = self._at_shares(design, number, source, np.array([share]))[0], f"{label}, {source} moved"
+        return {"scene": self.session.model(design).scene(np.array(design.settings), x, label, names)}
 
     def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
         """Return the leading output of a unit while one of its errors goes from one end of its zone to the other.
@@ -71,16 +85,10 @@ class LiveUnits:
         InputError, UnknownNameError
             There is no such unit or source.
         """
-        errors, sources = self.session.prepared.errors, {own.name: own for own in self.session.sources(design)}
-        if source not in sources:
-            raise UnknownNameError.among("page", "source", source, sources)
-        x = self._columns(design, number)
-        own = np.array([name == source for name in errors.source_of_column])
         shares = np.linspace(-1.0, 1.0, _SWEPT)
-        tried = np.tile(x, (_SWEPT, 1))
-        tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
+        tried = self._at_shares(design, number, source, shares)
         values = self._values(design, tried)[:, 0]
-        model, settings = self.session.prepared.model, np.array(design.settings)
+        model, settings = self.session.model(design), np.array(design.settings)
         labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
         curves = [model.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
         leading = self.session.outputs[0]
@@ -98,6 +106,18 @@ class LiveUnits:
             "spread": float(known.max() - known.min()) if known.size else None,
             "curves": [[chart(own) for own in figures] for figures in curves],
         }
+
+    def _at_shares(
+        self, design: LiveDesign, number: int, source: str, shares: Float[np.ndarray, " share"]
+    ) -> Float[np.ndarray, "share column"]:
+        """Return the deviations of a unit with one of its errors at places of its zone [m, angles rad]."""
+        errors, sources = self.session.prepared.errors, {own.name: own for own in self.session.sources(design)}
+        if source not in sources:
+            raise UnknownNameError.among("page", "source", source, sources)
+        own = np.array([name == source for name in errors.source_of_column])
+        tried = np.tile(self._columns(design, number), (len(shares), 1))
+        tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
+        return tried
 
     def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
         """Return the deviations of a unit [m, angles rad]."""
@@ -119,8 +139,7 @@ class LiveUnits:
         return np.asarray(centred * half / measure)
 
     def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
-        model = self.session.prepared.model.at(np.array(design.settings))
-        evaluation = model.reading(self.session.outputs)(x)
+        evaluation = self.session.model(design).reading(self.session.outputs)(x)
         return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
 
 

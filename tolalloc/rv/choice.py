@@ -12,6 +12,7 @@ from tolalloc.drawings.sources import neglected_columns
 from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import is_number
+from tolalloc.rv import TORQUE
 from tolalloc.rv.clearance_settings import clearance_settings
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
@@ -139,20 +140,25 @@ class ReducerChoice:
         return self.reducer.name
 
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
-        """Return the reducer with a tooth modification that leaves other clearances [µm].
+        """Return the reducer with a tooth modification that leaves other clearances [µm], or at another torque [N·m].
 
         Raises
         ------
         InputError, UnknownNameError
-            A setting that it does not have, or a clearance outside its bounds.
+            A setting that it does not have, a clearance outside its bounds, or a torque that is not allowed.
         """
+        place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
+        self.reducer.torque_on_carrier(torque, place)
+        clearances = {name: value for name, value in settings.items() if name != TORQUE}
         own, stage = self.reducer.modification, self.reducer.cycloid_stage
         present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
         known = clearance_settings(present, (self.flank_clearance, self.radial_clearance))
-        require_settings(f"reducer {self.name}", known, settings)
-        flank, radial = (settings.get(setting.name, setting.value) * MICROMETRE for setting in known)
+        require_settings(place, known, clearances)
+        if not clearances:
+            return replace(self, torque=torque)
+        flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
         modification = Modification.from_clearances(flank, radial, stage)
-        return replace(self, reducer=replace(self.reducer, modification=modification))
+        return replace(self, torque=torque, reducer=replace(self.reducer, modification=modification))
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
         """Return the model at the sources of a drawing; nothing is solved.

@@ -17,7 +17,7 @@ from tolalloc.exceptions import UnknownNameError
 from tolalloc.models import Model, Observer, Response, SettingDerivatives, Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
-from tolalloc.rv import PEAK_TO_PEAK, PRELOAD
+from tolalloc.rv import PEAK_TO_PEAK, PRELOAD, TORQUE
 from tolalloc.rv.clearance_settings import FLANK, RADIAL, clearance_settings
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES, Equilibria
@@ -199,7 +199,14 @@ class ReducerModel(Model):
     @property
     def conditions(self) -> Mapping[str, float | str]:
         """Torque on the carrier."""
-        return {"torque [N·m]": self.kernel.torque}
+        return {TORQUE: self.kernel.torque}
+
+    @property
+    def operating_conditions(self) -> tuple[Setting, ...]:
+        """The torque, up to twice the rated one either way; what resists the rotation has no other sign than this."""
+        largest = max(2 * self.reducer.load.rated_torque, abs(self.kernel.torque))
+        step = self.reducer.load.rated_torque / 100
+        return (Setting(name=TORQUE, value=self.kernel.torque, lower=-largest, upper=largest, step=step),)
 
     @property
     def assumptions(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import { Zones, make } from "./zones.js";
 const at = (id) => document.getElementById(id);
 const REST = 350; // ms after which a hand rests and more units are asked for
 
-let mechanism = null, pictured = "";
+let mechanism = null, pictured = "", picturing = false;
 let turn = 0, study, zones, designs, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
 const history = { past: [], future: [], now: null };
 const charts = new Map();
@@ -70,21 +70,28 @@ async function more(record) {
   await count(study.most, record);
 }
 
-// The moving picture follows once the hand rests: it needs every angle in both directions.
+// The moving picture follows once the hand rests, and a swept error at once; only the newest of several is drawn.
 async function picture() {
-  const record = { design: zones.design, unit: Number(at("unit").value) }, key = JSON.stringify(record);
-  if (key === pictured || !at("moving").open || at("moving").dataset.none) return;
-  try {
-    const { scene } = await ask("scene", record);
-    pictured = key;
-    at("moving").hidden = !scene;
-    if (!scene) return void (at("moving").dataset.none = "yes");
-    if (mechanism) mechanism.update(scene);
-    else mechanism = new Mechanism(at("mechanism"), scene, { onPoint: (id) => zones.light(sourcesAt(id)), onChoose: (id) => goTo(sourcesAt(id)) });
-    shade();
-  } catch (error) {
-    if (!(error instanceof Refusal)) throw error;
+  if (picturing || at("moving").dataset.none) return;
+  picturing = true;
+  for (let key; at("moving").open && (key = JSON.stringify(pictureAsked())) !== pictured; pictured = key) {
+    const found = await refusable(ask("scene", JSON.parse(key)));
+    if (found) showScene(found.scene);
   }
+  picturing = false;
+}
+
+function pictureAsked() {
+  const record = { design: zones.design, unit: Number(at("unit").value) };
+  return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
+}
+
+function showScene(scene) {
+  at("moving").hidden = !scene;
+  if (!scene) return void (at("moving").dataset.none = "yes");
+  if (mechanism) mechanism.update(scene);
+  else mechanism = new Mechanism(at("mechanism"), scene, { onPoint: (id) => zones.light(sourcesAt(id)), onChoose: (id) => goTo(sourcesAt(id)) });
+  shade();
 }
 
 const sourcesAt = (id) => mechanism?.scene.places.find((place) => place.id === id)?.sources ?? [];
@@ -230,6 +237,7 @@ function follow() {
   at("effect-at").textContent = `at ${(100 * x[place]).toFixed(0)} % of its half zone: ${number(y[place])} ${judged?.outputs[0].unit ?? ""}`;
   charts.get("effect").update({ ...swept.figure, height: 220, vertical: [[x[place], "here"]] });
   curves(swept.curves[place]);
+  picture();
 }
 
 function unsweep() {
@@ -337,6 +345,7 @@ async function begin() {
   at("effect-close").addEventListener("click", () => {
     unsweep();
     curves(drawn.figures);
+    picture();
   });
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range])")) return;

@@ -65,7 +65,8 @@ export class Zones {
     const lock = make("button", { title: "lock: an allocation leaves it as it is", "aria-label": `lock ${name}`, onclick: () => this.toggle(group) });
     const price = make("span", { class: "price", title: "cost" });
     const share = make("div", { class: "share", hidden: true });
-    const about = make("small", {}, many ? `${members.length} alike: ${first.meaning}` : first.meaning);
+    const labels = [...new Set(members.map((own) => own.label).filter(Boolean))];
+    const about = make("small", {}, [...labels, many ? `${members.length} alike: ${first.meaning}` : first.meaning].join(" · "));
     const row = make("div", { class: "row", onpointerenter: () => this.point(members.map((own) => own.name)), onpointerleave: () => this.point([]) },
       make("span", { class: "title" }, name, make("br"), about), make("span", {}, field, ` ${MICRO}`), lock, price,
       make("span", { class: "slide" }, slider, make("button", { title: "effect of this source over its zone", "aria-label": `effect of ${first.name}`, onclick: () => this.effect(first.name) }, "effect")), share);
@@ -79,7 +80,7 @@ export class Zones {
         } });
         return [own, input];
       });
-      row.append(make("details", {}, make("summary", {}, "each"), ...fields.map(([own, input]) => make("label", {}, own.name, input))));
+      row.append(make("details", {}, make("summary", {}, "each"), ...fields.map(([own, input]) => make("label", {}, own.label ? `${own.name} (${own.label})` : own.name, input))));
       row.fields = fields;
     }
     const made = first.processes.length > 1 ? make("select", { "aria-label": `process of ${name}`, onchange: (e) => {
@@ -118,9 +119,9 @@ export class Zones {
       this.changed(this.design, settled);
     };
     const field = make("input", { type: "number", step: "any", disabled: fixed, "aria-label": own.name, onchange: (e) => set(Number(e.target.value), true) });
-    const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: (own.upper - own.lower) / STEPS || 1, disabled: fixed, "aria-label": `${own.name}, from ${own.lower} to ${own.upper}`,
+    const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: own.step || 1, disabled: fixed, "aria-label": `${own.name}, from ${own.lower} to ${own.upper}`,
       oninput: (e) => set(rounded(Number(e.target.value)), false), onchange: (e) => set(rounded(Number(e.target.value)), true) });
-    const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : this.study.settings_word);
+    const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : own.word);
     const row = make("div", { class: "row" }, make("span", { class: "title" }, own.name, make("br"), note), field, "", "", make("span", { class: "slide" }, slider));
     row.update = () => {
       field.value = rounded(this.setting(own.name));
@@ -157,7 +158,7 @@ export class Zones {
 
   find(text) {
     for (const [group, row] of this.rows) {
-      const names = [group, ...(this.groups.get(group) ?? []).map((own) => own.name)];
+      const names = [group, ...(this.groups.get(group) ?? []).flatMap((own) => [own.name, own.label])];
       row.hidden = !names.some((name) => name.toLowerCase().includes(text.toLowerCase()));
     }
   }
