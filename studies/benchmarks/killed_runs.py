@@ -1,6 +1,6 @@
 """Runs that are killed at a random moment and started again: whether they end in the same bits.
 
-    python studies/benchmarks/killed_runs.py [--kills 20] [--seed 1] [--json]
+    python studies/benchmarks/killed_runs.py [--kills 20] [--seed 1] [--only assemble] [--json]
 
 A folder of three cranks that `tolalloc new` makes is asked by five commands. Each command runs once in one piece and
 then, per kill, in an empty folder until it is killed (SIGKILL) at a moment uniform over the time it takes, and again
@@ -108,14 +108,14 @@ def _is_time(runs: Path, after: float, passed: float) -> bool:
     return passed >= after if after <= 1 else any(runs.glob(".*.unfinished/report.html"))
 
 
-def measured(kills: int, seed: int, folder: Path) -> dict[str, list[Killed]]:
+def measured(commands: dict[str, tuple[str, ...]], kills: int, seed: int, folder: Path) -> dict[str, list[Killed]]:
     """Return what became of the runs of every command."""
     generator, found = np.random.default_rng(seed), {}
     rows = (folder / "zones.csv").read_text(encoding="utf-8").splitlines(keepends=True)
     few = [row for row in rows if row.split(",")[0] in KEPT]
     (folder / "few.csv").write_text("".join(few), encoding="utf-8")
     (folder / "small.py").write_text(STUDY, encoding="utf-8")
-    for name, words in COMMANDS.items():
+    for name, words in commands.items():
         whole = folder / "runs" / name / "whole"
         begin = time.monotonic()
         with started(words, whole, folder) as running:
@@ -137,6 +137,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--kills", type=int, default=20, help="kills of each command")
     parser.add_argument("--seed", type=int, default=1, help="seed of the moments")
+    parser.add_argument("--only", choices=COMMANDS, help="one command alone")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     asked = parser.parse_args()
     if asked.kills < 1:
@@ -145,7 +146,8 @@ def main() -> None:
         folder = Path(place) / "mine"
         new = ["new", str(folder), "--like", "rv40e", "--cranks", "3", "--with", "bench,assembly"]
         subprocess.run([sys.executable, "-m", "tolalloc.cli.main", *new], check=True, stdout=subprocess.DEVNULL)
-        found = measured(asked.kills, asked.seed, folder)
+        commands = {asked.only: COMMANDS[asked.only]} if asked.only else COMMANDS
+        found = measured(commands, asked.kills, asked.seed, folder)
     if asked.json:
         print(json.dumps({name: [asdict(own) for own in runs] for name, runs in found.items()}, indent=2))
         return
