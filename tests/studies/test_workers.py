@@ -45,7 +45,7 @@ def in_this_process(study, units):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(5))
 def test_workers_that_are_killed_leave_the_same_bits(study, units, in_this_process, seed):
     generator = np.random.default_rng(seed)
     with workers_at("local") as workers:

@@ -13,7 +13,6 @@ from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import is_number
 from tolalloc.rv import TORQUE
-from tolalloc.rv.clearance_settings import clearance_settings
 from tolalloc.rv.equivalent.columns import source_name
 from tolalloc.rv.equivalent.kinematics import HARMONICS
 from tolalloc.rv.equivalent.model import EquivalentModel, remembered_model
@@ -24,6 +23,7 @@ from tolalloc.rv.reducer.series import at_torque
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.rv.settings import clearance_settings
 from tolalloc.settings import require_settings
 from tolalloc.units import MICROMETRE
 

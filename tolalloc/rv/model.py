@@ -18,12 +18,10 @@ from tolalloc.models import Model, Observer, Response, SettingDerivatives, Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD, TORQUE
-from tolalloc.rv.clearance_settings import FLANK, RADIAL, clearance_settings
 from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES, Equilibria
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.reducer.design import Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
@@ -39,6 +37,7 @@ from tolalloc.rv.response.outputs import (
 )
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force
+from tolalloc.rv.settings import FLANK, RADIAL, clearance_settings, torque_condition
 from tolalloc.settings import DrawnAmounts, Setting
 from tolalloc.units import ARCMINUTE, MICROMETRE
 
@@ -117,10 +116,10 @@ class ReducerModel(Model):
     def settings(self) -> tuple[Setting, ...]:
         """Flank and radial clearance."""
         bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in (self.flank, self.radial))
-        return clearance_settings(self._clearances, bounds)
+        return clearance_settings(self.present_clearances, bounds)
 
     @property
-    def _clearances(self) -> tuple[float, float]:
+    def present_clearances(self) -> tuple[float, float]:
         """Flank and radial clearance in force [µm]."""
         own, stage = self.reducer.modification, self.reducer.cycloid_stage
         return self.clearances or (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
@@ -203,10 +202,8 @@ class ReducerModel(Model):
 
     @property
     def operating_conditions(self) -> tuple[Setting, ...]:
-        """The torque, up to twice the rated one either way; what resists the rotation has no other sign than this."""
-        largest = max(2 * self.reducer.load.rated_torque, abs(self.kernel.torque))
-        step = self.reducer.load.rated_torque / 100
-        return (Setting(name=TORQUE, value=self.kernel.torque, lower=-largest, upper=largest, step=step),)
+        """The torque."""
+        return (torque_condition(self.kernel.torque, self.reducer.load.rated_torque),)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -370,10 +367,10 @@ class ReducerModel(Model):
 
         Only where bearings are stated by their dimensions: printed stiffnesses, many times too large, jam nearly all.
         """
-        return {PRELOAD: self._rated_pin_force} if self.reducer.parts else {}
+        return {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
 
     @cached_property
-    def _rated_pin_force(self) -> float:
+    def rated_pin_force(self) -> float:
         """Largest pin force of the perfect reducer under its rated torque [N]."""
         return rated_pin_force(self.reducer)
 
@@ -385,21 +382,9 @@ class ReducerModel(Model):
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:
         """Return nominal clearances, how many random units are jammed, and what is said of the catalogue."""
-        stage, (flank, radial) = self.reducer.cycloid_stage, self._clearances
-        found = preload(self.kernel.model, self.kernel.errors(x))
-        solved, rated = found.status == 0, self._rated_pin_force
-        if not solved.any():
-            return (f"None of {len(x)} random units has an equilibrium without torque.", *self.remarks)
-        jammed, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
-        unsolved = "" if solved.all() else f" ({(~solved).sum()} have no equilibrium)"
-        return (
-            f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
-            f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
-            f"Of {len(x)} random units {jammed.mean():.1%} are jammed{unsolved}: without torque their pins press with "
-            f"more than the {rated:.0f} N of the rated torque; half of all press with {median:.2g} N or more.",
-            *self.remarks,
-            *self.cautions(np.array(self._clearances)),
-        )
+        from tolalloc.rv.examination import examined
+
+        return examined(self, x)
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""

@@ -2,15 +2,15 @@
 
 import { Chart, colour, number } from "./chart.js";
 import { Designs } from "./designs.js";
-import { Mechanism } from "./mechanism.js";
-import { Refusal, ask, trouble } from "./requests.js";
+import { Picture } from "./picture.js";
+import { Refusal, ask, refusable, trouble } from "./requests.js";
+import { named, percent, quantile, verdict } from "./verdict.js";
 import { Zones, make } from "./zones.js";
 
 const at = (id) => document.getElementById(id);
 const REST = 350; // ms after which a hand rests and more units are asked for
 
-let mechanism = null, pictured = "", picturing = false;
-let turn = 0, study, zones, designs, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
+let turn = 0, study, zones, designs, picture, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
 const history = { past: [], future: [], now: null };
 const charts = new Map();
 
@@ -66,46 +66,8 @@ async function more(record) {
   if (!(await count(Math.min(1024, study.most), record))) return;
   const said = await refusable(ask("examined", record));
   if (said && record.turn === turn) at("cautions").replaceChildren(...said.sentences.map((text) => make("p", {}, text)));
-  await picture();
+  await picture.follow();
   await count(study.most, record);
-}
-
-// The moving picture follows once the hand rests, and a swept error at once; only the newest of several is drawn.
-async function picture() {
-  if (picturing || at("moving").dataset.none) return;
-  picturing = true;
-  for (let key; at("moving").open && (key = JSON.stringify(pictureAsked())) !== pictured; pictured = key) {
-    const found = await refusable(ask("scene", JSON.parse(key)));
-    if (found) showScene(found.scene);
-  }
-  picturing = false;
-}
-
-function pictureAsked() {
-  const record = { design: zones.design, unit: Number(at("unit").value) };
-  return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
-}
-
-function showScene(scene) {
-  at("moving").hidden = !scene;
-  if (!scene) return void (at("moving").dataset.none = "yes");
-  if (mechanism) mechanism.update(scene);
-  else mechanism = new Mechanism(at("mechanism"), scene, { onPoint: (id) => zones.light(sourcesAt(id)), onChoose: (id) => goTo(sourcesAt(id)) });
-  shade();
-}
-
-const sourcesAt = (id) => mechanism?.scene.places.find((place) => place.id === id)?.sources ?? [];
-
-function goTo([source]) {
-  const own = study.sources.find((item) => item.name === source);
-  if (own) zones.rows.get(own.group)?.scrollIntoView({ block: "center" });
-}
-
-// Places take the colour of what their sources contribute, as far as a ranking has said it.
-function shade() {
-  if (!mechanism || !zones.shares) return;
-  const most = Math.max(...Object.values(zones.shares), 1e-9);
-  mechanism.shade(Object.fromEntries(mechanism.scene.places.map((place) => [place.id, place.sources.reduce((sum, own) => sum + (zones.shares[own] ?? 0), 0) / most])));
 }
 
 function showDesign(shown) {
@@ -128,18 +90,6 @@ function curves(figures) {
   });
 }
 
-// What is named of an output: the value that so many units stay below, or above where only little is not allowed.
-const named = (share) => `${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`;
-const percent = (share) => `${(100 * share).toFixed(2)} %`;
-
-function quantile(own, { share, value, interval }) {
-  const limit = share < 0.5 ? own.lower : own.upper, beyond = value !== null && (share < 0.5 ? value < limit : value > limit);
-  const end = (known) => (known === null ? "more units needed" : number(Number(known.toPrecision(4))));
-  return make("div", {}, make("dt", {}, `${own.name}, ${named(share)}`),
-    make("dd", { class: beyond ? "bad" : "" }, `${value === null ? "–" : number(Number(value.toPrecision(4)))} ${own.unit}`),
-    make("dd", { class: "small" }, `${end(interval[0])} … ${end(interval[1])} (95 %)`));
-}
-
 function showUnits(shown) {
   at("answer").classList.remove("stale");
   const [share, low, high] = judged.yield;
@@ -148,7 +98,7 @@ function showUnits(shown) {
   at("yield-interval").textContent = `${percent(low)} … ${percent(high)} (95 %)`;
   at("counted").textContent = `${judged.units} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
   at("quantiles").replaceChildren(...judged.outputs.flatMap((own) => own.quantiles.map((item) => quantile(own, item))));
-  at("verdict").textContent = verdict(low, high);
+  at("verdict").textContent = verdict(judged);
   at("verdict").className = high < judged.target ? "bad" : "";
   judged.outputs.forEach((own, place) => {
     const marks = [[own.upper, "limit"], [own.lower, "limit"], ...own.quantiles.map(({ share, value }) => [value, named(share)])].filter(([value]) => value !== null);
@@ -160,16 +110,6 @@ function showUnits(shown) {
   for (const button of document.querySelectorAll("[data-unit]")) button.disabled = button.dataset.unit === "reject" && judged.outputs[0].reject === null;
   at("answer").dataset.judged = shown;
   at("answer").dataset.units = judged.units;
-}
-
-function verdict(low, high) {
-  const free = Object.entries(judged.broken).map(([output, share]) => {
-    const units = share ? `${percent(share)} of the units are` : "No unit is";
-    return output.startsWith("largest pin force without torque") ? ` ${units} jammed${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
-  }).join("");
-  if (low >= judged.target) return `The limits are kept: the yield is at least the ${percent(judged.target)} asked for.${free}`;
-  if (high < judged.target) return `The limits are not kept: the yield is below the ${percent(judged.target)} asked for.${free}`;
-  return `These units leave it open whether the yield is the ${percent(judged.target)} asked for; a run confirms it.${free}`;
 }
 
 // A page that is loaded again goes on with its design.
@@ -237,22 +177,12 @@ function follow() {
   at("effect-at").textContent = `at ${(100 * x[place]).toFixed(0)} % of its half zone: ${number(y[place])} ${judged?.outputs[0].unit ?? ""}`;
   charts.get("effect").update({ ...swept.figure, height: 220, vertical: [[x[place], "here"]] });
   curves(swept.curves[place]);
-  picture();
+  picture.follow();
 }
 
 function unsweep() {
   swept = null;
   at("effect").hidden = true;
-}
-
-// What a request answers; nothing where it was refused, which the page has said.
-async function refusable(asked) {
-  try {
-    return await asked;
-  } catch (error) {
-    if (!(error instanceof Refusal)) throw error;
-    return null;
-  }
 }
 
 function unlocked(found) {
@@ -283,7 +213,7 @@ async function question(kind) {
   if (state.answer.figure) draw("found", at("found"), state.answer.figure);
   if (state.answer.shares) {
     zones.show(null, state.answer.shares);
-    shade();
+    picture.shade();
   }
   if (state.answer.zones) at("found").prepend(make("button", { onclick: () => take({ zones: unlocked(state.answer.zones), settings: { ...zones.design.settings, ...state.answer.settings } }) }, "Take this drawing"));
 }
@@ -318,7 +248,11 @@ async function begin() {
       look();
     },
     effect,
-    point: (names) => mechanism?.light(mechanism.scene.places.filter((place) => place.sources.some((own) => names.includes(own))).map((place) => place.id)),
+    point: (names) => picture.light(names),
+  });
+  picture = new Picture(study, zones, () => {
+    const record = { design: zones.design, unit: Number(at("unit").value) };
+    return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
   });
   history.now = zones.design;
   at("unit").max = study.most;
@@ -341,11 +275,11 @@ async function begin() {
   at("stop").addEventListener("click", () => ask("stop"));
   at("effect-share").addEventListener("input", follow);
   if (innerWidth <= 900) at("moving").open = false; // zones would stand far below it
-  at("moving").addEventListener("toggle", () => judged && picture());
+  at("moving").addEventListener("toggle", () => judged && picture.follow());
   at("effect-close").addEventListener("click", () => {
     unsweep();
     curves(drawn.figures);
-    picture();
+    picture.follow();
   });
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range])")) return;

@@ -31,6 +31,16 @@ export async function ask(name, record = {}) {
   }
 }
 
+// What a request answers; nothing where it was refused, which the page has said.
+export async function refusable(asked) {
+  try {
+    return await asked;
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    return null;
+  }
+}
+
 export function trouble(sentence) {
   if (away && !sentence) return; // what is still away is still said
   place().hidden = !sentence;

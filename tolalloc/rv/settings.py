@@ -1,9 +1,10 @@
-"""The tooth modification as a designer chooses it: the clearances that it leaves on the flank, and at tip and root."""
+"""What may be chosen of a reducer: the clearances that its modification leaves, and a torque, which changes no part."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+from tolalloc.rv import TORQUE
 from tolalloc.settings import Setting
 
 FLANK = "flank clearance [µm]"
@@ -20,3 +21,9 @@ def clearance_settings(
         Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
         for name, value, own in zip((FLANK, RADIAL), present, bounds, strict=True)
     )
+
+
+def torque_condition(present: float, rated: float) -> Setting:
+    """Return the torque as an operating condition, up to twice the rated one either way, or as far as it is [N·m]."""
+    largest = max(2 * rated, abs(present))
+    return Setting(name=TORQUE, value=present, lower=-largest, upper=largest, step=rated / 100)

@@ -1,0 +1,28 @@
+// What random units say, in words.
+
+import { number } from "./chart.js";
+import { make } from "./zones.js";
+
+// What is named of an output: the value that so many units stay below, or above where only little is not allowed.
+export const named = (share) => `${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`;
+export const percent = (share) => `${(100 * share).toFixed(2)} %`;
+
+export function quantile(own, { share, value, interval }) {
+  const limit = share < 0.5 ? own.lower : own.upper, beyond = value !== null && (share < 0.5 ? value < limit : value > limit);
+  const end = (known) => (known === null ? "more units needed" : number(Number(known.toPrecision(4))));
+  return make("div", {}, make("dt", {}, `${own.name}, ${named(share)}`),
+    make("dd", { class: beyond ? "bad" : "" }, `${value === null ? "–" : number(Number(value.toPrecision(4)))} ${own.unit}`),
+    make("dd", { class: "small" }, `${end(interval[0])} … ${end(interval[1])} (95 %)`));
+}
+
+// Whether the limits are kept, as far as the units tell, and how many units do not work at all.
+export function verdict(judged) {
+  const [, low, high] = judged.yield;
+  const free = Object.entries(judged.broken).map(([output, share]) => {
+    const units = share ? `${percent(share)} of the units are` : "No unit is";
+    return output.startsWith("largest pin force without torque") ? ` ${units} jammed${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
+  }).join("");
+  if (low >= judged.target) return `The limits are kept: the yield is at least the ${percent(judged.target)} asked for.${free}`;
+  if (high < judged.target) return `The limits are not kept: the yield is below the ${percent(judged.target)} asked for.${free}`;
+  return `These units leave it open whether the yield is the ${percent(judged.target)} asked for; a run confirms it.${free}`;
+}
