@@ -191,6 +191,14 @@ def test_a_study_is_saved_beside_a_script_of_any_name(script):
     assert load_study(script.parent / said["script"]).drawing.sources[1].zone == pytest.approx(41.7e-6)
 
 
+def test_own_labels_and_drawing_numbers_stand_beside_the_ids(tmp_path):
+    script = tmp_path / "own.py"
+    row = '{"id": "housing", '
+    script.write_text(STUDY.replace(row, f'{row}"label": "Gehäuse", "drawing": "A-7", '), encoding="utf-8")
+    told = {own["name"]: own["label"] for own in ask(desk_of(script), "study")["sources"]}
+    assert told == {"housing": "Gehäuse, A-7", "shaft": ""}
+
+
 def test_a_zone_beyond_its_range_is_saved_with_a_wider_one(script, desk):
     found = ask(desk, "units", design={"zones": {"shaft": 150.0}}, units=256)
     saved = script.parent / ask(desk, "save", design={"zones": {"shaft": 150.0}}, name="loose")["script"]
