@@ -46,6 +46,7 @@ class Session:
 
     prepared: Prepared
     _known: dict[LiveDesign, Float[np.ndarray, "unit output"]] = field(default_factory=dict)
+    _under: dict[tuple[tuple[str, float], ...], Model] = field(default_factory=dict)  # Latest conditions → model
     _lock: Lock = field(default_factory=Lock)
 
     @cached_property
@@ -76,7 +77,12 @@ class Session:
         prepared, source = self.prepared, self.prepared.study.model
         model = prepared.model
         if design.operating and source is not None:
-            model = source.set_to(dict(design.operating)).bound(prepared.errors, "page").mapped(prepared.mapper)
+            bound = self._under.get(design.operating)
+            if bound is None:
+                bound = source.set_to(dict(design.operating)).bound(prepared.errors, "page").mapped(prepared.mapper)
+                self._under.clear()  # a hand that moves on seldom comes back to the very value
+                self._under[design.operating] = bound
+            model = bound
         return model.at(np.array(design.settings))
 
     def sources(self, design: LiveDesign) -> tuple[Source, ...]:

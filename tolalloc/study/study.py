@@ -191,7 +191,7 @@ class Study(NamedFields):
     def changed(
         self, drawing: Drawing | str | Path, settings: Mapping[str, float] | None = None, name: str = ""
     ) -> Study:
-        """Return the study at another drawing, and at other values of the model's settings.
+        """Return the study at another drawing, and at other values of the model's settings and operating conditions.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class Study(NamedFields):
             Another drawing, or the path of a tolerance table whose zones the present one takes; its correlations and
             process costs stay.
         settings
-            Setting → its value [unit of its name], such as ``{"flank clearance [µm]": 2.0}``.
+            Setting or operating condition → its value [unit of its name], such as ``{"flank clearance [µm]": 2.0}``.
         name
             Name of the new study; that of this one unless given.
 
