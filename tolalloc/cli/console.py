@@ -121,9 +121,9 @@ def tell(answer: Answer, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> No
         return
     for frame, title in tables:
         print_table(frame, title)
-    for sentence in answer.sentences:
+    for sentence in answer.told:
         typer.echo(sentence)
-    for warning in answer.warnings:
+    for warning in answer.warned:
         typer.secho(warning, fg="yellow")
 
 

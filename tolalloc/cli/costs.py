@@ -17,9 +17,12 @@ def costs(
 ) -> None:
     """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
     from tolalloc.allocation.cost.answer import CostFitsAnswer
-    from tolalloc.allocation.cost.points import load_shop_points
+    from tolalloc.allocation.cost.points import currency_of_prices, load_shop_points
+    from tolalloc.report.currency import in_currency
 
-    answer = CostFitsAnswer.of(load_shop_points(shop), shop.name)
+    answer = CostFitsAnswer.of(load_shop_points(shop), shop.name, currency_of_prices(shop))
     write_report(answer, out)
-    columns = ["process", "form, t in µm [cost units]", "rms error [%]", "error at points left out [%]", "taken"]
-    tell(answer, as_json, (answer.fits[columns], f"{shop.name}: what a zone costs"))
+    fits = answer.to_frame("fits")
+    form = in_currency("form, t in µm [cost units]", answer.header.currency)
+    shown = ["process", form, "rms error [%]", "error at points left out [%]", "taken"]
+    tell(answer, as_json, (fits[shown], f"{shop.name}: what a zone costs"))

@@ -26,6 +26,7 @@ def series(
 ) -> None:
     """Run many studies, a product series or a grid of limits, and tell all answers in one table."""
     from tolalloc.report.answer import Header
+    from tolalloc.study.finished_run import common_currency
     from tolalloc.study.series import SeriesAnswer, run_series
 
     studies = [load_study(script) for script in scripts]
@@ -41,5 +42,6 @@ def series(
         raise StoppedError(
             f"Stopped after {len(members)} of {len(asked)} studies; the same command goes on with the others."
         ) from None
-    answer = SeriesAnswer(header=Header(name="series", model=""), members=tuple(members))
+    currency = common_currency(member.found for member in members if member.found)
+    answer = SeriesAnswer(header=Header(name="series", model="", currency=currency), members=tuple(members))
     tell(answer, as_json, (answer.table, "Answers"))

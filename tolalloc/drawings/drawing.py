@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.fields import ToleranceRow
+from tolalloc.drawings.fields import COLUMNS, ToleranceRow
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import read_table_file, require_columns
+from tolalloc.drawings.table_file import read_table_file, require_columns, split_header, stated_currency
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
 from tolalloc.exceptions import InputError
 from tolalloc.file_content import is_file
 from tolalloc.files import found_from_here, write_new
+from tolalloc.report.currency import in_currency
+from tolalloc.report.wording import currency_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,12 +40,15 @@ class Drawing:
         Ways to make the features and what each costs, which `tolalloc.allocation.cost` reads.
     notes
         What a reader of its table must know, such as which rows were hidden.
+    currency
+        What its costs are in, such as EUR, which reports then say; empty where they are cost units.
     """
 
     name: str
     errors: ErrorModel
     costs: Costs = ""
     notes: tuple[str, ...] = ()
+    currency: str = ""
 
     @classmethod
     def of_rows(
@@ -54,6 +59,7 @@ class Drawing:
         processes: str | Path = "generic",
         correlations: str | Path | Correlation = "",
         costs: Costs = "",
+        currency: str = "",
     ) -> Drawing:
         """Return the drawing of rows written in Python, with the same checks as those of a file.
 
@@ -65,6 +71,8 @@ class Drawing:
             What messages and reports call the rows.
         processes, correlations, costs
             As in `load_drawing`; correlations may also be given as they are.
+        currency
+            What costs are in, three letters as in EUR or a sign; cost units if empty.
 
         Raises
         ------
@@ -86,7 +94,10 @@ class Drawing:
         sources = sources_of_rows(numbered, processes, place, Path.cwd())
         if not isinstance(correlations, Correlation):
             correlations = load_correlations(correlations, sources) if correlations else Correlation()
-        return cls(name=place, errors=ErrorModel(sources, correlation=correlations), costs=_placed(costs))
+        if currency and currency_in(currency) != currency:
+            raise InputError.at(place, "currency", currency, "three letters such as EUR, or €, $, £ or ¥")
+        errors = ErrorModel(sources, correlation=correlations)
+        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency)
 
     def __repr__(self) -> str:
         return f"<drawing {self.name}: {len(self.sources)} sources>"
@@ -115,7 +126,9 @@ class Drawing:
             The file, row, field and value that are not allowed.
         """
         path = found_from_here(table)
-        return replace(self.with_sources(load_tolerance_table(path), str(table)), notes=_notes(path))
+        notes, currency = _read_beside(path)
+        changed = self.with_sources(load_tolerance_table(path), str(table))
+        return replace(changed, notes=notes, currency=currency or self.currency)
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
         """Return the drawing with some of its sources changed, with the same correlations and process costs."""
@@ -126,7 +139,7 @@ class Drawing:
 
     def to_frame(self) -> pd.DataFrame:
         """Return the tolerance table, units in the headers."""
-        return table_frame(self.sources)
+        return in_currency(table_frame(self.sources), self.currency)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
@@ -139,7 +152,7 @@ class Drawing:
             The file is there already or cannot be made.
         """
         written = Path(path)
-        write_new(written, table_text(self.sources, written.parent))
+        write_new(written, table_text(self.sources, written.parent, self.currency))
         return written
 
     def _repr_html_(self) -> str:
@@ -188,19 +201,27 @@ def load_drawing(
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
+    notes, currency = _read_beside(found_from_here(beside(folder, table)), sheet)
     return Drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
-        notes=_notes(found_from_here(beside(folder, table)), sheet),
+        notes=notes,
+        currency=currency,
     )
 
 
-def _notes(table: Path, sheet: str = "") -> tuple[str, ...]:
-    """Return what a reader of a tolerance table must know: what of the file was left out, and what is hidden in it."""
+def _read_beside(table: Path, sheet: str = "") -> tuple[tuple[str, ...], str]:
+    """Return what a reader of a tolerance table must know, and the currency of its costs."""
     if not table.suffix:
-        return ()  # a shipped one
-    header = read_table_file(table, header=("id",), sheet=sheet)[0][0]
+        return (), ""  # a shipped one
+    header, names = read_table_file(table, header=("id",), sheet=sheet)[0]
+    stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
+    return _notes(table, header, sheet), stated_currency(table, stated, units)
+
+
+def _notes(table: Path, header: int, sheet: str) -> tuple[str, ...]:
+    """Return what of a tolerance table was left out, above the row of its header, and what is hidden in it."""
     titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
     left_out = (titles,) if header > 1 else ()
     if table.suffix.lower() not in (".xlsx", ".xlsm"):

@@ -13,9 +13,10 @@ from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
 from tolalloc.drawings.mixtures import batches_text, parsed_batches
 from tolalloc.drawings.sources import ANGULAR, Source
-from tolalloc.drawings.table_file import COST_UNITS, usual_signs
+from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
 from tolalloc.files import Record
+from tolalloc.report.wording import COST_UNITS
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 LARGEST_ZONE = 2000.0

@@ -15,12 +15,10 @@ from typing import Literal, TypeVar, get_args, get_origin
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.file_content import read_text, require_believable
 from tolalloc.files import Record, validated
+from tolalloc.report.wording import COST_UNITS, currency_in, in_cost_units
 
 DATA = Path(__file__).parent / "data"
 """Shipped tables."""
-
-COST_UNITS = "cost units"
-_CURRENCY = re.compile(r"^([A-Z]{3}|[€$£¥])")
 
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
@@ -241,7 +239,7 @@ def read_rows(
 def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> None:
     """Raise if the header of a column states another unit than the one it has, empty where it has none.
 
-    A currency is a cost unit like any other: three letters as in EUR, or its sign.
+    A currency is a cost unit like any other, three letters as in EUR or its sign; it is one for the whole file.
 
     Raises
     ------
@@ -251,10 +249,28 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
     for name, unit in stated:
         known = units.get(name, "")
         priced = known.startswith(COST_UNITS)
-        if unit and known not in (unit, _CURRENCY.sub(COST_UNITS, unit, count=1) if priced else unit):
+        if unit and known not in (unit, in_cost_units(unit) if priced else unit):
             allowed = f"{known}; numbers are not converted" if known else "none"
             allowed = f"a currency such as EUR, or {allowed}" if priced else allowed
             raise InputError.at(path, f"the unit of column {name}", unit, allowed)
+    _ = stated_currency(path, stated, units)
+
+
+def stated_currency(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> str:
+    """Return the currency that the headers of costs state, empty where they state none.
+
+    Raises
+    ------
+    InputError
+        A column that states another one than those before it.
+    """
+    first = ""
+    for name, unit in stated:
+        own = currency_in(unit) if units.get(name, "").startswith(COST_UNITS) else ""
+        if first and own and own != first:
+            raise InputError.at(path, f"the currency of column {name}", own, f"{first} as in the columns before it")
+        first = first or own
+    return first
 
 
 def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Record]) -> None:

@@ -24,6 +24,7 @@ from tolalloc.drawings.table_file import (
 )
 from tolalloc.exceptions import Faults, InputError
 from tolalloc.files import no_formula, shipped_or_path, validated
+from tolalloc.report.currency import in_currency
 from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -152,11 +153,11 @@ def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequen
     return frame
 
 
-def table_text(sources: Sequence[Source], folder: Path | None = None) -> str:
-    """Return the sources as the CSV file that `load_tolerance_table` reads."""
+def table_text(sources: Sequence[Source], folder: Path | None = None, currency: str = "") -> str:
+    """Return the sources as the CSV file that `load_tolerance_table` reads, costs in a currency if they are in one."""
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEADERS.values())
+    writer.writerow(in_currency(tuple(HEADERS.values()), currency))
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 

@@ -74,7 +74,7 @@ class Job:
     def _run(self) -> None:
         try:
             answer = self.study.ask(self.kind, "quick", self)
-            said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
+            said = {"sentences": list(answer.told), "warnings": list(answer.warned)}
             self.answer = said | _found(answer, self.settings)
         except _StoppedError:
             self.error = "stopped"

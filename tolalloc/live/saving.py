@@ -64,8 +64,9 @@ class Saving:
         for path in (table, script):
             if path.exists():
                 raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
-        drawing = self.study(design, name).drawing
-        write_new(table, table_text(tuple(map(_with_range, drawing.sources if drawing else ())), table.parent))
+        drawing, currency = self.study(design, name).drawing, self.session.prepared.currency
+        sources = tuple(map(_with_range, drawing.sources if drawing else ()))
+        write_new(table, table_text(sources, table.parent, currency))
         self._require_readable(table, design)
         before = self.session.prepared.study.name
         values = self._settings(design)

@@ -20,6 +20,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.live.design import LiveDesign, shown_zone
 from tolalloc.live.judged import judged
 from tolalloc.models import Model
+from tolalloc.report.wording import COST_UNITS
 from tolalloc.settings import Setting
 from tolalloc.study.prepared import Prepared
 from tolalloc.units import MICROMETRE
@@ -174,6 +175,7 @@ class Session:
                 *(_setting(own, "operating condition", _STEPS + 1) for own in model.operating_conditions),
             ],
             "limits": [own.sentence for own in self.requirements],
+            "currency": self.prepared.currency or COST_UNITS,
         }
 
 

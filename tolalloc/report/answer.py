@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from tolalloc.exceptions import UnknownNameError
+from tolalloc.report.currency import in_currency
 from tolalloc.report.document import Document, Section, tables_of
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ class Header:
         Outcome → number of solved units [-].
     stages
         Seconds and units of each stage.
+    currency
+        What costs are in by the user's own files, such as EUR; empty where they are cost units.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Header:
     assumptions: tuple[str, ...] = ()
     statuses: Mapping[str, int] = field(default_factory=dict)
     stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    currency: str = ""
 
     @property
     def failed(self) -> int:
@@ -127,7 +131,7 @@ class Answer(ABC):
     @cached_property
     def document(self) -> Document:
         """The report on this answer alone."""
-        return Document(
+        made = Document(
             title=self.title,
             subtitle=self.subtitle,
             answer=self.sentences,
@@ -138,11 +142,22 @@ class Answer(ABC):
             seed=self.header.seed,
             manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
         )
+        return in_currency(made, self.header.currency)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The answer in a few sentences, costs in the user's currency."""
+        return in_currency(self.sentences, self.header.currency)
+
+    @property
+    def warned(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it, costs in the user's currency."""
+        return in_currency(self.warnings, self.header.currency)
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
-        """All tables by name, units in the headers."""
-        return tables_of(self.sections)
+        """All tables by name, units in the headers, costs in the user's currency."""
+        return tables_of(in_currency(self.sections, self.header.currency))
 
     @property
     def figures(self) -> dict[str, Figure | HeatMap]:
@@ -194,7 +209,7 @@ class Answer(ABC):
 
     def __str__(self) -> str:
         """Return title, sentences and warnings."""
-        return "\n".join([self.title, *self.sentences, *self.warnings])
+        return "\n".join([self.title, *self.told, *self.warned])
 
     def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # noqa: ARG002
         """Show a terminal session what a person reads, not the numbers behind it."""
@@ -205,7 +220,7 @@ class Answer(ABC):
         from tolalloc.report.html_table import html_table
         from tolalloc.report.writer import inline_png
 
-        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:1])]
+        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.told[:1])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]
         shown += [inline_png(figure) for figure in list(self.figures.values())[:1]]
         return "\n".join(shown)

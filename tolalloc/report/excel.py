@@ -17,7 +17,7 @@ from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
 from tolalloc.files import is_formula
-from tolalloc.report.wording import unit_of
+from tolalloc.report.wording import in_cost_units, unit_of
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 _FORMATS = {"µm": "0.0##", "mm": "0.0000", "%": "0.0", "cost units": "0.00", "arcsec": "0.00", "arcmin": "0.000"}
@@ -52,7 +52,7 @@ def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
                 for row in range(2, len(frame) + 2):
                     value, cell = frame.iloc[row - 2, number - 1], sheet.cell(row, number)
                     if isinstance(value, float | Formula):
-                        cell.number_format = _FORMATS.get(unit_of(str(header)), "0.0###")
+                        cell.number_format = _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")
                     _keep_text(cell, value)
 
 

@@ -9,7 +9,7 @@ from numbers import Integral
 import pandas as pd
 from markupsafe import Markup, escape
 
-from tolalloc.report.wording import unit_of
+from tolalloc.report.wording import in_cost_units, unit_of
 
 _DECIMALS = {"%": 1, "cost units": 2}
 """Unit → decimals; every other number has four significant digits [-]."""
@@ -22,7 +22,7 @@ _MANY = 12
 def html_table(frame: pd.DataFrame) -> Markup:
     """Return a frame as an HTML table."""
     numeric = [all(map(_is_number, frame.iloc[:, at])) for at in range(frame.shape[1])]
-    units = [unit_of(str(name)) for name in frame.columns]
+    units = [in_cost_units(unit_of(str(name))) for name in frame.columns]
     head = "".join(
         f"<th{_NUMBER if is_number else ''}>{escape(name)}</th>"
         for name, is_number in zip(frame.columns, numeric, strict=True)

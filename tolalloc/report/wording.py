@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
+COST_UNITS = "cost units"
+"""What costs are counted in where no file states a currency."""
+_CURRENCY = re.compile(r"([A-Z]{3}|[€$£¥])(?=[ /·×]|$)")
+
 _SIGNS = {"arcsec": "″", "%": " %"}
 _UNDERSTOOD = " transmission error"
 """What an engineer leaves out where nothing else is meant."""
@@ -14,6 +20,25 @@ def unit_of(name: str) -> str:
     'arcmin'
     """
     return name.split("[")[-1].split("]")[0] if "[" in name else "-"
+
+
+def currency_in(unit: str) -> str:
+    """Return the currency that a unit of costs begins with, three letters or a sign; empty where there is none.
+
+    >>> currency_in("EUR µm^n"), currency_in("€"), currency_in("cost units")
+    ('EUR', '€', '')
+    """
+    found = _CURRENCY.match(unit)
+    return found[1] if found else ""
+
+
+def in_cost_units(unit: str) -> str:
+    """Return a unit with cost units for its currency, so that it is known whatever a user counts costs in.
+
+    >>> in_cost_units("EUR µm^n"), in_cost_units("µm")
+    ('cost units µm^n', 'µm')
+    """
+    return _CURRENCY.sub(COST_UNITS, unit, count=1)
 
 
 def sign_of(unit: str) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Section
+from tolalloc.report.document import Section, tables_of
 from tolalloc.report.figure import Figure, Series
-from tolalloc.report.wording import with_unit
-from tolalloc.study.finished_run import HIGH, LOW, TOTAL, FinishedRun
+from tolalloc.report.wording import COST_UNITS, with_unit
+from tolalloc.study.finished_run import HIGH, LOW, TOTAL, FinishedRun, common_currency
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,8 @@ class ComparisonAnswer(Answer):
     @classmethod
     def of(cls, first: FinishedRun, second: FinishedRun) -> ComparisonAnswer:
         """Return the comparison of two runs."""
-        return cls(header=Header(name=f"{first.name}, {second.name}", model=""), first=first, second=second)
+        header = Header(name=f"{first.name}, {second.name}", model="", currency=common_currency((first, second)))
+        return cls(header=header, first=first, second=second)
 
     @property
     def title(self) -> str:
@@ -81,6 +82,9 @@ class ComparisonAnswer(Answer):
             for label, run in zip(self.names, self.runs, strict=True)
             if run.manifest.get("quick")
         ]
+        if self.first.currency != self.second.currency:
+            units = [run.currency or COST_UNITS for run in self.runs]
+            found.append(f"The costs of A are in {units[0]} and those of B in {units[1]}; they cannot be compared.")
         if self.first.manifest.get("study hash") == self.second.manifest.get("study hash"):
             found.append("Both are runs of one and the same study, seed included.")
         return tuple(found)
@@ -121,7 +125,7 @@ class ComparisonAnswer(Answer):
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The comparison for a program."""
-        answers, ranking, zones = (self.tables[name] for name in ("answers", "rankings", "zones"))
+        answers, ranking, zones = (tables_of(self.sections)[name] for name in ("answers", "rankings", "zones"))
         return {
             "A": self.first.name,
             "B": self.second.name,

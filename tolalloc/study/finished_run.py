@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -12,6 +13,7 @@ import pandas as pd
 
 from tolalloc.exceptions import InputError
 from tolalloc.file_content import is_file, read_text
+from tolalloc.report.wording import in_cost_units, unit_of
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
@@ -42,9 +44,20 @@ class FinishedRun:
     zones: pd.DataFrame
 
     @property
+    def currency(self) -> str:
+        """What its costs are in; empty where they are cost units, as in runs of versions that knew no other."""
+        return str(self.manifest.get("currency", ""))
+
+    @property
     def limits(self) -> dict[str, float]:
         """Limits of the leading output by the names that the summary gives them, the upper one first."""
         return {name: value for name, value in self.summary.items() if name.startswith(_LIMITS)}
+
+
+def common_currency(runs: Iterable[FinishedRun]) -> str:
+    """Return the one currency of several runs; empty where they have none or several."""
+    stated = {run.currency for run in runs}
+    return stated.pop() if len(stated) == 1 else ""
 
 
 def read_run(folder: Path) -> FinishedRun:
@@ -96,11 +109,17 @@ def _read_json(path: Path) -> dict[str, Any]:
 def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
     text = _text(path, "a table in CSV")
     try:
-        found = pd.read_csv(StringIO(text))
+        found = pd.read_csv(StringIO(text)).rename(columns=_with_cost_units)
     except ValueError as error:
         raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
     _with(dict.fromkeys(found.columns), columns, path)
     return found
+
+
+def _with_cost_units(header: str) -> str:
+    """Return the header of a column under the name that every run's has, whatever its costs are in."""
+    unit = unit_of(header)
+    return header.replace(f"[{unit}]", f"[{in_cost_units(unit)}]")
 
 
 def _with(found: dict[str, Any], names: tuple[str, ...], path: Path) -> dict[str, Any]:

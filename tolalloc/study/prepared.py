@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from tolalloc.allocation.cost.process_costs_file import load_process_costs, priced
+from tolalloc.allocation.cost.process_costs_file import currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
 from tolalloc.allocation.requirement import JointRequirement, Requirement
@@ -115,6 +115,21 @@ class Prepared:
         return DesignSpace(errors=self.errors, settings=self.model.settings, processes=processes)
 
     @cached_property
+    def currency(self) -> str:
+        """What costs are in, by the headers of tolerance table and process costs; empty where they are cost units.
+
+        Raises
+        ------
+        InputError
+            The two state different ones.
+        """
+        drawing = self.study.drawing
+        own, made = (drawing.currency, currency_of_costs(drawing.costs)) if drawing else ("", "")
+        if own and made and own != made:
+            raise InputError.at(str(drawing and drawing.costs), "currency", made, f"{own} as in the tolerance table")
+        return own or made
+
+    @cached_property
     def digest(self) -> str:
         """Digest of the study and of what its files hold, wherever they stand."""
         study = self.study
@@ -138,5 +153,6 @@ class Prepared:
             quick=self.study.quick,
             digest=self.digest,
             conditions=self.model.conditions,
+            currency=self.currency,
             assumptions=(*self.model.assumptions, *(self.study.drawing.notes if self.study.drawing else ())),
         )

@@ -111,6 +111,7 @@ def _document(prepared: Prepared, answers: dict[str, Answer]) -> Document:
         "study hash": first.header.digest,
         "quick": study.quick,
         "questions": list(answers),
+        "currency": first.header.currency,
         "statuses": {kind: dict(answer.header.statuses) for kind, answer in answers.items()},
         "stages": {kind: dict(answer.header.stages) for kind, answer in answers.items()},
     }

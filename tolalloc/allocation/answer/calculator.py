@@ -21,6 +21,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.drawings.callouts import callout
+from tolalloc.report.currency import in_currency
 from tolalloc.report.excel import Formula, keep_values
 from tolalloc.report.feature_frame import FeatureFrame
 from tolalloc.report.wording import unit_of
@@ -137,7 +138,8 @@ def style_calculator(answer: AllocationAnswer, path: Path) -> None:
     path
         Workbook with the sheets of `calculator_sheets`, and others behind them.
     """
-    workbook, sheets = load_workbook(path), calculator_sheets(answer)
+    workbook = load_workbook(path)
+    sheets = {name: in_currency(own, answer.header.currency) for name, own in calculator_sheets(answer).items()}
     drawing, requirements = workbook["drawing"], workbook["requirements"]
     groups = len(answer.drawn.groups)
     guard = DataValidation(type="decimal", operator="between", formula1=f"E{_FIRST}", formula2=f"F{_FIRST}")

@@ -14,6 +14,7 @@ from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.drawings.fields import HEADERS
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame, with_own_words
+from tolalloc.report.currency import in_currency
 from tolalloc.report.excel import write_sheets
 from tolalloc.report.feature_frame import write_frames
 from tolalloc.report.wording import unit_of
@@ -120,8 +121,9 @@ def full_drawing_table(answer: AllocationAnswer) -> pd.DataFrame:
 
 def write_drawing(answer: AllocationAnswer, folder: Path) -> None:
     """Write ``allocation.csv``, which ``tolalloc`` reads back, and ``drawing.xlsx``, which goes on calculating."""
-    write_csv(table_frame(sources_to_go_on_from(answer), folder), folder / "allocation.csv")
+    currency = answer.header.currency
+    write_csv(in_currency(table_frame(sources_to_go_on_from(answer), folder), currency), folder / "allocation.csv")
     sheets = {**calculator_sheets(answer), "tolerances": full_drawing_table(answer)}
-    write_sheets(sheets, folder / "drawing.xlsx")
+    write_sheets({name: in_currency(frame, currency) for name, frame in sheets.items()}, folder / "drawing.xlsx")
     style_calculator(answer, folder / "drawing.xlsx")
     write_frames(frames_of(answer), folder / "frames.dxf")

@@ -39,7 +39,7 @@ class CostFitsAnswer(Answer):
     processes: Mapping[str, Points]  # Process, and the kind of callout if they are for one alone → zones [µm] and costs
 
     @classmethod
-    def of(cls, shop: ShopPoints, place: str) -> CostFitsAnswer:
+    def of(cls, shop: ShopPoints, place: str, currency: str = "") -> CostFitsAnswer:
         """Return the answer for the points of a file; what `fits` refuses is an InputError."""
         named = {
             process if feature is None else f"{process}, {feature}": points
@@ -47,7 +47,7 @@ class CostFitsAnswer(Answer):
         }
         for points in named.values():
             best_fit(points)
-        return cls(header=Header(name=place, model="closed forms"), processes=named)
+        return cls(header=Header(name=place, model="closed forms", currency=currency), processes=named)
 
     @property
     def title(self) -> str:

@@ -12,10 +12,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_COST, SMALLEST_ZONE, UNITS
-from tolalloc.drawings.table_file import COST_UNITS, read_rows
+from tolalloc.drawings.table_file import read_rows, read_text_table, split_header, stated_currency
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.files import Record
+from tolalloc.report.wording import COST_UNITS
 
 MOST_POINTS = 200
 """Most prices of one process; a fit leaves out each of them in turn, and a workbook's formula names all [-]."""
@@ -86,6 +87,14 @@ ShopPoints = Mapping[tuple[str, Feature | None], Points]
 """Process and feature, or None for every feature → points in micrometres."""
 
 
+_UNITS = {"cost": COST_UNITS, "tolerance": "unit"}
+
+
+def currency_of_prices(path: Path) -> str:
+    """Return the currency that the header of a shop's prices states, empty where it states none."""
+    return stated_currency(path, [split_header(header) for header in read_text_table(path).headers], _UNITS)
+
+
 def load_shop_points(path: Path) -> ShopPoints:
     """Return the points of a CSV file with the columns process, tolerance [unit], unit and cost [cost units].
 
@@ -97,7 +106,7 @@ def load_shop_points(path: Path) -> ShopPoints:
         The file, row, field and value that are not allowed, or a process with less than two tolerances.
     """
     prices: dict[tuple[str, Feature | None], list[tuple[float, float]]] = {}
-    for place, row in read_rows(path, ShopPrice, "process", {"cost": COST_UNITS, "tolerance": "unit"}):
+    for place, row in read_rows(path, ShopPrice, "process", _UNITS):
         zone = row.tolerance * UNITS[row.unit]
         if zone > LARGEST_ZONE:
             raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")

@@ -23,12 +23,14 @@ from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import CostModel, Process
 from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points, points_of
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.drawings.drawing import Costs
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import COST_UNITS, DATA, read_rows
+from tolalloc.drawings.table_file import DATA, read_rows, read_text_table, split_header, stated_currency
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.file_content import is_file
 from tolalloc.files import Record, shipped_or_path
+from tolalloc.report.wording import COST_UNITS
 from tolalloc.units import MICROMETRE, MILLIMETRE
 
 Cost = Annotated[float, Field(ge=0, le=1e9)]
@@ -244,6 +246,14 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
             own = [(place, row) for place, row in rows if fnmatchcase(source.name, row.sources)]
             found[source.name] = _processes(source, own, shops, path) if own else (today(source),)
     return found
+
+
+def currency_of_costs(costs: Costs) -> str:
+    """Return the currency that a process cost table states in its headers, empty where it states none."""
+    if isinstance(costs, Mapping) or not costs:
+        return ""
+    path = shipped_or_path(costs, DATA, ".process_costs.csv", "process cost table")
+    return stated_currency(path, [split_header(header) for header in read_text_table(path).headers], UNITS)
 
 
 def _processes(

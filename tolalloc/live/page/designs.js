@@ -4,8 +4,8 @@ import { colour, node, number } from "./chart.js";
 import { make } from "./zones.js";
 
 export class Designs {
-  constructor(element, { take }) {
-    Object.assign(this, { element, take, pinned: [], count: 0 });
+  constructor(element, { currency, take }) {
+    Object.assign(this, { element, currency, take, pinned: [], count: 0 });
   }
 
   pin(record) {
@@ -25,7 +25,7 @@ export class Designs {
   draw() {
     this.element.hidden = !this.pinned.length;
     if (!this.pinned.length) return;
-    const heads = ["design", "cost [cost units]", "yield [%], 95 % interval", "units [-]", ...this.pinned[0].outputs.flatMap((own) => own.quantiles.map(({ share }) => `${own.name} [${own.unit}], ${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`)), ""];
+    const heads = ["design", `cost [${this.currency}]`, "yield [%], 95 % interval", "units [-]", ...this.pinned[0].outputs.flatMap((own) => own.quantiles.map(({ share }) => `${own.name} [${own.unit}], ${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`)), ""];
     const rows = this.pinned.map((own, place) => make("tr", {},
       make("td", {}, make("i", { style: `background: ${colour(place + 2)}` }), own.name), make("td", { class: "number" }, own.cost.toFixed(2)),
       make("td", { class: "number" }, `${(100 * own.yield[0]).toFixed(2)} (${(100 * own.yield[1]).toFixed(2)}…${(100 * own.yield[2]).toFixed(2)})`),

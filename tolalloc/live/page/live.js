@@ -73,7 +73,7 @@ async function more(record) {
 function showDesign(shown) {
   const change = drawn.cost - drawn.before;
   at("cost").textContent = drawn.cost.toFixed(2);
-  at("cost-change").textContent = Math.abs(change) < 5e-4 ? "cost units, as drawn" : `cost units, ${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
+  at("cost-change").textContent = Math.abs(change) < 5e-4 ? `${study.currency}, as drawn` : `${study.currency}, ${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
   at("answer").classList.add("stale");
   zones.show(drawn);
   at("values").textContent = drawn.values.map((own) => `${own.name} ${own.value === null ? "without an answer" : `${number(own.value)} ${own.unit}`}`).join(" · ");
@@ -241,7 +241,8 @@ async function begin() {
   document.title = `${study.name}, live`;
   at("name").textContent = `${study.model}: ${study.name}`;
   at("conditions").textContent = [...study.conditions.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value).replace("-", "−")} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
-  designs = new Designs(at("designs"), { take: (own) => take(own.design) });
+  at("currency").textContent = study.currency;
+  designs = new Designs(at("designs"), { currency: study.currency, take: (own) => take(own.design) });
   zones = new Zones(study, at("zones"), at("settings"), {
     changed: (design, settled) => {
       if (settled) remember(design);
