@@ -56,10 +56,7 @@ def exact_front(
     """
     budgets = stacks[0].budget + (shares - 1) * limit
     if space.has_choices:
-        chosen = [
-            process_choice.allocate(space.problem((replace(stacks[0], budget=budget), *stacks[1:])))
-            for budget in budgets
-        ]
+        chosen = process_choice.front(space.problem(stacks), 0, budgets)
         solved = [found if isinstance(found, Solution) else None for found in chosen]
     else:
         program = Programs(space, len(stacks)).of(np.zeros(len(space.groups), dtype=int))

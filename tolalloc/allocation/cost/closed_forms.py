@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from math import isfinite, log
 from typing import Any
@@ -152,3 +154,16 @@ class Combined(_FallingCost):
 
 
 ClosedForm = Reciprocal | ReciprocalPower | Exponential | Combined
+
+
+def stacked(costs: Sequence[ClosedForm]) -> ClosedForm:
+    """Return costs of one form as one whose parameters are columns, so that a row of zones belongs to each.
+
+    >>> stacked([Reciprocal(factor=1.0), Reciprocal(factor=2.0)]).value(np.array([[1.0, 2.0], [1.0, 2.0]]))
+    array([[1. , 0.5],
+           [2. , 1. ]])
+    """
+    made = copy(costs[0])
+    for name in vars(made):
+        object.__setattr__(made, name, np.array([[getattr(cost, name)] for cost in costs]))  # each is checked already
+    return made

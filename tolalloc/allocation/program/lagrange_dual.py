@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.allocation.cost.closed_forms import Expression, Reciprocal
+from tolalloc.allocation.cost.closed_forms import Expression
 from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.program.least_priced import by_form
 from tolalloc.allocation.program.problem import AllocationProblem
 from tolalloc.exceptions import InputError
-
-_FRACTIONS = np.linspace(0.0, 1.0, 33)
-_ROUNDS = 4
-"""Each narrows a zone to 1/32 of its range, so four leave a ratio of 1 + 1e-5 at most [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +50,7 @@ class LagrangeDual:
     λ/(2·budget)·(‖root_sum_square∘zones‖² − budget²) ≤ 0, which needs no u and stays as tight as a dual can be when
     processes compete.
 
-    The minimum over one zone does not hang on a converged iteration either (`least_priced_cost`), so all that may
+    The minimum over one zone does not hang on a converged iteration either (`LeastPriced`), so all that may
     lift the bound is the rounding of a sum of as many terms as there are features and stacks.
     """
 
@@ -68,6 +64,7 @@ class LagrangeDual:
         self._processes = tuple(process for feature in problem.features for process in feature.processes)
         for at, process in zip(self.feature, self._processes, strict=True):
             convex_cost(f"feature {problem.features[at].name}", process, cp.Variable(pos=True))
+        self._alone = by_form(self._processes)
         self._worst_case = np.array([stack.worst_case for stack in problem.stacks]).reshape(-1, len(counts))
         self._root_sum_square = np.array([stack.root_sum_square for stack in problem.stacks]).reshape(-1, len(counts))
         self._slopes = np.array([stack.slopes for stack in problem.stacks]).reshape(
@@ -98,13 +95,13 @@ class LagrangeDual:
         square = (half / budget) @ self._root_sum_square**2 + self.problem.losses
         slope, box = prices @ self._slopes, self.problem.shared
         shared = np.where(slope > 0, box.lower, box.upper)
-        found = [
-            least_priced_cost(process, float(linear[at]), float(square[at]))
-            for at, process in zip(self.feature, self._processes, strict=True)
-        ]
+        least, zones = np.empty((2, self.feature.size))
+        for alike in self._alone:
+            own = self.feature[alike.places]
+            least[alike.places], zones[alike.places] = alike.found(linear[own], square[own])
         return PricedProcesses(
-            least=np.array([value for value, _ in found]),
-            zones=np.array([zone for _, zone in found]),
+            least=least,
+            zones=zones,
             shared=shared,
             constant=float(slope @ shared - (plane + half) @ self._budget),
             prices=prices,
@@ -151,45 +148,3 @@ def convex_cost(place: str, process: Process, zone: Expression) -> Expression:
     if expression is None:
         raise InputError.at(place, f"process {process.name}", "a cost that is not convex", "a convex cost")
     return expression
-
-
-def least_priced_cost(process: Process, linear: float, square: float) -> tuple[float, float]:
-    """Return a lower bound on cost + linear·zone + square·zone² over the range of a process, and the zone there.
-
-    Parameters
-    ----------
-    process
-        The process, whose cost is convex.
-    linear, square
-        Price of its zone [cost units per unit of the zone], and of its square, 0 or above [cost units per unit²].
-
-    Notes
-    -----
-    A convex function lies above its tangents at any two zones, so the crossing of the two bounds it from below
-    wherever they stand; that they stand on both sides of the minimum and close together only makes the bound tight.
-    For b/t + p·t the minimum is known: it is reached at √(b/p), or at the nearer end of the range.
-    """
-    if isinstance(process.cost, Reciprocal) and square == 0:
-        return _least_reciprocal(process, process.cost, linear)
-    low, high = process.minimum, process.maximum
-    for _ in range(_ROUNDS):
-        zones = np.minimum(low * (high / low) ** _FRACTIONS, high)
-        rising = process.cost.slope(zones) + linear + 2 * square * zones >= 0
-        after = int(np.argmax(rising)) if rising[-1] else zones.size
-        low, high = float(zones[max(after - 1, 0)]), float(zones[min(after, zones.size - 1)])
-        if low == high:
-            break
-    ends = np.array([low, high])
-    values = process.total(ends) + linear * ends + square * ends**2
-    if low == high:
-        return float(values[0]), low
-    slopes = process.cost.slope(ends) + linear + 2 * square * ends
-    step = float(np.clip((values[1] - values[0] - slopes[1] * (high - low)) / (slopes[0] - slopes[1]), 0, high - low))
-    return float(values[0] + slopes[0] * step), low + step
-
-
-def _least_reciprocal(process: Process, cost: Reciprocal, price: float) -> tuple[float, float]:
-    """Return the least of a reciprocal cost with a price on its zone, and the zone there."""
-    best = sqrt(cost.factor / price) if price > 0 else process.maximum
-    zone = min(max(best, process.minimum), process.maximum)
-    return cost.fixed + process.change + cost.factor / zone + price * zone, zone

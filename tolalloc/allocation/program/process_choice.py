@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.program.certificate import ascend
 from tolalloc.allocation.program.convex import ConvexProgram
@@ -35,14 +35,28 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
     SolveError
         The search ended before it found a design, or a convex program was not solved.
     """
-    search = _BranchAndBound(problem)
-    best = search.cheapest([np.ones(search.dual.feature.size, dtype=bool)], most_nodes)
-    if best is not None:
-        return best
-    closest = least_infeasible(problem)
-    if closest.feasible:
-        raise SolveError(f"No design was found within {most_nodes} nodes, though there are some.")
-    return closest
+    return _BranchAndBound(problem).answer(most_nodes)
+
+
+def front(
+    problem: AllocationProblem, at: int, budgets: Float[np.ndarray, " point"], most_nodes: int = 500
+) -> tuple[Solution | LeastInfeasible, ...]:
+    """Return what `allocate` finds for every budget of the stack at a position.
+
+    Each search begins with the processes and the prices of the one before: neighbours are mostly made alike, and a
+    program that is compiled takes other budgets.
+
+    Raises
+    ------
+    InputError, SolveError
+        As of `allocate`.
+    """
+    found, before = list[Solution | LeastInfeasible](), None
+    for budget in budgets.tolist():
+        stacks = (*problem.stacks[:at], replace(problem.stacks[at], budget=budget), *problem.stacks[at + 1 :])
+        before = _BranchAndBound(replace(problem, stacks=stacks), before)
+        found.append(before.answer(most_nodes))
+    return tuple(found)
 
 
 def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 500) -> Solution | None:
@@ -63,20 +77,38 @@ def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 50
 
 
 class _BranchAndBound:
-    """Best-first branch and bound; every multiplier ever tried bounds every node."""
+    """Best-first branch and bound; every multiplier ever tried bounds every node.
 
-    def __init__(self, problem: AllocationProblem) -> None:
+    A search of the same features and stacks at another budget hands over what it compiled and what it found.
+    """
+
+    def __init__(self, problem: AllocationProblem, before: _BranchAndBound | None = None) -> None:
         self.problem, self.dual, self._alike = problem, LagrangeDual(problem), _alike_features(problem)
         self._tried: list[PricedProcesses] = []
         self._solved: dict[tuple[int, ...], Solution | None] = {}
+        self._programs: dict[tuple[int, ...], ConvexProgram] = before._programs if before else {}
         self._best: Solution | None = None
         zones = np.array([feature.processes[0].maximum for feature in problem.features])
         self._add([self.dual.price(self.dual.span / problem.scales, self.dual.planes(zones))])
+        if before and before._best:
+            top, _ = before._best_tried(np.ones(self.dual.feature.size, dtype=bool))
+            self._add([self.dual.price(top.prices, top.planes)])
+            self._try(before._best.processes)
 
     @property
     def _enough(self) -> float:
         """Bound from which on a node cannot hold anything cheaper [cost units]."""
         return np.inf if self._best is None else self._best.cost - _GAP * abs(self._best.cost)
+
+    def answer(self, most_nodes: int) -> Solution | LeastInfeasible:
+        """Return the cheapest design of all, or what violates the stacks least."""
+        best = self.cheapest([np.ones(self.dual.feature.size, dtype=bool)], most_nodes)
+        if best is not None:
+            return best
+        closest = least_infeasible(self.problem)
+        if closest.feasible:
+            raise SolveError(f"No design was found within {most_nodes} nodes, though there are some.")
+        return closest
 
     def cheapest(self, nodes: Iterable[Allowed], most_nodes: int) -> Solution | None:
         """Return the cheapest design within the nodes, None if there is none."""
@@ -134,8 +166,10 @@ class _BranchAndBound:
         """Solve for one choice of processes, unless that is done already, and keep the cheapest design."""
         key = tuple(processes.tolist())
         if key not in self._solved:
-            program = ConvexProgram(self.problem.features, processes, len(self.problem.stacks), self.problem.shared)
-            found = self._solved[key] = program.solve(self.problem.stacks)
+            if key not in self._programs:
+                made = ConvexProgram(self.problem.features, processes, len(self.problem.stacks), self.problem.shared)
+                self._programs[key] = made
+            found = self._solved[key] = self._programs[key].solve(self.problem.stacks)
             if found is not None:
                 self._add([self.dual.price(found.prices, self.dual.planes(found.zones))])
                 if self._best is None or found.cost < self._best.cost:
