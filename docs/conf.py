@@ -56,7 +56,15 @@ def _write_files(_: Any) -> None:
     (HERE / "_made" / "files.md").write_text(page(), encoding="utf-8")
 
 
+def _write_cases(_: Any) -> None:
+    """Write the validation manual beside it, from the cases whose values tests show."""
+    from cases_page import page
+
+    (HERE / "_made" / "cases.md").write_text(page(), encoding="utf-8")
+
+
 def setup(app: Any) -> None:
     """Make the pages that no hand writes before Sphinx reads them."""
     app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
     app.connect("builder-inited", _write_files, priority=101)
+    app.connect("builder-inited", _write_cases, priority=102)

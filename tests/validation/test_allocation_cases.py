@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from studies.published import allocation_cases as published
 from studies.published.stacks import root_sum_square
+from tests.validation_manual import shown
 from tolalloc.allocation.cost.process_costs_file import priced
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
@@ -104,6 +105,8 @@ def test_the_clutch_has_the_optimum_of_the_file(loss):
     best = solved(problem)
     second = second_best(problem, best)
     assert best.cost == pytest.approx(known["total"], rel=1e-6)
+    if loss == "0":
+        shown("C6", best.cost)
     assert (best.processes + 1).tolist() == known["processes"]
     np.testing.assert_allclose(best.zones, known["t"], rtol=1e-5)
     assert second is not None

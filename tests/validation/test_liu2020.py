@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.validation_manual import shown
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -47,7 +48,10 @@ def test_curve_agrees_at_every_angle(rv20e, table4, column):
 )
 def test_equally_spaced_angles_miss_the_extremes(rv20e, table4, angles, expected):
     curves = rv20e.equilibria(table4, -1.0, 2 * np.pi * np.arange(angles) / angles)
-    assert np.ptp(curves.transmission_error) / ARCSECOND == pytest.approx(expected, abs=0.005)
+    found = float(np.ptp(curves.transmission_error)) / ARCSECOND
+    assert found == pytest.approx(expected, abs=0.005)
+    if angles == 936:
+        shown("S1", found)
 
 
 @pytest.mark.parametrize(("torque", "expected"), [(-1.0, 96.582), (-10.0, 96.462)])
@@ -77,6 +81,7 @@ def test_the_extremes_lie_between_the_6240_angles(rv20e, table4):
         truth.append(extreme(rv20e.equilibria(table4, -1.0, near).transmission_error) / ARCSECOND)
     assert truth[0] - truth[1] == pytest.approx(96.629, abs=0.001)
     assert result.peak_to_peak[0] / ARCSECOND == pytest.approx(truth[0] - truth[1], abs=0.005)
+    shown("S2", result.peak_to_peak[0] / ARCSECOND)
 
 
 def test_mean(rv20e, table4):
@@ -90,6 +95,7 @@ def test_main_orders(rv20e, table4):
     assert [order for order, _, _ in main] == [1, 78, 80, 79, 39, 2]
     amplitudes = [amplitude / ARCSECOND for _, amplitude, _ in main]
     np.testing.assert_allclose(amplitudes, [16.9, 11.8, 11.7, 8.4, 6.3, 4.4], atol=0.07)
+    shown("V6", amplitudes[0])
 
 
 def test_contact_set_changes_over_the_turn(rv20e, table4):

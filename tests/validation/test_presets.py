@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.studies.command import refused, tolalloc
+from tests.validation_manual import shown
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces, order_spectrum
@@ -30,6 +31,7 @@ def test_the_rigidity_is_the_catalogues_within_a_fifth(size):
     loop = exact_loop(reducer)
     assert loop.torsional_stiffness[0] == pytest.approx(reducer.catalogue.torsional_rigidity, rel=0.2)
     assert 0.1 < loop.lost_motion[0] / ARCMINUTE < reducer.catalogue.lost_motion / ARCMINUTE
+    shown(f"V{1 + SIZES.index(size)}", loop.torsional_stiffness[0] * ARCMINUTE)
     sentence, warnings = against_catalogue(reducer, loop)
     assert "where the catalogue states" in sentence
     assert not warnings

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.rv.cycloid.clearance import formula_gap
 from tolalloc.rv.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
@@ -76,6 +77,7 @@ def test_zone_by_the_sources_own_interpolation(rv40e):
 
 def test_zone(rv40e):
     assert given(rv40e).zone[0] / DEGREE == pytest.approx([3.173, 150.020], abs=0.0005)
+    shown("V9", float(given(rv40e).zone[0, 0]) / DEGREE)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from tests.validation_manual import shown
 from tolalloc.files import validated
 from tolalloc.rv.equivalent.hysteresis import hysteresis_loop
 from tolalloc.rv.equivalent.model import EquivalentModel
@@ -69,6 +70,7 @@ def test_both_trends_have_the_printed_sign_and_order_of_size():
     assert (np.diff(lost) > 0).all()
     found = np.array([rigidity[1:] / rigidity[0] - 1, lost[1:] / lost[0] - 1])
     printed = [[125.55 / 131.98 - 1, 117.41 / 131.98 - 1], [0.389 / 0.364 - 1, 0.412 / 0.364 - 1]]
+    shown("V8", 100 * float(found[0, 1]))
     assert (found / printed > 1 / 4).all()
     assert (found / printed < 4).all()
 

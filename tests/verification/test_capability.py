@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
+from tests.validation_manual import shown
 from tolalloc.capability.indices import (
     Limits,
     capability,
@@ -101,6 +102,8 @@ def test_wilson_covers_on_average(confidence):
     low, high = np.array([end.low for end in ends]), np.array([end.high for end in ends])
     coverage = [binom.pmf(counts, units, p)[(low <= p) & (p <= high)].sum() for p in np.linspace(0.02, 0.98, 193)]
     assert np.mean(coverage) == pytest.approx(confidence, abs=0.005)
+    if confidence == 0.95:
+        shown("S4", 100 * float(np.mean(coverage)))
     assert min(coverage) > confidence - 0.05
 
 

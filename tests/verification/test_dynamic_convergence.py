@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.validation_manual import shown
 from tests.verification.test_dynamics import input_of, run
 from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
 from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, newmark
@@ -36,3 +37,5 @@ def test_the_order_is_two(rv20e, table4, name, contacts):
     assert changed == (contacts == "opening and closing")
     orders = np.log2(apart[:-1] / apart[1:])
     np.testing.assert_allclose(orders[-2:], 2.0, rtol=0, atol=0.1)
+    if changed:
+        shown("S3", float(orders[-2:].mean()))

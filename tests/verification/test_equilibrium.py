@@ -12,6 +12,7 @@ import pytest
 from tests.random_reducers import Case, random_case, variations
 from tests.random_units import random_units
 from tests.seeds import seeds
+from tests.validation_manual import shown
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
 from tolalloc.compiled import thread_count, use_threads
 from tolalloc.rv.cycloid.solvers import LOGARITHMIC
@@ -48,7 +49,9 @@ def test_agrees_with_the_dense_twin(seed):
             case.reducer, case.units[number], case.torque, float(case.carrier_angle[at]), case.orders
         )
         assert twin.imbalance < 1e-10  # so the twin is right, whatever the kernel says
-        assert abs(found[number, at] - twin.rotation) < 1e-6 * ARCSECOND, f"seed {seed}, unit {number}, angle {at}"
+        apart = abs(found[number, at] - twin.rotation)
+        assert apart < 1e-6 * ARCSECOND, f"seed {seed}, unit {number}, angle {at}"
+        shown("C1", apart / ARCSECOND)
 
 
 @pytest.mark.parametrize("bending", [2e7, 5e8])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -303,7 +303,7 @@ class ReducerModel(Model):
             return peak
         deviations = np.sqrt(np.diag(self.identified.covariance))
         return OutputsWithStiffness(
-            peak=peak, outputs=outputs, reading=self._reading_on(outputs), steps=tuple(deviations.tolist())
+            peak=peak, outputs=outputs, reading=self._reading_on, steps=tuple(deviations.tolist())
         )
 
     def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> ReducerModel:
@@ -320,9 +320,9 @@ class ReducerModel(Model):
         stiffnesses = tuple(self.identified.values) if self.identified else ()
         return StiffnessResponse(kernel=self.kernel, stiffnesses=stiffnesses)
 
-    def _reading_on(self, outputs: tuple[str, ...]) -> Callable[[KernelResponse], Response]:
-        """Return what makes the response of the outputs from a kernel with other stiffnesses."""
-        return lambda kernel: replace(self, kernel=kernel).reading(outputs)
+    def _reading_on(self, kernel: KernelResponse, outputs: tuple[str, ...]) -> Response:
+        """Return the response of the outputs on a kernel with other stiffnesses."""
+        return replace(self, kernel=kernel).reading(outputs)
 
     @cached_property
     def spectra(self) -> Mapping[int, tuple[str, str]]:

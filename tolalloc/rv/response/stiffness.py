@@ -94,12 +94,14 @@ class OutputsWithStiffness:
     -----
     The peak-to-peak takes its exact derivative. Every other output takes the one-sided difference between the kernel at
     a stiffness raised by its standard uncertainty and the kernel as it is, unit by unit, so that the effect of one
-    standard uncertainty is that of the kernel. A unit without an answer at one of them has none.
+    standard uncertainty is that of the kernel. A unit without an answer at one of them has none. What is counted of a
+    unit is how its peak-to-peak ended, or its other outputs where that is not asked for.
     """
 
     peak: StiffnessResponse  # The peak-to-peak with its exact derivative
     outputs: tuple[str, ...]  # Names of the outputs with their units
-    reading: Callable[[KernelResponse], Response]  # From a kernel, the response of these outputs
+    # From a kernel, the response of some outputs
+    reading: Callable[[KernelResponse, tuple[str, ...]], Response]
     steps: tuple[float, ...]  # Standard uncertainty of ln K of every stiffness: what a difference is taken over [-]
 
     @property
@@ -107,25 +109,38 @@ class OutputsWithStiffness:
         """The kernel's columns [m, angles rad], then ``stiffness.<field>`` [-]."""
         return self.peak.columns
 
+    @property
+    def _others(self) -> tuple[str, ...]:
+        """The outputs without the peak-to-peak, which no difference is taken of."""
+        return tuple(name for name in self.outputs if name != PEAK_TO_PEAK)
+
     @cached_property
     def _raised(self) -> dict[int, Response]:
-        """Position of every stiffness that is not known → the outputs with it raised; tables are made once for each."""
+        """Position of every stiffness that is not known → the others with it raised; tables are made once for each."""
         raised = ((at, step * np.eye(len(self.steps))[at]) for at, step in enumerate(self.steps) if step > 0.0)
         # These solves belong to a unit that is counted already.
-        return {at: self.reading(replace(self.peak.changed(change), observe=unobserved)) for at, change in raised}
+        return {
+            at: self.reading(replace(self.peak.changed(change), observe=unobserved), self._others)
+            for at, change in raised
+        }
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
-        own = len(self.peak.kernel.columns)
+        if PEAK_TO_PEAK not in self.outputs:
+            return self._differences(x, self.peak.kernel)
+        others = self._differences(x, replace(self.peak.kernel, observe=unobserved))
+        exact = self.peak(x)
+        values = np.insert(others.values, self.outputs.index(PEAK_TO_PEAK), exact.values[:, 0], axis=1)
+        return Evaluation(values=values, status=np.maximum(others.status, exact.status))
+
+    def _differences(self, x: Float[np.ndarray, "sample column"], kernel: KernelResponse) -> Evaluation:
+        """Return the others of every sample."""
+        own = len(kernel.columns)
         sample, change = np.ascontiguousarray(x[:, :own]), x[:, own:]
-        base = self.reading(self.peak.kernel)(sample)
+        base = self.reading(kernel, self._others)(sample)
         values, status = base.values.copy(), base.status.copy()
         for at, response in self._raised.items():
             found = response(sample)
             values += (found.values - base.values) * (change[:, [at]] / self.steps[at])
             status = np.maximum(status, found.status)
-        if PEAK_TO_PEAK in self.outputs:
-            exact = replace(self.peak, kernel=replace(self.peak.kernel, observe=unobserved))(x)
-            values[:, self.outputs.index(PEAK_TO_PEAK)] = exact.values[:, 0]
-            status = np.maximum(status, exact.status)
         return Evaluation(values=values, status=status)
