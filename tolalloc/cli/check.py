@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolalloc.cli.console import AsJson, print_json
+from tolalloc.cli.console import AsJson, announce_kernel, print_json
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
 from tolalloc.units import MICROMETRE
@@ -21,13 +21,22 @@ if TYPE_CHECKING:
     from tolalloc.study.prepared import Prepared
 
 
-def check(script: Script, as_json: AsJson = False) -> None:
+Timed = Annotated[
+    bool, typer.Option("--time", help="Solve a few units and say about how long each question takes here.")
+]
+
+
+def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None:
     """Check a study's names, units and bounds; no question is asked, but the script, a program, is run."""
     from tolalloc.study.prepared import Prepared
 
     study = load_study(script)
     if any(question.reads for question in study.questions):
-        summary, lines = _checked(Prepared(study=study), script)
+        prepared = Prepared(study=study)
+        summary, lines = _checked(prepared, script)
+        if timed:
+            found, said = _timed(prepared)
+            summary, lines = {**summary, **found}, [*lines, *said]
     else:
         kinds = ", ".join(question.kind for question in study.questions)
         summary = {"study": study.name, "questions": kinds}
@@ -73,6 +82,23 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     lines += study.drawing.notes if study.drawing else ()
     summary |= {"neglected": [*neglected, *model.left_out]}
     return {**summary, "examined": list(examined)}, [*lines, *examined]
+
+
+def _timed(prepared: Prepared) -> tuple[dict[str, Any], list[str]]:
+    """Return about how long the questions take at their effort and at the quick one, likewise."""
+    from dataclasses import replace
+
+    from tolalloc.study.duration import durations
+
+    study = prepared.study
+    announce_kernel(study.model)
+    efforts = {"quick": study.with_effort("quick"), **({} if study.quick else {"full": study})}
+    summary, lines = {}, []
+    for effort, asked in efforts.items():
+        for own in durations(replace(prepared, study=asked)):
+            summary[f"{effort} {own.kind}"] = {"units": list(own.units), "seconds": list(own.seconds)}
+            lines.append(f"{'With --quick, ' if effort == 'quick' else ''}{own.sentence}")
+    return {"durations": summary}, lines
 
 
 _CHECKED = 1000

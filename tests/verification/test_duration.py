@@ -1,0 +1,55 @@
+"""What a check says of the size of a question holds for what is then solved."""
+
+from __future__ import annotations
+
+import pytest
+
+import tolalloc as ta
+from tests.verification.test_own_words import ROWS, summed
+from tolalloc.study.duration import Duration, durations
+from tolalloc.study.prepared import Prepared
+
+
+def counted(study: ta.Study) -> dict[str, tuple[int, tuple[int, int]]]:
+    """Return question → units solved, and those that were foretold, at least and at most."""
+    told = {own.kind: own.units for own in durations(Prepared(study=study))}
+    solved = {kind: sum(study.ask(kind).header.statuses.values()) for kind in told}
+    return {kind: (solved[kind], told[kind]) for kind in told}
+
+
+def require_foretold(study: ta.Study) -> None:
+    found = counted(study)
+    assert {*found} == {"ranking", "allocation"}
+    for kind, (solved, (least, most)) in found.items():
+        assert least <= solved <= most, f"{kind}: {solved} of {least} to {most}"
+
+
+def test_the_units_of_an_own_function_are_foretold():
+    require_foretold(
+        ta.Study(
+            ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",)),
+            ta.Drawing.of_rows(ROWS),
+            limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)},
+            questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)],
+            effort="quick",
+        )
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("identified", [False, True])
+def test_the_units_of_a_reducer_are_foretold(identified):
+    stiffness = {"stiffness": "rv20e_table6"} if identified else {}
+    require_foretold(
+        ta.Study(
+            ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), **stiffness),
+            ta.drawing("rv20e_baseline"),
+            limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
+            effort="quick",
+        )
+    )
+
+
+def test_it_is_said_in_words():
+    told = Duration(kind="ranking", units=(9_000, 54_000), seconds=(12.3, 310.0))
+    assert told.sentence == "ranking: about 9,000 to 54,000 units, 12 s to 5.2 min here."

@@ -1,0 +1,145 @@
+"""About how long a question takes on this machine: how many units it solves, and what one costs here."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from math import prod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tolalloc.capability.experiment import Experiment
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.sensitivity.inverse import fewest_units
+from tolalloc.study.questions import Allocation, Ranking
+
+if TYPE_CHECKING:
+    from tolalloc.study.prepared import Prepared
+
+_TIMED = 128
+"""Units that are timed [-]."""
+_TRIALS = 16
+"""Units of the surrogates and their trials over those that they learn from, as counted in shipped studies [-]."""
+_CONFIRMATIONS = (0.3, 8.0)
+"""Units of a confirmation over its largest number for one design, as counted in shipped studies [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duration:
+    """What a question will take.
+
+    Parameters
+    ----------
+    kind
+        Its name.
+    units
+        About how many units it solves, at least and at most [-].
+    seconds
+        About how long that takes here, once everything is compiled [s].
+    """
+
+    kind: str
+    units: tuple[int, int]
+    seconds: tuple[float, float]
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        least, most = (_in_words(seconds) for seconds in self.seconds)
+        return f"{self.kind}: about {self.units[0]:,} to {self.units[1]:,} units, {least} to {most} here."
+
+
+def durations(prepared: Prepared) -> tuple[Duration, ...]:
+    """Return what the ranking and the allocation of a study will take, those of them that it asks."""
+    found = []
+    for question in prepared.study.questions:
+        if isinstance(question, Ranking):
+            parts = _of_ranking(prepared)
+        elif isinstance(question, Allocation):
+            parts = _of_allocation(question, prepared)
+        else:
+            continue
+        least, most = (sum(part.units[at] for part in parts) for at in (0, 1))
+        lower, upper = (sum((part.units[at] * part.seconds for part in parts), 0.0) for at in (0, 1))
+        found.append(Duration(kind=question.kind, units=(least, most), seconds=(lower, upper)))
+    return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """Units of one kind."""
+
+    units: tuple[int, int]  # At least and at most [-]
+    seconds: float  # What one takes [s]
+
+
+def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
+    """Return random units with all outputs, Saltelli blocks of them, and units of the leading output alone."""
+    model, errors, effort = prepared.model, prepared.errors, prepared.study.effort.ranking
+    leading = prepared.requirements[0].output
+    outputs = tuple(name for name in model.outputs if name in {*model.ranked, *prepared.study.limits})
+    waves = tuple(name for names in model.spectra.values() for name in names)
+    whole = _seconds(prepared, outputs)
+    analysed = _seconds(prepared, (*outputs, *waves), uncertain=True)
+    alone = _seconds(prepared, (leading,))
+    sources, dimensions = len(errors.blocks) + len(model.uncertain), len({*errors.dimension_of_column})
+    inverse = max(effort.inverse_units, fewest_units(prepared.target))
+    trials = effort.trajectories * (sources + 1) + 4 * effort.derivative_units + (sources + 2) * inverse
+    blocks = (effort.sobol.start, effort.sobol.limit)
+    most = trials + _TRIALS * effort.surrogate_units + 3 * effort.units
+    return (
+        _Part(units=(effort.units, effort.units), seconds=whole),
+        _Part(units=(blocks[0] * 2 * (sources + 2), blocks[1] * 2 * (sources + 2)), seconds=analysed),
+        _Part(units=(0, blocks[1] * (dimensions + 3) + most), seconds=alone),
+    )
+
+
+def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...]:
+    """Return the units of searches, confirmation, fronts, what-ifs and shares, all with the limited outputs."""
+    effort, model, errors = prepared.study.effort.allocation, prepared.model, prepared.errors
+    settings = len(prepared.space.settings)
+    searches = 2 if question.fixed_first and settings else 1
+    outputs = tuple(dict.fromkeys(own.output for own in prepared.requirements))
+    # A model without derivatives of its own is solved on either side of every column.
+    around = 2 if model.differentiable else 1 + 2 * len(errors.columns)
+    steps = (searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps) * around
+    front = effort.search.front
+    tried = front.designs + front.rounds * front.points + front.population_on_kernel * front.generations_on_kernel + 2
+    fronts = (1 + bool(settings)) * tried * effort.shared_units * question.front
+    what_if = question.what_if * (
+        effort.changed_stiffnesses * effort.stiffness_units * len(model.uncertain)
+        + prod(effort.setting_steps[:settings]) * 4 * effort.shared_units
+        + 2 * effort.stiffness_units
+    )
+    shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)
+    confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
+    least = effort.verification_units + confirmed[0]
+    most = steps * effort.verification_units + confirmed[1] + fronts + what_if + shares
+    return (_Part(units=(least, most), seconds=_seconds(prepared, outputs)),)
+
+
+def _seconds(prepared: Prepared, outputs: tuple[str, ...], *, uncertain: bool = False) -> float:
+    """Return what one unit takes, timed on a few random ones after others that compile what is needed [s]."""
+    model, errors = prepared.model, prepared.errors
+    response = model.reading(outputs)
+    experiment = Experiment.of(response, errors, SeedTree(prepared.study.seed).child("duration"))
+    x = experiment.deviations(errors.standard_values(experiment.uniform(_TIMED)))
+    if uncertain and model.uncertain:
+        response = model.with_uncertain(outputs)
+        x = np.pad(x, ((0, 0), (0, len(response.columns) - x.shape[1])))
+    response(x[:8])
+    start = time.perf_counter()
+    response(x)
+    return (time.perf_counter() - start) / _TIMED
+
+
+def _in_words(seconds: float) -> str:
+    """Return a time as a person says it.
+
+    >>> _in_words(0.4), _in_words(42.0), _in_words(300.0), _in_words(9000.0)
+    ('1 s', '42 s', '5.0 min', '2.5 h')
+    """
+    if seconds < 90:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
