@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fnmatch import fnmatchcase
 
 import numpy as np
 
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.units import MICROMETRE
@@ -23,14 +22,13 @@ def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict
     InputError, UnknownNameError
         No zone, a pattern that fits no source, a zone that is not above 0.
     """
-    names = [own.name for own in sources]
     found: dict[str, float] = {}
     if not zones:
         raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
     for pattern, zone in zones.items():
-        own = [name for name in names if fnmatchcase(name, pattern)]
+        own = meant(pattern, sources)
         if not own:
-            raise UnknownNameError.among("difference", "source", pattern, names)
+            raise UnknownNameError.among("difference", "source", pattern, known_as(sources))
         if not (isinstance(zone, int | float) and 0 < zone < 1e6):
             raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
         found |= dict.fromkeys(own, zone * MICROMETRE)

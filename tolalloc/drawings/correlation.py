@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import combinations, permutations, zip_longest
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.distributions import ndtri
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.table_file import plain_number, read_table_file
 from tolalloc.exceptions import InputError, UnknownNameError
 
@@ -194,9 +193,8 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
         The file, row and value that are not allowed.
     """
     rows = _read(Path(path))
-    names = tuple(source.name for source in sources)
     is_list = bool(set(LIST_HEADERS[1:]) & set(rows[0][1]))
-    pairs = _pairs_of_list(rows, names) if is_list else _pairs_of_matrix(rows, names)
+    pairs = _pairs_of_list(rows, sources) if is_list else _pairs_of_matrix(rows, sources)
     correlation = Correlation(pairs=pairs, origin=str(path))
     correlation.require_sound(sources)
     return correlation
@@ -210,7 +208,7 @@ def _read(path: Path) -> list[Row]:
     return [(f"{path}, row {number}", list(cells)) for number, cells in rows]
 
 
-def _pairs_of_list(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, ...]:
+def _pairs_of_list(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair, ...]:
     """Return the pairs of all groups."""
     place, header = rows[0]
     for cell in header:
@@ -225,26 +223,28 @@ def _pairs_of_list(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, ...
         correlation = _number(row["correlation"], f"{place} ({row['sources'] or 'no sources'})")
         pairs += [
             Pair(one=one, other=other, correlation=correlation, place=place)
-            for one, other in combinations(_group(row["sources"], names, place), 2)
+            for one, other in combinations(_group(row["sources"], sources, place), 2)
         ]
     return tuple(pairs)
 
 
-def _group(text: str, names: Sequence[str], place: str) -> list[str]:
+def _group(text: str, sources: Sequence[Source], place: str) -> list[str]:
     """Return the sources that the patterns of a cell name, in the order of the tolerance table."""
     patterns = text.replace(";", " ").split()
     for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            raise UnknownNameError.among(place, "source", pattern, names)
-    group = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
+        if not meant(pattern, sources):
+            raise UnknownNameError.among(place, "source", pattern, known_as(sources))
+    named = {name for pattern in patterns for name in meant(pattern, sources)}
+    group = [source.name for source in sources if source.name in named]
     if len(group) < 2:
         raise InputError.at(place, "sources", text, "two or more different sources")
     return group
 
 
-def _pairs_of_matrix(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, ...]:
+def _pairs_of_matrix(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair, ...]:
     """Return the pairs of a matrix, each in both orders, so that one that is not symmetric is found."""
     place, (_, *header) = rows[0]
+    names = known_as(sources)
     for name in header:
         if name not in names:
             raise UnknownNameError.among(place, "column", name, (*names, *LIST_HEADERS))
@@ -266,8 +266,14 @@ def _pairs_of_matrix(rows: Sequence[Row], names: Sequence[str]) -> tuple[Pair, .
         value, place = values[name, name]
         if value != 1.0:
             raise InputError.at(f"{place} ({name})", "value on the diagonal", value, "1")
+    own = {source.own_id: source.name for source in sources if source.own_id}
     return tuple(
-        Pair(one=one, other=other, correlation=values[one, other][0], place=values[one, other][1])
+        Pair(
+            one=own.get(one, one),
+            other=own.get(other, other),
+            correlation=values[one, other][0],
+            place=values[one, other][1],
+        )
         for one, other in permutations(header, 2)
     )
 

@@ -102,7 +102,11 @@ class ToleranceRow(Record):
         str,
         Field(min_length=1),
         AfterValidator(_no_comment),
-        Column("name of the source; `check` offers the nearest one if it is not known", attribute="name"),
+        Column(
+            "name of the source, `check` offers the nearest one if it is not known; or your own where `source` says "
+            "which one is meant",
+            write=lambda source: source.own_id or source.name,
+        ),
     ]
     part: Annotated[str, Column("part that carries it; the id unless given", attribute="part")] = ""
     feature: Annotated[
@@ -248,7 +252,20 @@ class ToleranceRow(Record):
         str,
         Column("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
     ] = ""
+    source: Annotated[
+        str,
+        Column(
+            "the source that is meant where the id is your own, which is then shown beside it and may stand for it in "
+            "process costs, correlations and `whatif`",
+            write=lambda source: source.name if source.own_id else "",
+        ),
+    ] = ""
     note: Annotated[str, Column("carried through", attribute="note")] = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the source that the row is about."""
+        return self.source or self.id
 
     @property
     def zone(self) -> float:
@@ -275,11 +292,11 @@ class ToleranceRow(Record):
             raise ValueError(
                 f"the cost must be {SMALLEST_COST:g} or more for a zone that allocation may change; or lock it"
             )
-        angular = self.id.rsplit(".", 1)[-1] in ANGULAR
+        angular = self.name.rsplit(".", 1)[-1] in ANGULAR
         if angular != (self.over is not None):
             raise ValueError(
-                f"{self.id} {'is an angle and needs' if angular else 'is a length and has no'} over, the length in mm "
-                "over which the zone limits it"
+                f"{self.name} {'is an angle and needs' if angular else 'is a length and has no'} over, the length "
+                "in mm over which the zone limits it"
             )
         needs_spectrum = self.feature in (Feature.PITCH, Feature.RUNOUT)
         if needs_spectrum != bool(self.spectrum):
@@ -323,7 +340,7 @@ class ToleranceRow(Record):
                 f"deviates on its own here; it needs a spectrum of one order: {len(spectrum)} orders"
             )
 
-    def source(self, folder: Path) -> Source:
+    def as_source(self, folder: Path) -> Source:
         """Return the source in SI units; its file of measured parts is looked for in the folder."""
         factor = UNITS[self.unit] * MICROMETRE
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
@@ -331,7 +348,9 @@ class ToleranceRow(Record):
         plain = {name: column for name, column in COLUMNS.items() if column.attribute}
         stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
         return Source(
-            **stated | {"part": self.part or self.id, "group": self.group or self.id},
+            **stated | {"part": self.part or self.name, "group": self.group or self.name},
+            name=self.name,
+            own_id=self.id if self.name != self.id else "",
             zone=self.zone * factor,
             middle=middle,
             minimum=self.min * factor,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -40,6 +40,21 @@ def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozen
     )
 
 
+def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
+    """Return the names of the sources that a name, a user's own id or a pattern of either means, in their order."""
+    return [
+        own.name
+        for own in sources
+        if fnmatchcase(own.name, pattern) or (own.own_id and fnmatchcase(own.own_id, pattern))
+    ]
+
+
+def known_as(sources: Iterable[Source]) -> list[str]:
+    """Return what a file may call the sources: their names, then the user's own ids."""
+    known = tuple(sources)
+    return [*(own.name for own in known), *(own.own_id for own in known if own.own_id)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Source:
     """One tolerance on a drawing: one source of error, one or more columns of the model.
@@ -72,6 +87,8 @@ class Source:
         Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
     over
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
+    own_id
+        What the user's table calls it, if that is not its name.
     part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, drawing,
     label, note
         As `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may state.
@@ -104,6 +121,7 @@ class Source:
     grade: str = ""
     drawing: str = ""
     label: str = ""
+    own_id: str = ""
     note: str = ""
 
     @cached_property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, HEADERS, UNITS, Cell, ToleranceRow
 from tolalloc.drawings.process_capability import load_process_capabilities, with_process
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
     read_table_file,
@@ -93,13 +93,16 @@ def sources_of_rows(
         where = f"{place}, row {number} ({identity or 'no id'})"
         with faults.kept():
             cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
-            source = validated(ToleranceRow, cells, where).source(folder)
-            if identity in sources:
-                raise InputError(f"{where}: id is {identity!r} for the second time; each source has one row.")
+            source = validated(ToleranceRow, cells, where).as_source(folder)
+            if source.name in sources:
+                field = "source" if source.own_id else "id"
+                raise InputError(f"{where}: {field} is {source.name!r} for the second time; each source has one row.")
+            if {identity, source.name} & {*known_as(sources.values())}:
+                raise InputError(f"{where}: id is {identity!r} for the second time; each row has one of its own.")
             if source.sorted and source.zone_mapping.inside < SMALLEST_KEPT:
                 left = f"no, as it would leave less than {SMALLEST_KEPT:.0%} of all parts"
                 raise InputError.at(where, "sorted", "yes", left)
-            sources[identity] = source
+            sources[source.name] = source
     faults.require_none()
     return tuple(sources.values())
 
@@ -132,7 +135,7 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.Dat
 
 
 def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
-    """Return a table with the drawing and the label of its rows behind their names, where the drawing states any.
+    """Return a table with own id, drawing and label of its rows behind their names, where the drawing states any.
 
     Parameters
     ----------
@@ -143,13 +146,13 @@ def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequen
     members
         Name → its sources.
     """
-    for field in ("label", "drawing"):
+    for field, header in {"label": "label", "drawing": "drawing", "own_id": "own id"}.items():
         said = [
             ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members.get(name, ())))))
             for name in frame[named]
         ]
         if any(said):
-            frame.insert(list(frame.columns).index(named) + 1, field, said)
+            frame.insert(list(frame.columns).index(named) + 1, header, said)
     return frame
 
 

@@ -190,7 +190,7 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
     return {
         "name": source.name,
         "part": source.part,
-        "label": ", ".join(filter(None, (source.label, source.drawing))),
+        "label": ", ".join(filter(None, (source.own_id, source.label, source.drawing))),
         "feature": source.feature.value,
         "meaning": source.feature.zone_meaning,
         "zone": shown_zone(source.zone),

@@ -175,7 +175,7 @@ def _zones_table(comparison: ComparisonAnswer) -> pd.DataFrame:
     for run in comparison.runs:
         zone = run.zones["plus [unit]"] - run.zones["minus [unit]"]
         parts.append(pd.DataFrame({"zone": zone, "cost": run.zones["cost [cost units]"], "unit": run.zones["unit"]}))
-        parts[-1].index = pd.Index(run.zones["id"], name="source")
+        parts[-1].index = pd.Index(_names(run.zones), name="source")
     joint = parts[0].join(parts[1], how="outer", lsuffix=" A", rsuffix=" B")
     change = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
     return pd.DataFrame(
@@ -189,6 +189,12 @@ def _zones_table(comparison: ComparisonAnswer) -> pd.DataFrame:
             "cost B [cost units]": joint["cost B"].to_numpy(),
         }
     )
+
+
+def _names(zones: pd.DataFrame) -> pd.Series:
+    """Return what the sources of a tolerance table are, whatever its own ids."""
+    own = zones.get("source")
+    return zones["id"] if own is None else own.where(own.notna() & (own != ""), zones["id"])
 
 
 def _ranking_figure(comparison: ComparisonAnswer) -> Figure:

@@ -11,7 +11,6 @@ import pandas as pd
 from tolalloc.allocation.answer.calculator import calculator_sheets, style_calculator
 from tolalloc.allocation.answer.dimensions import frames_of
 from tolalloc.allocation.cost.process_costs_file import today
-from tolalloc.drawings.fields import HEADERS
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame, with_own_words
 from tolalloc.report.currency import in_currency
@@ -113,7 +112,7 @@ def _shares(answer: AllocationAnswer) -> dict[str, float]:
 def full_drawing_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return the tolerance table in the layout of the input, with share of the variance and change added."""
     frame, short = table_frame(answer.drawn_sources), answer.drawing_table.set_index("source")
-    names = frame[HEADERS["id"]]
+    names = pd.Series([source.name for source in answer.drawn_sources])
     for header in ("share of variance [%]", "change [%]", "cost before [cost units]"):
         frame[header] = names.map(short[header])
     return frame

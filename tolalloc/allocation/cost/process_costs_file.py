@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -25,7 +24,7 @@ from tolalloc.allocation.cost.points import Points, ShopPoints, load_shop_points
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.drawings.drawing import Costs
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.table_file import DATA, read_rows, read_text_table, split_header, stated_currency
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.file_content import is_file
@@ -233,8 +232,8 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     faults = Faults()
     for place, row in rows:
         with faults.kept():
-            if not any(fnmatchcase(source.name, row.sources) for source in sources):
-                raise UnknownNameError.among(place, "source", row.sources, [source.name for source in sources])
+            if not meant(row.sources, sources):
+                raise UnknownNameError.among(place, "source", row.sources, known_as(sources))
             if row.points and not is_file(path.parent / row.points):
                 folder = path.absolute().parent
                 raise InputError(f"{place}: points {row.points}: no such file; allowed is a CSV file in {folder}.")
@@ -243,7 +242,7 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     found = {}
     for source in sources:
         if source.zone > 0 and not source.locked:
-            own = [(place, row) for place, row in rows if fnmatchcase(source.name, row.sources)]
+            own = [(place, row) for place, row in rows if meant(row.sources, (source,))]
             found[source.name] = _processes(source, own, shops, path) if own else (today(source),)
     return found
 
