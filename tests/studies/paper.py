@@ -28,6 +28,7 @@ class _Shown(HTMLParser):
         self.feed(page)
 
     def handle_starttag(self, tag, attrs):
+        self._separate()
         if tag == "details":
             self._folded += 1
         elif tag == "svg":
@@ -37,10 +38,15 @@ class _Shown(HTMLParser):
             (self.cells if tag == "td" else self.pictures[-1]).append("")
 
     def handle_endtag(self, tag):
+        self._separate()
         if tag == "details":
             self._folded -= 1
         if tag == self._open:
             self._open = ""
+
+    def _separate(self):
+        if self._open == "td":
+            self.cells[-1] += " "
 
     def handle_data(self, data):
         if self._open == "td" and not self._folded:
@@ -52,8 +58,8 @@ class _Shown(HTMLParser):
 def lost(page: Path, folder: Path, paper: str = "A4") -> list[str]:
     """Return the cells and charts of a page that are not whole when it is printed on a paper.
 
-    A text is compared without blanks: a cell may have several lines. What stands beyond the edge of the paper is no
-    text of a PDF for poppler.
+    A text is compared without blanks: a cell may have several lines, but no word of it on two. What stands beyond the
+    edge of the paper is no text of a PDF for poppler.
     """
     path = folder / f"{page.parent.name}-{paper}.pdf"
     pdf.write_pdf(page, path, paper)
@@ -61,6 +67,8 @@ def lost(page: Path, folder: Path, paper: str = "A4") -> list[str]:
     sheets = [_bare(sheet) for sheet in text.split("\f")]
     whole, shown = "".join(sheets), _Shown(page.read_text(encoding="utf-8"))
     found = [cell for cell in shown.cells if _bare(cell) not in whole]
+    words = {word for cell in shown.cells for word in re.findall(r"[A-Za-z]{3,}", cell)}
+    found += [f"{word} is broken" for word in sorted(words - {*re.findall(r"[A-Za-z]{3,}", text)})]
     for words in shown.pictures:
         if not any(all(_bare(word) in sheet for word in words) for sheet in sheets):
             found.append(f"a chart with {words[:3]}")

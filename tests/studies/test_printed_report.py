@@ -172,6 +172,17 @@ def test_a_table_that_is_wider_than_the_paper_is_noticed(written, tmp_path):
     assert lost(page, tmp_path)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [5, 50])
+def test_a_word_on_two_lines_is_noticed(tmp_path, width):
+    if not can_print():
+        pytest.skip(MISSING)
+    page = tmp_path / "report.html"
+    cell = f'<td style="display: block; width: {width}mm; word-break: break-all">requirement</td>'
+    page.write_text(f"<!doctype html><table><tr>{cell}</tr></table>", encoding="utf-8")
+    assert lost(page, tmp_path) == (["requirement is broken"] if width == 5 else [])
+
+
 def test_the_title_block_says_what_the_study_states_and_nothing_else(tmp_path):
     stated = {"drawing number": "RVX-80-101", "author": "J. <Weiß>"}
     write_document(replace(report("Ranking"), title_block=stated), tmp_path / "report")

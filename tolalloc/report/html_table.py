@@ -15,8 +15,8 @@ _DECIMALS = {"%": 1, "cost units": 2}
 """Unit → decimals; every other number has four significant digits [-]."""
 _SPAN = re.compile(r"[\d.]+…[\d.]+")
 _POINT = re.compile(r"\.(?=[A-Za-z])")
-_MANY = 12
-"""Columns beyond which a table is set smaller on paper [-]."""
+_SMALLER = {"several": 8, "many": 12}
+"""Class of a table that is set smaller on paper → columns beyond which it is [-]."""
 
 
 def html_table(frame: pd.DataFrame) -> Markup:
@@ -31,7 +31,8 @@ def html_table(frame: pd.DataFrame) -> Markup:
         f"<tr>{''.join(_cell(value, unit) for value, unit in zip(row, units, strict=True))}</tr>"
         for row in frame.itertuples(index=False)
     )
-    kind = "data many" if frame.shape[1] > _MANY else "data"
+    smaller = [name for name, columns in _SMALLER.items() if frame.shape[1] > columns][-1:]
+    kind = " ".join(["data", *smaller])
     return Markup(f'<table class="{kind}"><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table>')
 
 
