@@ -8,6 +8,9 @@ COST_UNITS = "cost units"
 """What costs are counted in where no file states a currency."""
 _CURRENCY = re.compile(r"([A-Z]{3}|[€$£¥])(?=[ /·×]|$)")
 
+QUICK_RUN = "Quick run: small samples, wide intervals. Run without --quick before setting a drawing."
+"""What every answer of a quick run warns of."""
+
 _SIGNS = {"arcsec": "″", "%": " %"}
 _UNDERSTOOD = " transmission error"
 """What an engineer leaves out where nothing else is meant."""

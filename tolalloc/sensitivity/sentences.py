@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.report.wording import quantity, sign_of
+from tolalloc.report.wording import QUICK_RUN, quantity, sign_of
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
     found = []
     if answer.header.quick:
-        found.append("Quick run: small samples, wide intervals. Run without --quick before setting a drawing.")
+        found.append(QUICK_RUN)
     if not answer.sobol.growth.stable:
         found.append("The order of the first places is not settled: see the blocks that would tell neighbours apart.")
     if answer.errors.is_correlated:

@@ -10,7 +10,7 @@ from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.callouts import callout_assumptions
-from tolalloc.report.wording import short, unit_of, with_unit
+from tolalloc.report.wording import QUICK_RUN, short, unit_of, with_unit
 from tolalloc.surrogate.regression import NEEDED_Q2
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen, found = answer.chosen, []
     if answer.header.quick:
         found += [
-            "Quick run: small samples, wide intervals. Run without --quick before setting a drawing.",
+            QUICK_RUN,
             "A quick run calls a design just at its limits met at even odds.",
         ]
     if not answer.met:
