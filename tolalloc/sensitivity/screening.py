@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.compiled import in_threads
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -248,5 +249,10 @@ def _reduced_deltas(
     column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"], resamples: int, generator: np.random.Generator
 ) -> Float[np.ndarray, " resample"]:
     """Return twice the estimate less that of each resample; their mean is the estimate without its bias [-]."""
-    drawn = (generator.integers(y.size, size=y.size) for _ in range(resamples))
-    return 2.0 * _delta(column, y) - np.array([_delta(column[own], y[own]) for own in drawn])
+    drawn, found = [generator.integers(y.size, size=y.size) for _ in range(resamples)], np.empty(resamples)
+
+    def resample(part: slice) -> None:
+        found[part] = [_delta(column[own], y[own]) for own in drawn[part]]
+
+    in_threads(resample, resamples, size=1)
+    return 2.0 * _delta(column, y) - found

@@ -75,7 +75,10 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
 
 
 def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
-    """Return the largest line load of every pin and disc [N/m]."""
+    """Return the largest line load of every pin and disc, the even one where no disc is tilted [N/m]."""
+    layout = equilibria.columns.layout
+    if not np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T):
+        return np.asarray(forces.pins / equilibria.reducer.cycloid_stage.face_width)
     return line_contact(equilibria, forces).peak
 
 
