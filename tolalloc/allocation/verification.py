@@ -17,6 +17,9 @@ from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model
 
+SLOPE_UNITS = 1024
+"""Units that differences of an output without derivatives are averaged over [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Confirming:
@@ -111,7 +114,8 @@ class Verifier:
     requirements: tuple[Requirement, ...]  # What must be kept; the first one limits the leading output
     seeds: SeedTree  # Node of the seed tree; every verification takes its own child
     units: int  # Units per verification [-]
-    slope_units: int = 1024  # How many of them derivatives that the model does not know exactly are averaged over [-]
+    # How many of them derivatives that the model does not know exactly are averaged over [-]
+    slope_units: int = SLOPE_UNITS
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
     confidence: float = CONFIDENCE  # With which guarantees are judged, one-sided [-]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tolalloc.allocation.verification import SLOPE_UNITS
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.sensitivity.inverse import fewest_units
@@ -101,9 +102,10 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
     settings = len(prepared.space.settings)
     searches = 2 if question.fixed_first and settings else 1
     outputs = tuple(dict.fromkeys(own.output for own in prepared.requirements))
-    # A model without derivatives of its own is solved on either side of every column.
-    around = 2 if model.differentiable else 1 + 2 * len(errors.columns)
-    steps = (searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps) * around
+    # A model without derivatives is solved on either side of every column, an output without on either side of every
+    # variable of the design.
+    around = effort.verification_units * (2 if model.differentiable else 1 + 2 * len(errors.columns))
+    steps = searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps
     front = effort.search.front
     tried = front.designs + front.rounds * front.points + front.population_on_kernel * front.generations_on_kernel + 2
     fronts = (1 + bool(settings)) * tried * effort.shared_units * question.front
@@ -115,8 +117,13 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
     shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)
     confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
     least = effort.verification_units + confirmed[0]
-    most = steps * effort.verification_units + confirmed[1] + fronts + what_if + shares
-    return (_Part(units=(least, most), seconds=_seconds(prepared, outputs)),)
+    most = steps * around + confirmed[1] + fronts + what_if + shares
+    parts = (_Part(units=(least, most), seconds=_seconds(prepared, outputs)),)
+    rough = tuple(name for name in outputs if name not in {*model.exact, *model.differentiable})
+    if not rough:
+        return parts
+    differences = steps * 2 * SLOPE_UNITS * (len(prepared.space.groups) + settings)
+    return (*parts, _Part(units=(0, differences), seconds=_seconds(prepared, rough)))
 
 
 def _seconds(prepared: Prepared, outputs: tuple[str, ...], *, uncertain: bool = False) -> float:
