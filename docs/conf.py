@@ -22,6 +22,8 @@ extensions = [
 ]
 exclude_patterns = ["_build", "tutorials"]
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["handbook.css"]
 html_title = f"tolalloc {release}"
 html_show_copyright = False
 html_show_sourcelink = False
