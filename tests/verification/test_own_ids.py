@@ -62,6 +62,7 @@ def test_they_stand_for_the_source_where_files_and_commands_name_one(tmp_path):
     for asked in ("4711-12", "4711-*"):
         changed = study(drawing).ask(ta.Difference(zones={asked: 10.0}))
         assert {own.name: round(own.zone * 1e6, 6) for own in changed.after}["a"] == 10.0
+        assert changed.zones.set_index("source").loc["a", "own id"] == "4711-12"
     (tmp_path / "pairs.csv").write_text("sources,correlation\n4711-12 4711-13,0.5\n", encoding="utf-8")
     pair = load_correlations(tmp_path / "pairs.csv", drawing.sources).pairs[0]
     assert (pair.one, pair.other) == ("a", "b")

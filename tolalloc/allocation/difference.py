@@ -17,6 +17,7 @@ from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
@@ -115,7 +116,7 @@ class DifferenceAnswer(Answer):
         """The zones that change, with their costs."""
         import pandas as pd
 
-        return pd.DataFrame(
+        changed = pd.DataFrame(
             {
                 "source": [own.name for own in self.before],
                 "zone before [µm]": [own.zone / MICROMETRE for own in self.before],
@@ -124,6 +125,7 @@ class DifferenceAnswer(Answer):
                 "cost after [cost units]": [own.cost for own in self.after],
             }
         )
+        return with_own_words(changed, "source", {own.name: (own,) for own in self.before})
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:

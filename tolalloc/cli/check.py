@@ -70,7 +70,8 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     ]
     for source in errors.active:
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
-        lines.append(f"  {source.name}: {source.mapping}; {'locked' if source.locked else span}")
+        own = f"{source.own_id} ({source.name})" if source.own_id else source.name
+        lines.append(f"  {own}: {source.mapping}; {'locked' if source.locked else span}")
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
     neglected = [source.name for source in errors.sources if source.zone == 0.0]
     if neglected:
