@@ -48,6 +48,8 @@ class CondensedAngles(NamedTuple):
     play_by_load: Float[np.ndarray, "angle element 2 load"]
     play_stiffness: Float[np.ndarray, "angle element"]  # Stiffness of the elements with play [N/m]
     contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]  # Pin compression per displacement of its disc [m/m]
+    # Displacement x, y of a disc's pole, through which all contact normals pass, per its rotation coordinate [m/m]
+    pole_by_rotation: Float[np.ndarray, "angle disc 2"]
     # Pin compression per deviation: pin radial and tangential, harmonic amplitudes of the disc's pitch and run-out,
     # pitch and run-out of the tooth met [m/m]
     contact_by_error: Float[np.ndarray, "angle disc deviation pin"]
@@ -164,6 +166,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
     by_retained[:, rest], by_load[:, rest] = solved[..., : retained.size], solved[..., retained.size :]
     condensed = stiffness[:, retained] @ by_retained
     moved, disturbed, play_stiffness = _elements(groups, scale, angles, loads)
+    direction = np.stack([at.disc_direction(disc) for disc in range(reducer.disc_count)], axis=1)
     lever = np.array([1.0, 1.0, 1 / reducer.cycloid_stage.disc_pitch_radius])[:, np.newaxis]
     return CondensedAngles(
         stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
@@ -177,6 +180,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
         play_by_load=moved @ by_load[:, np.newaxis] + disturbed,
         play_stiffness=play_stiffness,
         contact_by_disc=contact.by_disc * lever,
+        pole_by_rotation=np.stack([-np.sin(direction), np.cos(direction)], axis=2),
         contact_by_error=_contact_by_error(contact, at.orders),
         tooth=contact.tooth,
         contact_stiffness=contact.stiffness.reshape(angles, -1),

@@ -1,1 +1,1 @@
-"""Compiled solvers: one sample or eight side by side, one angle or a turn, extremes, derivatives, forces."""
+"""Compiled solvers: one sample or many side by side, one angle or a turn, extremes, derivatives, forces."""

@@ -12,9 +12,10 @@ import numpy as np
 
 from tolalloc.compiled import in_threads, jit
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
+from tolalloc.rv.equivalent.solvers.lending import make_lent
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes
-from tolalloc.rv.equivalent.solvers.refinement import make_lent, search_peaks
+from tolalloc.rv.equivalent.solvers.refinement import search_peaks
 from tolalloc.rv.equivalent.solvers.searches import gain, make_peaks, make_searches
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile, tile_size
 

@@ -61,6 +61,24 @@ def blend(table, weights, out):
         own[i] = first + (weights[2] * flat[2 * size + i] + weights[3] * flat[3 * size + i])
 
 
+@jit_within
+def _blend_levers(first, weights, tables, out):
+    """Set out to the contacts' compressions per displacement of their discs.
+
+    Between nodes, too, all normals of a disc pass through its pole.
+    """
+    discs, _, pins = out.shape
+    blend(tables.contact_by_disc[first : first + 4], weights, out)
+    pole = tables.pole_by_rotation
+    for d in range(discs):
+        x, y = 0.0, 0.0
+        for node in range(4):
+            x += weights[node] * pole[first + node, d, 0]
+            y += weights[node] * pole[first + node, d, 1]
+        for k in range(pins):
+            out[d, 2, k] = x * out[d, 0, k] + y * out[d, 1, k]
+
+
 @jit_in_place
 def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained):
     """Fill ``own`` with the problem between nodes, all tables interpolated; return the rotation at fixed discs."""
@@ -81,7 +99,7 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
     here = slice(first, first + 4)
     blend(tables.stiffness[here], weights, own.stiffness)
     blend(nodes.force[slot], weights, own.force)
-    blend(tables.contact_by_disc[here], weights, own.by_disc)
+    _blend_levers(first, weights, tables, own.by_disc)
     blend(nodes.undisturbed[slot], weights, own.undisturbed)
     blend(tables.contact_stiffness[here], weights, own.contact)
     if own.law != LINEAR:

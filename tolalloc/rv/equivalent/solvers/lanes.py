@@ -16,7 +16,13 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
+from tolalloc.compiled import jit, processor
+
 WIDTH = 8
+"""Samples side by side."""
+
+_MOVES_LANES = "+avx512f" in processor()["features"]
+"""Whether one instruction of the processor moves chosen numbers of a register together, or apart."""
 
 LOGARITHM_OF_TWO = float.fromhex("0x1.62e42fee00000p-1")
 _LOGARITHM_LEFT = float.fromhex("0x1.a39ef35793c76p-33")
@@ -27,19 +33,27 @@ _BITS = ir.VectorType(ir.IntType(1), WIDTH)
 
 
 class Common(NamedTuple):
-    """A table of which all eight samples take the same entries."""
+    """A table of which all samples take the same entries."""
 
     entries: Float[np.ndarray, "..."]
 
 
 class Apart(NamedTuple):
-    """A table of which each of eight samples has its own entries, side by side in the last axis."""
+    """A table of which each sample has its own entries, side by side in the last axis."""
 
-    entries: Float[np.ndarray, "... 8"]
+    entries: Float[np.ndarray, "... lane"]
+
+
+@jit
+def aligned(rows, width):
+    """Return zeros whose rows start where a register does: a load across two lines of the cache takes twice as long."""
+    room = np.zeros(rows * width + WIDTH)
+    first = (-(room.ctypes.data >> 3)) % WIDTH
+    return room[first : first + rows * width].reshape(rows, width)
 
 
 class _Lanes(types.Type):  # type: ignore[misc]
-    """Type of eight doubles in one register."""
+    """Type of the doubles side by side."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")
@@ -73,7 +87,7 @@ def _splat(builder, number):
 
 @intrinsic
 def load(typing, array, at):
-    """Return the eight numbers of a contiguous array from the flat index ``at`` on."""
+    """Return the numbers of a contiguous array from the flat index ``at`` on."""
 
     def emit(context, builder, signature, arguments):
         return builder.load(_address(context, builder, signature.args[0], *arguments), align=8)
@@ -102,7 +116,7 @@ def entry(typing, table, at):
 
 @intrinsic
 def store(typing, array, at, value):
-    """Write eight numbers into a contiguous array from the flat index ``at`` on."""
+    """Write the numbers into a contiguous array from the flat index ``at`` on."""
 
     def emit(context, builder, signature, arguments):
         builder.store(arguments[2], _address(context, builder, signature.args[0], *arguments[:2]), align=8)
@@ -219,10 +233,72 @@ def choose(typing, bits, a, b):
     """Return a in the lanes whose bit is set, b in the others."""
 
     def emit(context, builder, signature, arguments):
-        mask = builder.bitcast(builder.trunc(arguments[0], ir.IntType(WIDTH)), _BITS)
-        return builder.select(mask, arguments[1], arguments[2])
+        return builder.select(_mask(builder, arguments[0]), arguments[1], arguments[2])
 
     return lanes(types.int64, lanes, lanes), emit
+
+
+def _mask(builder: Any, bits: Any) -> Any:
+    return builder.bitcast(builder.trunc(bits, ir.IntType(WIDTH)), _BITS)
+
+
+def _places(builder: Any, data: Any, at: Any, bits: Any) -> Any:
+    """Yield each lane, and where its number stands if the chosen ones stand one after another."""
+    for lane in range(WIDTH):
+        yield ir.IntType(32)(lane), builder.gep(data, [at])
+        at = builder.add(at, builder.and_(builder.lshr(bits, bits.type(lane)), bits.type(1)))
+
+
+def _move_lanes(builder: Any, name: str, value: Any, bits: Any) -> Any:
+    kind = ir.FunctionType(_DOUBLES, [_DOUBLES, _DOUBLES, _BITS])
+    function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.x86.avx512.mask.{name}.v{WIDTH}f64")
+    return builder.call(function, [value, ir.Constant(_DOUBLES, [0.0] * WIDTH), _mask(builder, bits)])
+
+
+@intrinsic
+def compress(typing, array, at, bits, value):
+    """Write the lanes whose bit is set into a contiguous array, one after another from the flat index ``at`` on.
+
+    What stands behind them is lost, as far as all lanes would reach.
+    """
+
+    def emit(context, builder, signature, arguments):
+        kind, (array, at, bits, value) = signature.args[0], arguments
+        if _MOVES_LANES:
+            together = _move_lanes(builder, "compress", value, bits)
+            builder.store(together, _address(context, builder, kind, array, at), align=8)
+            return
+        for lane, place in _places(builder, context.make_array(kind)(context, builder, array).data, at, bits):
+            builder.store(builder.extract_element(value, lane), place)
+
+    return types.void(array, types.intp, types.int64, lanes), emit
+
+
+@intrinsic
+def expand(typing, array, at, bits):
+    """Return numbers that stand one after another from a flat index on in the lanes whose bit is set, 0 elsewhere."""
+
+    def emit(context, builder, signature, arguments):
+        kind, (array, at, bits) = signature.args[0], arguments
+        if _MOVES_LANES:
+            together = builder.load(_address(context, builder, kind, array, at), align=8)
+            return _move_lanes(builder, "expand", together, bits)
+        apart = ir.Constant(_DOUBLES, [0.0] * WIDTH)
+        for lane, place in _places(builder, context.make_array(kind)(context, builder, array).data, at, bits):
+            apart = builder.insert_element(apart, builder.load(place), lane)
+        return builder.select(_mask(builder, bits), apart, ir.Constant(_DOUBLES, [0.0] * WIDTH))
+
+    return lanes(array, types.intp, types.int64), emit
+
+
+@intrinsic
+def count_bits(typing, bits):
+    """Return how many bits are set."""
+
+    def emit(context, builder, signature, arguments):
+        return builder.ctpop(arguments[0])
+
+    return types.int64(types.int64), emit
 
 
 @intrinsic

@@ -1,4 +1,4 @@
-"""Eight searches around peaks of the curve, one in each lane.
+"""Searches around peaks of the curve, one in each lane.
 
 An extreme is a kink, where one pin takes over from another, so a peak is searched by halving the step around it and
 not by a parabola. What a search finds depends on its own sample alone.
@@ -29,20 +29,20 @@ class Peaks(NamedTuple):
 
 
 class Searches(NamedTuple):
-    """What eight searches know; the first axis is the lane."""
+    """What the searches know."""
 
-    peak: Int[np.ndarray, "8"]  # Which peak is searched; −1 for none [-]
-    level: Int[np.ndarray, "8"]  # Halvings done [-]
-    half: Int[np.ndarray, "8"]  # Whether the left or the right side is looked at [-]
+    peak: Int[np.ndarray, " lane"]  # Which peak is searched; −1 for none [-]
+    level: Int[np.ndarray, " lane"]  # Halvings done [-]
+    half: Int[np.ndarray, " lane"]  # Whether the left or the right side is looked at [-]
     # Where the centre is, and how far its sides [nodes]
-    at: Float[np.ndarray, "8"]
-    step: Float[np.ndarray, "8"]
-    looks_at: Float[np.ndarray, "8"]  # Which side that is [nodes]
+    at: Float[np.ndarray, " lane"]
+    step: Float[np.ndarray, " lane"]
+    looks_at: Float[np.ndarray, " lane"]  # Which side that is [nodes]
     # Left neighbour, centre, right neighbour; and the two that stand half as far: ±rotation [rad], coordinates [m]
-    height: Float[np.ndarray, "8 3"]
-    q: Float[np.ndarray, "8 3 retained"]
-    new_height: Float[np.ndarray, "8 2"]
-    new_q: Float[np.ndarray, "8 2 retained"]
+    height: Float[np.ndarray, "lane 3"]
+    q: Float[np.ndarray, "lane 3 retained"]
+    new_height: Float[np.ndarray, "lane 2"]
+    new_q: Float[np.ndarray, "lane 2 retained"]
 
 
 @jit

@@ -1,6 +1,6 @@
 """All samples over a turn: tiles of samples in parallel, each from its own last angle's equilibrium; their forces.
 
-Samples without play go eight samples to a register; whatever needs more care goes one by one. Which way
+Samples without play go side by side in registers; whatever needs more care goes one by one. Which way
 a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
 """
 
@@ -17,7 +17,7 @@ from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
 from tolalloc.rv.equivalent.solvers.problem import problem_at_node, solve_at_node, values_of
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
-from tolalloc.rv.equivalent.solvers.tile import FOUR, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.rv.equivalent.solvers.tile import FOUR, ROW, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
 
 
 def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
@@ -92,12 +92,12 @@ def _take_over(samples, angle, tile, turn):
 
 @jit
 def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
-    """Solve up to a tile of samples at every ``stride``-th node, eight to a register."""
+    """Solve up to a tile of samples at every ``stride``-th node, side by side."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
     used = (samples + FOUR - 1) // FOUR * FOUR
-    tile, careful, tilted = make_tile(layout, size, contacts, TILE), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    tile, careful, tilted = make_tile(layout, size, contacts, ROW), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
     _fill_tile(layout, values, finite, used, tile, tilted)
     rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
     teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
