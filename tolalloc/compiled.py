@@ -20,7 +20,7 @@ import numba as nb
 import numpy as np
 
 _HERE = Path(__file__)
-_FILES = [_HERE, *sorted(_HERE.parent.glob("**/solvers/*.py"))]
+_FILES = [_HERE, _HERE.with_name("compiled_parts.py"), *sorted(_HERE.parent.glob("**/solvers/*.py"))]
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()
 _KEPT = _HERE.parent / "__pycache__" / f"compiled-{_DIGEST[:16]}"
 
@@ -41,10 +41,27 @@ def processor() -> dict[str, str]:
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
-    others = nb.config.CACHE_DIR
-    nb.config.CACHE_DIR = str(_KEPT)  # read while decorating only
+    whole = _new(function, {"nogil": True, "error_model": "numpy"} | options)
+    _keep(whole, _KEPT)
+    if hasattr(whole, "part"):
+        _keep(whole.part, _KEPT / "parts")
+    return whole
+
+
+def _new(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     try:
-        return nb.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        from tolalloc.compiled_parts import Whole
+    except (AttributeError, ImportError):  # numba has moved what parts stand on: compiling takes longer without them
+        return nb.njit(**options)(function)
+    return Whole(function, options)
+
+
+def _keep(dispatcher: Any, folder: Path) -> None:
+    """Keep in a folder what is compiled."""
+    others = nb.config.CACHE_DIR
+    nb.config.CACHE_DIR = str(folder)  # read while caching is enabled only
+    try:
+        dispatcher.enable_caching()
     finally:
         nb.config.CACHE_DIR = others
 
