@@ -11,6 +11,7 @@ All stands on names that numba does not promise to keep; `tolalloc.compiled` fal
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -122,6 +123,16 @@ class Whole(CPUDispatcher):  # type: ignore[misc]
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the type of a call from a compiled function."""
         return self.part.get_call_template(args, kws)
+
+    def compile(self, signature: Any) -> Any:
+        """Compile, or read what is kept, without looking for garbage: numba makes millions of objects and few cycles."""
+        collected = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(signature)
+        finally:
+            if collected:
+                gc.enable()
 
     def get_overload(self, signature: Any) -> Any:
         """Return what such a call is built from."""
