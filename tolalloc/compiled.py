@@ -11,7 +11,9 @@ faster here, and took as long to compile as all that it calls.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -53,7 +55,7 @@ def _new(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         from tolalloc.compiled_parts import Whole
     except (AttributeError, ImportError):  # numba has moved what parts stand on: compiling takes longer without them
         return nb.njit(**options)(function)
-    return Whole(function, options)
+    return Whole(function, options, _wait_for)
 
 
 def _keep(dispatcher: Any, folder: Path) -> None:
@@ -83,6 +85,25 @@ def jit_in_place(function: Callable[..., Any]) -> Any:
 def jit_within(function: Callable[..., Any]) -> Any:
     """Compile a function in place as a part of every one that calls it, for innermost loops."""
     return _compiled(function, _nrt=False, forceinline=True)
+
+
+_elsewhere: dict[str, subprocess.Popen[bytes]] = {}
+
+
+def compile_elsewhere(modules: Iterable[str], *command: str) -> None:
+    """Let a second process, ``python -m command``, compile functions of these modules, where there is a core for it.
+
+    Whatever calls one of the functions first waits for the process to end, and compiles what it has not kept.
+    """
+    if thread_count() > 1:
+        nowhere = subprocess.DEVNULL
+        process = subprocess.Popen([sys.executable, "-m", *command], stdin=nowhere, stdout=nowhere, stderr=nowhere)
+        _elsewhere.update(dict.fromkeys(modules, process))
+
+
+def _wait_for(module: str) -> None:
+    if module in _elsewhere:
+        _elsewhere[module].wait()
 
 
 _threads = int(nb.config.NUMBA_NUM_THREADS)
