@@ -11,7 +11,9 @@ faster here, and took as long to compile as all that it calls.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,7 +22,7 @@ import numba as nb
 import numpy as np
 
 _HERE = Path(__file__)
-_FILES = [_HERE, *sorted(_HERE.parent.glob("**/solvers/*.py"))]
+_FILES = [_HERE, _HERE.with_name("compiled_parts.py"), *sorted(_HERE.parent.glob("**/solvers/*.py"))]
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()
 _KEPT = _HERE.parent / "__pycache__" / f"compiled-{_DIGEST[:16]}"
 
@@ -41,10 +43,27 @@ def processor() -> dict[str, str]:
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
-    others = nb.config.CACHE_DIR
-    nb.config.CACHE_DIR = str(_KEPT)  # read while decorating only
+    whole = _new(function, {"nogil": True, "error_model": "numpy"} | options)
+    _keep(whole, _KEPT)
+    if hasattr(whole, "part"):
+        _keep(whole.part, _KEPT / "parts")
+    return whole
+
+
+def _new(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     try:
-        return nb.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        from tolalloc.compiled_parts import Whole
+    except (AttributeError, ImportError):  # numba has moved what parts stand on: compiling takes longer without them
+        return nb.njit(**options)(function)
+    return Whole(function, options, _wait_for)
+
+
+def _keep(dispatcher: Any, folder: Path) -> None:
+    """Keep in a folder what is compiled."""
+    others = nb.config.CACHE_DIR
+    nb.config.CACHE_DIR = str(folder)  # read while caching is enabled only
+    try:
+        dispatcher.enable_caching()
     finally:
         nb.config.CACHE_DIR = others
 
@@ -66,6 +85,25 @@ def jit_in_place(function: Callable[..., Any]) -> Any:
 def jit_within(function: Callable[..., Any]) -> Any:
     """Compile a function in place as a part of every one that calls it, for innermost loops."""
     return _compiled(function, _nrt=False, forceinline=True)
+
+
+_elsewhere: dict[str, subprocess.Popen[bytes]] = {}
+
+
+def compile_elsewhere(modules: Iterable[str], *command: str) -> None:
+    """Let a second process, ``python -m command``, compile functions of these modules, where there is a core for it.
+
+    Whatever calls one of the functions first waits for the process to end, and compiles what it has not kept.
+    """
+    if thread_count() > 1:
+        nowhere = subprocess.DEVNULL
+        process = subprocess.Popen([sys.executable, "-m", *command], stdin=nowhere, stdout=nowhere, stderr=nowhere)
+        _elsewhere.update(dict.fromkeys(modules, process))
+
+
+def _wait_for(module: str) -> None:
+    if module in _elsewhere:
+        _elsewhere[module].wait()
 
 
 _threads = int(nb.config.NUMBA_NUM_THREADS)

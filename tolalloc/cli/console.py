@@ -42,9 +42,11 @@ def announce_compilation(room: str = "equivalent") -> None:
 def announce_kernel(model: object) -> None:
     """Say the same of the kernel of a study's model; a user's own model has none."""
     from tolalloc.rv.choice import ReducerChoice
+    from tolalloc.rv.equivalent.compiled_ahead import compile_ahead
 
     if isinstance(model, ReducerChoice):
         announce_compilation()
+        compile_ahead(model.reducer.disc_count)
 
 
 def print_json(answer: dict[str, Any]) -> None:

@@ -25,6 +25,7 @@ def te(
 ) -> None:
     """Transmission error of one built unit over one output turn."""
     from tolalloc.report.folder import require_usable
+    from tolalloc.rv.equivalent.compiled_ahead import compile_ahead
     from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
     from tolalloc.rv.reducer.unit_file import load_unit
     from tolalloc.rv.transmission_error import transmission_error
@@ -34,6 +35,7 @@ def te(
         design = with_stiffness(design, load_identified_stiffness(stiffness))
     require_usable(out)
     announce_compilation()
+    compile_ahead(design.disc_count)
     asked = design.torque_on_carrier(torque, "tolalloc te")
     answer = transmission_error(design, load_unit(unit), asked, attributed=attributed)
     write_report(answer, out)
