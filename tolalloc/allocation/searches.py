@@ -43,6 +43,7 @@ from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
@@ -246,20 +247,16 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
 
-    def shares(
-        self, space: DesignSpace, design: Float[np.ndarray, " variable"], factor_groups: tuple[str, ...] = ()
-    ) -> SobolIndices:
+    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> tuple[SobolIndices, SobolIndices]:
         """Return the indices of the leading output at the zones and the settings of a design.
 
-        Those of the sources, unless every column is said to belong to something else.
+        By source, and by dimension of the drawing.
         """
         errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
         response = self.model.at(space.settings_of(design)).reading((leading,))
-        return sobol_indices(
-            Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share),
-            SobolEffort(start=blocks, limit=blocks),
-            factor_groups=factor_groups,
-        ).of(leading)
+        experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
+        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
+        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
 
 
 def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
@@ -325,9 +322,7 @@ def allocate_drawing(
                 robust = question.robustness(free)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
-            shares = question.shares(chosen.space, chosen.design)
-            dimensions = chosen.space.errors.dimension_of_column
-            of_dimensions = question.shares(chosen.space, chosen.design, dimensions)
+            shares, of_dimensions = question.shares(chosen.space, chosen.design)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationAnswer(
         header=replace(header, statuses=statuses, stages=record.stages),

@@ -209,11 +209,11 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         with record.stage("random units"):
             sample = measures.sample()
         with record.stage("Sobol indices"):
-            sobol = measures.sobol("sobol", tuple(name for names in spectra.values() for name in names))
+            sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
             effect = measures.uncertain(sample)
-            dimensions = measures.dimensions(sobol.growth.history[-1].blocks)
+            dimensions = measures.dimensions(sobol)
         with record.stage("Sobol, second seed"):
-            again = measures.sobol("second seed", blocks=sobol.growth.history[-1].blocks)
+            again = measures.second_seed(sobol.growth.history[-1].blocks)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()
@@ -246,7 +246,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         design=effort.design,
         sobol=sobol,
         dimensions=dimensions,
-        reproduction=sobol.of(leading).reproduced_by(again.of(leading)),
+        reproduction=sobol.of(leading).reproduced_by(again),
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,
         shapley=shapley,

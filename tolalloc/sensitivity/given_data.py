@@ -6,6 +6,8 @@ processor time. Here the units of all classes stand beside each other; the numbe
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -30,7 +32,7 @@ def pawn_index(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]
     order = np.argsort(y)
     column, last = column[order], np.searchsorted(y[order], y[order], side="right")
     found = []
-    for low, high in zip(ends[:CLASSES], ends[1:], strict=False):
+    for low, high in pairwise(ends[: CLASSES + 1]):
         count = np.cumsum((column >= low) & (column < high))
         if count[-1]:
             apart = count[last - 1] / count[-1] - last / y.size
@@ -78,4 +80,4 @@ def _densities(
         np.maximum(away, _LEAST_EXPONENT, out=away)
         np.exp(away, out=away)
         sums[points] = np.add.reduceat(away, starts, axis=1)
-    return sums / (counts * np.sqrt(2 * np.pi) * width)
+    return np.asarray(sums / (counts * np.sqrt(2 * np.pi) * width))
