@@ -180,13 +180,15 @@ class Measures:
                     ("sparse quadratic regression", sparse_quadratic_regression),
                 )
             ]
+        learnt = _first(sample, self.effort.surrogate_units)
         return choose(
             self.response,
             candidates,
-            sample.x[: self.effort.surrogate_units],
+            learnt.x,
             self.seeds.child("surrogates"),
             quantile=self.target,
             largest_failed_share=self.largest_failed_share,
+            evaluation=learnt.evaluation,
         )
 
 
