@@ -37,8 +37,8 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             heading="One ranking over all requirements",
             paragraphs=(
                 "Sources by their largest total index over the outputs that have a limit "
-                f"({', '.join(name.split(' [')[0] for name in answer.sobol.ranked)}), {answer.sobol.blocks} blocks; the "
-                f"others stand beside them, {answer.sobol.blocks_of_others} blocks.",
+                f"({', '.join(name.split(' [')[0] for name in answer.sobol.ranked)}), {answer.sobol.blocks} blocks; "
+                f"the others stand beside them, {answer.sobol.blocks_of_others} blocks.",
             ),
             figures=(figures.requirements_figure(answer),),
             tables=(("all requirements", driver_tables.overall_table(answer)),),
