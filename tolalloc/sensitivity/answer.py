@@ -211,7 +211,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         with record.stage("Sobol indices"):
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
             effect = measures.uncertain(sample)
-            dimensions = measures.dimensions(sobol)
+            dimensions = measures.dimensions(sobol.growth.history[-1].blocks)
         with record.stage("Sobol, second seed"):
             again = measures.second_seed(sobol.growth.history[-1].blocks)
         with record.stage("other measures"):

@@ -16,9 +16,8 @@ from tolalloc.differences import derived
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model, Response, ResponseWithDerivatives
-from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
-from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
@@ -90,16 +89,16 @@ class Measures:
         effort = replace(self.effort.sobol, start=blocks, limit=blocks, second_order=False)
         return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort).of(0)
 
-    def dimensions(self, found: SobolAnalysis) -> SobolIndices | None:
-        """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
+    def dimensions(self, blocks: int) -> SobolIndices | None:
+        """Return the indices of the leading output by the dimensions of the drawing, with so many blocks.
 
         All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
         every dimension has one member, or as many as are correlated with it.
         """
-        groups = self._with_joint.dimension_of_column
+        groups, effort = self._with_joint.dimension_of_column, SobolEffort(start=blocks, limit=blocks)
         if len(set(groups)) == len(self._with_joint.blocks):
             return None
-        return regrouped(self._sobol_experiment("sobol", (self.leading,)), found, groups)
+        return sobol_indices(self._sobol_experiment("dimensions", (self.leading,)), effort, factor_groups=groups).of(0)
 
     @property
     def _with_joint(self) -> ErrorModel:
