@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -59,6 +61,7 @@ class RunRecord:
         self.progress.begin(name)
         units, start = sum(self.statuses.values()), time.perf_counter()
         yield
+        _give_back()
         seconds, solved = time.perf_counter() - start, sum(self.statuses.values()) - units
         self.stages[name] = {
             "seconds": round(seconds, 3),
@@ -75,3 +78,9 @@ class RunRecord:
     def counts(self) -> dict[str, int]:
         """Outcome → number of units [-]."""
         return {sentence: self.statuses[status] for status, sentence in self.outcomes.items()}
+
+
+def _give_back() -> None:
+    """Give freed memory back to the system: Linux's C library keeps it, 120 MiB after a Sobol analysis."""
+    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):
+        library.malloc_trim(0)
