@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.drawings.seeds import SamplingDesign, uniform_chunks
+from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
 from tolalloc.models import Evaluation, Response
 
@@ -151,8 +151,9 @@ def monte_carlo(
     at once and solves them in chunks of its own, so that an executor has many chunks to spread.
     """
     errors, seeds = experiment.errors, experiment.seeds
-    chunks = uniform_chunks(design, seeds, units, len(errors.columns))
-    x = np.concatenate([experiment.deviations(errors.standard_values(uniform)) for uniform in chunks])
+    x = np.empty((units, len(errors.columns)))
+    for index, uniform in enumerate(uniform_chunks(design, seeds, units, len(errors.columns))):
+        x[index * CHUNK : (index + 1) * CHUNK] = experiment.deviations(errors.standard_values(uniform))
     result = MonteCarlo(x=x, evaluation=experiment.response(x))
     require_few_failures(result, ".".join(seeds.path), experiment.largest_failed_share)
     return result
