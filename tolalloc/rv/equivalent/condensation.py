@@ -26,7 +26,7 @@ GROUPS: tuple[Callable[[Positions], SpringGroup], ...] = (
     crank_carrier,
     carrier_support,
 )
-_ANGLES_AT_ONCE = 512
+_ANGLES_AT_ONCE = 64
 
 
 class CondensedAngles(NamedTuple):
