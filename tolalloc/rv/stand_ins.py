@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numpy.polynomial import polynomial
 
 from tolalloc.chunks import map_chunks
-from tolalloc.models import Evaluation, Response
+from tolalloc.models import Evaluation, KeepsTables, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.response.kernel import KernelResponse
@@ -40,6 +40,11 @@ class Corrected:
         """Return the corrected answers; a sample that fails stays a failed one."""
         evaluation = self.response(x)
         return replace(evaluation, values=self.offset + self.factor * evaluation.values)
+
+    def put_away(self) -> None:
+        """Let go of the tables of what answers."""
+        if isinstance(self.response, KeepsTables):
+            self.response.put_away()
 
 
 def corrected(response: Response, evaluation: Evaluation, y: Float[np.ndarray, " sample"]) -> Corrected:

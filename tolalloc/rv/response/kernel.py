@@ -106,6 +106,10 @@ class KernelResponse:
         """The response without what must stay in this process."""
         return replace(self, observe=unobserved, mapper=map)
 
+    def put_away(self) -> None:
+        """Let go of the model's tables."""
+        self.model.put_away()
+
     def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
         return self.model.extremes(self.errors(x), self.torque)
 
