@@ -25,7 +25,7 @@ from tolalloc.allocation.graded import (
     with_shared_zones,
 )
 from tolalloc.allocation.judging import AS_GOOD_AS, Judge, confidence_of_fewer
-from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement
@@ -216,10 +216,11 @@ class DrawingQuestion:
         around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
         stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
         exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
-        response = replace(self.quantile(drawn.spread), space=space)
+        # The searches begin with the same designs, and share what the kernel says of them.
+        kernel = RememberedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
         further = [()] if not space.settings else [(), (space.settings[-1].name,)]
         searched = [
-            searched_front(response, drawn, stacks, exact, self.seeds("front"), effort, ladders, own, checkpoint)
+            searched_front(space, kernel, drawn, stacks, exact, self.seeds("front"), effort, ladders, own)
             for own in further
         ]
         third = searched[1][0] if len(searched) > 1 else None
