@@ -103,6 +103,15 @@ class ResponseWithDerivatives(Protocol):
         ...
 
 
+@runtime_checkable
+class KeepsTables(Protocol):
+    """What keeps tables, and makes them again when they are needed."""
+
+    def put_away(self) -> None:
+        """Let go of the tables."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class SettingDerivatives:
     """Answers of one output with its exact derivatives.
@@ -307,6 +316,9 @@ class Model(ABC):
     def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:  # noqa: ARG002
         """Return what a check of a study says of the model and of some random units, in sentences."""
         return ()
+
+    def put_away(self) -> None:  # noqa: B027
+        """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
 
     def illustrated(
         self,

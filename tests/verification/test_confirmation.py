@@ -127,7 +127,7 @@ def test_a_design_well_inside_is_confirmed_and_one_far_beyond_given_up_early():
     assert (found.confirmed, lost.confirmed) == (True, False)
     # Few units are near the wide limit, so as many are drawn as may be; a quarter of all finds the other one hopeless.
     assert found.achieved.units == 8 * UNITS
-    assert (len(found.sample.x), len(lost.sample.x)) == (308, 77)
+    assert (len(found.sample.redraw()), len(lost.sample.redraw())) == (308, 77)
     assert found.confidence == 1 - FIRST.error(ERROR)
     assert lost.confidence == confidence_of_fewer(found.confidence, 77, 308)
     assert lost.confidence == pytest.approx(norm.cdf(norm.ppf(found.confidence) / 2))

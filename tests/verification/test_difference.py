@@ -75,6 +75,14 @@ def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
     assert little.high < 0.0
 
 
+def test_units_are_in_memory_some_at_a_time_and_the_same_ones(monkeypatch):
+    whole = fit().ask(ta.Difference(zones={"housing": 20.0}, units=5000))
+    monkeypatch.setattr("tolalloc.allocation.difference._CHUNKS_AT_ONCE", 2)
+    parts = fit().ask(ta.Difference(zones={"housing": 20.0}, units=5000))
+    np.testing.assert_array_equal(whole.values, parts.values)
+    assert whole.quantile_changes == parts.quantile_changes
+
+
 @pytest.mark.slow
 def test_intervals_cover():
     """400 samples of 300 pairs: 95 % less two standard errors of 1.1 %; the share's interval is on the safe side."""

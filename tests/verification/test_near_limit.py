@@ -73,7 +73,7 @@ def test_a_screen_calls_those_near_that_lie_beyond_the_limit():
     design = designed(study)
     screen = Screen.of(design)
     assert screen is not None
-    x = np.random.default_rng(2).standard_normal((4000, 2)) * design.sample.x.std(axis=0)
+    x = np.random.default_rng(2).standard_normal((4000, 2)) * design.sample.redraw().std(axis=0)
     beyond = study.model.reading((GAP,))(x).values[:, 0] > at(0.99)
     assert screen(x)[beyond].mean() > 0.9
     assert screen(x).mean() < 3 * beyond.mean()

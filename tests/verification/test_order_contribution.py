@@ -140,6 +140,7 @@ def independent_blocks(weights: np.ndarray, blocks: int, seed: int) -> SobolAnal
         indices=saltelli_indices(evaluation, sources, SeedTree(seed).child("resamples"), resamples=200),
         growth=Growth(history=(Step(blocks=blocks, first=(0,), probability=1.0),), probability=0.9),
         samples=evaluation.status.size,
+        blocks_of_others=blocks,
     )
 
 

@@ -102,11 +102,11 @@ EFFORT = FrontEffort(
 )
 
 
-def kernel_front(prepared, quantile, **options):
-    space = prepared.space
+def kernel_front(prepared, quantile, checkpoint=None, **options):
+    space, kernel = prepared.space, RememberedResponse(quantile, checkpoint)
     unit = np.random.default_rng(1).random((14, space.lower.size))
     designs = space.lower * (space.upper / space.lower) ** unit
-    return pareto_front(quantile, rough, 1.0, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
+    return pareto_front(space, kernel, rough, 1.0, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
 
 
 @pytest.mark.slow

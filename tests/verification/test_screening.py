@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from SALib.analyze import delta, pawn
 from SALib.analyze import morris as salib_morris
 from SALib.sample import morris
 from scipy.stats import norm
@@ -19,6 +20,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation
+from tolalloc.sensitivity.given_data import delta_index, pawn_index
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 
 
@@ -144,6 +146,30 @@ def test_pawn_is_the_median_distance_of_the_classes():
     found = moment_independent(sample, errors, SeedTree(0).child("m"), resamples=2, dummies=2)
     within = 4 * 0.4 * 0.5 / np.sqrt(205) + 0.02
     np.testing.assert_allclose(found.pawn[:2], [true_pawn(0.6), true_pawn(0.4)], atol=within)
+
+
+@pytest.mark.parametrize("units", [100, 777, 4096])
+@pytest.mark.parametrize("resampled", [False, True])
+def test_pawn_and_delta_are_those_of_salib(units, resampled):
+    """But for rounding: SALib makes every density anew. Units drawn again are ties."""
+    generator = SeedTree(units).generator()
+    y = generator.gamma(9.0, 5.0, units)
+    column = y + generator.normal(0.0, 20.0, units)
+    if resampled:
+        drawn = generator.integers(units, size=units)
+        column, y = column[drawn], y[drawn]
+    exponent = 2.0 / (7.0 + np.tanh((1500.0 - units) / 500.0))
+    edges = np.linspace(0, units, min(int(np.ceil(units**exponent)), 48) + 1)
+    theirs = delta.calc_delta(y, np.linspace(y.min(), y.max(), 100), column, edges)
+    assert delta_index(column, y) == pytest.approx(theirs, rel=1e-12)
+    problem = {"num_vars": 1, "names": ["x"]}
+    theirs = pawn.analyze(problem, column[:, np.newaxis], y, S=10)["median"][0]
+    assert pawn_index(column, y) == pytest.approx(theirs, rel=1e-12)
+
+
+def test_a_class_of_equal_outputs_adds_nothing():
+    y = np.repeat([1.0, 2.0, 3.0], 100)
+    assert np.isfinite(delta_index(np.arange(300.0), y))
 
 
 @pytest.mark.slow

@@ -126,6 +126,30 @@ def test_blocks_are_added_until_the_order_is_stable_and_none_is_evaluated_twice(
     same_indices(found, analysis([[1.0, 1.05, 0.3, 0.1]], fixed(steps[-1].blocks), seed=2))
 
 
+def test_outputs_that_do_not_count_are_asked_for_in_the_first_blocks_alone():
+    weights, errors = np.array([[0.2, 1.0, 1.0, 1.0], [1.0, 0.99, 0.98, 0.1]]), sizes("abcd")
+    both, second = Linear(weights, errors.columns), Renamed(weights[1:], errors.columns)
+    effort = SobolEffort(start=16, limit=64, places=4, probability=0.999)
+    found = sobol_indices(Experiment.of(both, errors, SeedTree(2)), effort, ranked=("y1 [-]",), further=second)
+    assert (sum(both.asked), sum(second.asked)) == (16 * 6, 48 * 6)
+    whole = sobol_indices(Experiment.of(both, errors, SeedTree(2)), fixed(64), ranked=("y1 [-]",))
+    first = sobol_indices(Experiment.of(both, errors, SeedTree(2)), fixed(16), ranked=("y1 [-]",))
+    for output, own in (("y1 [-]", whole), ("y0 [-]", first)):
+        np.testing.assert_array_equal(found.of(output).total, own.of(output).total)
+        np.testing.assert_array_equal(found.of(output).first_resamples, own.of(output).first_resamples)
+        assert found.of(output).blocks == own.of(output).blocks
+    np.testing.assert_array_equal(found.overall.total, whole.overall.total)
+
+
+@dataclass(frozen=True)
+class Renamed(Linear):
+    """The second of two outputs alone."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return ("y1 [-]",)
+
+
 def test_equal_sources_reach_the_limit_and_the_analysis_says_so():
     found = analysis([[1.0, 1.0, 1.0, 1.0]], SobolEffort(start=16, limit=100, places=4, probability=0.99))
     assert not found.growth.stable

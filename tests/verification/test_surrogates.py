@@ -285,7 +285,7 @@ def test_the_sparse_regression_finds_few_products_among_many():
 
 def test_a_correction_is_the_line_of_least_squares():
     x = samples(50)
-    line = corrected(Exact(fail=(4,)), x, 3.0 - 2.0 * Exact()(x).values[:, 0])
+    line = corrected(Exact(fail=(4,)), Exact(fail=(4,))(x), 3.0 - 2.0 * Exact()(x).values[:, 0])
     assert (line.offset, line.factor) == pytest.approx((3.0, -2.0))
     found = line(x)
     assert found.status[4] == 1 and found.good.sum() == 49

@@ -13,6 +13,7 @@ from tolalloc.allocation.cost.model import Process, made_together
 from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError
 from tolalloc.settings import Setting
@@ -160,6 +161,14 @@ class DesignSpace:
         """Return the zones of the active sources [m]."""
         scales = np.append(design[: len(self.groups)], 1.0)
         return np.asarray(self.errors.zones * scales[self.group_of_source])
+
+    def units(
+        self, design: Float[np.ndarray, " variable"], seeds: SeedTree, units: int
+    ) -> Float[np.ndarray, "unit column"]:
+        """Return random units of a design, the same for the same node of the seed tree [m, angles rad]."""
+        uniform = seeds.uniform_chunks(units, len(self.errors.columns))
+        zones, standard = self.zones(design), (self.errors.standard_values(chunk) for chunk in uniform)
+        return np.concatenate([self.errors.deviations(chunk, zones) for chunk in standard])
 
     def process_positions(self, designs: Float[np.ndarray, "*designs variable"]) -> Int[np.ndarray, "*designs group"]:
         """Return the position of the cheapest process that holds each scale, or comes nearest to it [-]."""

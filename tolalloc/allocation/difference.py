@@ -15,10 +15,11 @@ from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
 from tolalloc.allocation.repricing import named_zones, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
-from tolalloc.models import Model
+from tolalloc.models import Model, Response
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
@@ -28,6 +29,8 @@ from tolalloc.units import MICROMETRE
 if TYPE_CHECKING:
     import pandas as pd
 
+_CHUNKS_AT_ONCE = 16
+"""Chunks of units that are in memory at a time, enough for many workers [-]."""
 _BEYOND = 10
 """Units beyond a quantile below which its interval is too narrow [-]."""
 
@@ -205,12 +208,9 @@ def difference(
     wanted = named_zones(errors.active, zones)
     changed = repriced(space, wanted)
     outputs = tuple(dict.fromkeys(own.output for own in requirements))
-    standard = errors.standard_values(np.concatenate([*seeds.uniform_chunks(units, len(errors.columns))]))
-    response, found = model.observed(record.observe).reading(outputs), []
+    drawings = [np.array([source.zone for source in own]) for own in (errors.active, changed)]
     with record.stage("difference"):
-        for own in (errors.active, changed):
-            evaluation = response(errors.deviations(standard, np.array([source.zone for source in own])))
-            found.append(np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan))
+        values = _solved(model.observed(record.observe).reading(outputs), errors, drawings, units, seeds)
     pairs = [(old, new) for old, new in zip(errors.active, changed, strict=True) if old.name in wanted]
     return DifferenceAnswer(
         header=replace(header, statuses=record.counts, stages=record.stages),
@@ -219,9 +219,27 @@ def difference(
         after=tuple(new for _, new in pairs),
         whole_cost=sum(own.cost for own in errors.active),
         outputs=outputs,
-        values=np.stack(found),
+        values=values,
         seeds=seeds.child("resamples"),
     )
+
+
+def _solved(
+    response: Response, errors: ErrorModel, drawings: list[Float[np.ndarray, " source"]], units: int, seeds: SeedTree
+) -> Float[np.ndarray, "drawing unit output"]:
+    """Return the outputs of the same units by the zones of every drawing, NaN where a unit has none.
+
+    The units themselves are in memory some at a time: ten million of them would be gigabytes.
+    """
+    values, columns = np.empty((len(drawings), units, len(response.outputs))), len(errors.columns)
+    for first in range(0, units, _CHUNKS_AT_ONCE * CHUNK):
+        indices = range(first // CHUNK, -(-min(first + _CHUNKS_AT_ONCE * CHUNK, units) // CHUNK))
+        uniform = np.concatenate([seeds.uniform_chunk(index, columns) for index in indices])
+        standard = errors.standard_values(uniform[: units - first])
+        for own, zones in zip(values, drawings, strict=True):
+            found = response(errors.deviations(standard, zones))
+            own[first : first + len(standard)] = np.where(found.good[:, np.newaxis], found.values, np.nan)
+    return values
 
 
 def limited_shares(requirement: Requirement) -> tuple[float, ...]:

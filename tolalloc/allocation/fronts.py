@@ -11,14 +11,13 @@ from scipy.stats import qmc
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.pareto import Front, from_genes, pareto_front, to_genes
-from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.answers import RememberedResponse
 from tolalloc.allocation.pareto.found import spread_over
 from tolalloc.allocation.pareto.problem import Ladders
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.convex import front
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
-from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.surrogate.validation import Score
@@ -85,7 +84,8 @@ def _designs_around(
 
 
 def searched_front(
-    response: QuantileResponse,
+    space: DesignSpace,
+    kernel: RememberedResponse,
     best: VerifiedDesign,
     stacks: tuple[Stack, ...],
     exact: ConvexFront,
@@ -93,14 +93,15 @@ def searched_front(
     effort: FrontEffort,
     ladders: Ladders | None = None,
     large: tuple[str, ...] = (),
-    checkpoint: Checkpoint | None = None,
 ) -> tuple[Front, Score]:
     """Return the front of cost against the quantile of the output around a verified design, and its surrogate's score.
 
     Parameters
     ----------
-    response
-        Quantile of a design on the real kernel, common random numbers.
+    space
+        The design variables.
+    kernel
+        Quantile of a design on the real kernel, common random numbers, at the spread of the verified design.
     best
         The verified design.
     stacks
@@ -115,24 +116,22 @@ def searched_front(
         Group → the scales that it may have, rising [-].
     large
         Settings that shall be large, further objectives.
-    checkpoint
-        Where the kernel's answers are kept.
     """
     # A load that is its own budget may lie beyond it by rounding.
     others = zip(best.sides[1:], stacks[1:], strict=True)
     sides = tuple(replace(side, stack=replace(own, budget=own.budget + 1e-9 * side.scale)) for side, own in others)
     return pareto_front(
-        replace(response, spread=best.spread),
+        space,
+        kernel,
         best.sides[0].predicted_value,
         best.sides[0].limit / 60,
-        _designs_around(response.space, best.design, effort.designs, seeds.child("designs")),
+        _designs_around(space, best.design, effort.designs, seeds.child("designs")),
         np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),
         seeds.child("pareto"),
         effort,
         ladders=ladders,
         large=large,
         sides=sides,
-        checkpoint=checkpoint,
     )
 
 

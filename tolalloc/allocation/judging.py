@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.attempts import Attempt
+from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.guarantee import AtYield, Sampled
 from tolalloc.allocation.level import Level, reached
 from tolalloc.allocation.local_model import Side
@@ -16,10 +19,10 @@ from tolalloc.allocation.screen import Screen
 from tolalloc.allocation.verification import Confirming, VerifiedDesign
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation, Model, Response
+from tolalloc.models import Evaluation, Model
 
 AS_GOOD_AS = 4
 """Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""
@@ -98,9 +101,11 @@ class Judge:
             wanted = Drawn(units=int(np.ceil(share * final.units)), whatever=int(np.ceil(share * final.whatever)))
             solved.append(self._solved(design, screen, seeds.child(f"look {look}"), _more(wanted, solved)))
             together = _joined(solved)
-            require_few_failures(together.plain, f"{design.name}, confirmation", self.largest_failed_share)
+            plain = AnsweredUnits(evaluation=together.plain)
+            require_few_failures(plain, f"{design.name}, confirmation", self.largest_failed_share)
             confidence = confidence_of_fewer(1 - attempt.error(self.error), wanted.whatever, final.whatever)
-            found = _judged(design, together, confidence)
+            redraw = partial(_plain_units, design.space, design.design, seeds, _whatever(solved))
+            found = _judged(design, together, confidence, redraw)
             if _is_hopeless(found):
                 break
         return replace(found, confirmed=found.met and wanted == final)
@@ -152,32 +157,37 @@ class Judge:
             rows.append(x[kept])
             near.append(is_near[kept])
             first += len(x)
-        x = np.concatenate(rows)
-        return _Solved.of(response, x, drawn, np.concatenate(near))
+        # Those solved whatever was predicted come first.
+        whatever = np.arange(sum(map(len, rows))) < drawn.whatever
+        units = SolvedUnits(drawn=drawn, near=np.concatenate(near), whatever=whatever)
+        return _Solved(evaluation=response(np.concatenate(rows)), units=units)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Solved:
     """Fresh units that were solved."""
 
-    sample: MonteCarlo
+    evaluation: Evaluation
     units: SolvedUnits
 
-    @classmethod
-    def of(
-        cls, response: Response, x: Float[np.ndarray, "unit column"], drawn: Drawn, near: Bool[np.ndarray, " unit"]
-    ) -> _Solved:
-        """Return units with their answers; those solved whatever was predicted come first."""
-        whatever = np.arange(len(x)) < drawn.whatever
-        units = SolvedUnits(drawn=drawn, near=near, whatever=whatever)
-        return cls(sample=MonteCarlo(x=x, evaluation=response(x)), units=units)
-
     @property
-    def plain(self) -> MonteCarlo:
+    def plain(self) -> Evaluation:
         """Those that were solved whatever was predicted: a random sample like any other."""
-        own, kept = self.sample, self.units.whatever
-        evaluation = Evaluation(values=own.evaluation.values[kept], status=own.evaluation.status[kept])
-        return MonteCarlo(x=own.x[kept], evaluation=evaluation)
+        kept = self.units.whatever
+        return Evaluation(values=self.evaluation.values[kept], status=self.evaluation.status[kept])
+
+
+def _whatever(solved: list[_Solved]) -> tuple[int, ...]:
+    """Return how many units of every look were solved whatever was predicted [-]."""
+    return tuple(own.units.drawn.whatever for own in solved)
+
+
+def _plain_units(
+    space: DesignSpace, design: Float[np.ndarray, " variable"], seeds: SeedTree, whatever: tuple[int, ...]
+) -> Float[np.ndarray, "unit column"]:
+    """Return the units of every look that were solved whatever was predicted, drawn again [m, angles rad]."""
+    looks = ((seeds.child(f"look {look}"), units) for look, units in enumerate(whatever, start=1))
+    return np.concatenate([space.units(design, *look) for look in looks])
 
 
 def _more(wanted: Drawn, before: list[_Solved]) -> Drawn:
@@ -191,14 +201,11 @@ def _more(wanted: Drawn, before: list[_Solved]) -> Drawn:
 
 def _joined(solved: list[_Solved]) -> _Solved:
     """Return all units of several looks."""
-    drawn, samples = [own.units.drawn for own in solved], [own.sample for own in solved]
+    drawn = [own.units.drawn for own in solved]
     return _Solved(
-        sample=MonteCarlo(
-            x=np.concatenate([own.x for own in samples]),
-            evaluation=Evaluation(
-                values=np.concatenate([own.evaluation.values for own in samples]),
-                status=np.concatenate([own.evaluation.status for own in samples]),
-            ),
+        evaluation=Evaluation(
+            values=np.concatenate([own.evaluation.values for own in solved]),
+            status=np.concatenate([own.evaluation.status for own in solved]),
         ),
         units=SolvedUnits(
             drawn=Drawn(units=sum(own.units for own in drawn), whatever=sum(own.whatever for own in drawn)),
@@ -208,9 +215,11 @@ def _joined(solved: list[_Solved]) -> _Solved:
     )
 
 
-def _judged(design: VerifiedDesign, solved: _Solved, confidence: float) -> VerifiedDesign:
+def _judged(
+    design: VerifiedDesign, solved: _Solved, confidence: float, redraw: Callable[[], Float[np.ndarray, "unit column"]]
+) -> VerifiedDesign:
     """Return a design with what other units say of it; its derivatives stay those of its search."""
-    evaluation, units = solved.sample.evaluation, solved.units
+    evaluation, units = solved.evaluation, solved.units
     found = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
     values = dict(zip(design.outputs, found.T, strict=True))
     confirming = Confirming(units=units, outputs=values)
@@ -218,7 +227,7 @@ def _judged(design: VerifiedDesign, solved: _Solved, confidence: float) -> Verif
     kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
     return replace(
         design,
-        sample=solved.plain,
+        sample=RedrawnUnits(evaluation=solved.plain, redraw=redraw),
         achieved=units.yield_of(np.logical_not(kept[0])),
         checks=checks,
         joint=units.yield_of(np.logical_not(kept.all(axis=0))),

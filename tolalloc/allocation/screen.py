@@ -52,7 +52,7 @@ class Screen:
         learnt = int(_LEARNT * np.count_nonzero(known))
         if np.count_nonzero(known) - learnt < _FEWEST:
             return None
-        x, excess = design.sample.x[known], excess[known]
+        x, excess = design.sample.redraw()[known], excess[known]
         predicted = fit_quadratic_form(x[:learnt], excess[:learnt], _STRENGTH)
         held_out = zip(predicted(x[learnt:]).T, excess[learnt:].T, strict=True)
         least = np.array([_least_of_near(*own) for own in held_out])

@@ -25,7 +25,7 @@ from tolalloc.allocation.graded import (
     with_shared_zones,
 )
 from tolalloc.allocation.judging import AS_GOOD_AS, Judge, confidence_of_fewer
-from tolalloc.allocation.pareto.answers import Checkpoint
+from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
 from tolalloc.allocation.proportional import scale_in_proportion
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.allocation.requirement import Requirement
@@ -43,6 +43,7 @@ from tolalloc.models import Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
@@ -215,10 +216,11 @@ class DrawingQuestion:
         around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
         stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
         exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
-        response = replace(self.quantile(drawn.spread), space=space)
+        # The searches begin with the same designs, and share what the kernel says of them.
+        kernel = RememberedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
         further = [()] if not space.settings else [(), (space.settings[-1].name,)]
         searched = [
-            searched_front(response, drawn, stacks, exact, self.seeds("front"), effort, ladders, own, checkpoint)
+            searched_front(space, kernel, drawn, stacks, exact, self.seeds("front"), effort, ladders, own)
             for own in further
         ]
         third = searched[1][0] if len(searched) > 1 else None
@@ -246,20 +248,16 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
 
-    def shares(
-        self, space: DesignSpace, design: Float[np.ndarray, " variable"], factor_groups: tuple[str, ...] = ()
-    ) -> SobolIndices:
+    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> tuple[SobolIndices, SobolIndices]:
         """Return the indices of the leading output at the zones and the settings of a design.
 
-        Those of the sources, unless every column is said to belong to something else.
+        By source, and by dimension of the drawing.
         """
         errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
         response = self.model.at(space.settings_of(design)).reading((leading,))
-        return sobol_indices(
-            Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share),
-            SobolEffort(start=blocks, limit=blocks),
-            factor_groups=factor_groups,
-        ).of(leading)
+        experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
+        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
+        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
 
 
 def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
@@ -325,9 +323,7 @@ def allocate_drawing(
                 robust = question.robustness(free)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
-            shares = question.shares(chosen.space, chosen.design)
-            dimensions = chosen.space.errors.dimension_of_column
-            of_dimensions = question.shares(chosen.space, chosen.design, dimensions)
+            shares, of_dimensions = question.shares(chosen.space, chosen.design)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationAnswer(
         header=replace(header, statuses=statuses, stages=record.stages),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +13,7 @@ from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, proportion, require_few_failures
+from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models import Model
@@ -38,7 +39,9 @@ class VerifiedDesign:
     design: Float[np.ndarray, " variable"]  # Scales [-] and settings
     processes: tuple[str, ...]  # Name of the process of every group
     cost: float  # Cost [cost units]
-    sample: MonteCarlo  # The fresh units on the real model with the leading output, which the first requirement limits
+    sample: (
+        RedrawnUnits  # The fresh units on the real model with the leading output, which the first requirement limits
+    )
     achieved: Yield  # Yield within its limits
     checks: tuple[Check, ...]  # How the design stands against every requirement, the leading one first
     joint: Yield  # Share of units that keep the limits of all requirements
@@ -161,7 +164,9 @@ class Verifier:
             design=design,
             processes=self.space.process_names(design),
             cost=float(self.space.cost(design)),
-            sample=fresh.samples[0],
+            sample=RedrawnUnits(
+                evaluation=fresh.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
+            ),
             achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))),
             checks=checks,
             joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),

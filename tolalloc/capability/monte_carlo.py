@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.drawings.seeds import SamplingDesign, uniform_chunks
+from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
 from tolalloc.models import Evaluation, Response
 
@@ -34,10 +35,9 @@ class Yield:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MonteCarlo:
-    """Random units and what the response said of them."""
+class AnsweredUnits:
+    """What a response said of random units."""
 
-    x: Float[np.ndarray, "sample column"]  # The units' deviations, in the order of the response's columns [m]
     evaluation: Evaluation  # The answers; a failed unit counts as rejected
 
     @property
@@ -55,10 +55,10 @@ class MonteCarlo:
         units = self.evaluation.status.size
         return proportion(units, int(np.count_nonzero(self.values > limit)) + self.failed)
 
-    def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
-        """Return the good unit whose first output is nearest to a quantile [m]."""
+    def nearest(self, share: float) -> int:
+        """Return the position of the good unit whose first output is nearest to a quantile."""
         distance = np.where(self.evaluation.good, np.abs(self.evaluation.values[:, 0] - self.quantile(share)), np.inf)
-        return self.x[[int(distance.argmin())]]
+        return int(distance.argmin())
 
     def quantile(self, share: float) -> float:
         """Return the empirical quantile of the good units."""
@@ -75,6 +75,28 @@ class MonteCarlo:
         units = self.evaluation.status.size
         allowed = allowed_rejections(units, target, confidence) - self.failed
         return float(np.sort(self.values)[-1 - allowed]) if allowed >= 0 else float("inf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MonteCarlo(AnsweredUnits):
+    """Random units and what the response said of them."""
+
+    x: Float[np.ndarray, "sample column"]  # The units' deviations, in the order of the response's columns [m]
+
+    def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
+        """Return the good unit whose first output is nearest to a quantile [m]."""
+        return self.x[[self.nearest(share)]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RedrawnUnits(AnsweredUnits):
+    """Random units whose deviations are not kept: a search has tens of samples, and asks for the deviations of few."""
+
+    redraw: Callable[[], Float[np.ndarray, "sample column"]]  # Draws the same deviations again [m]
+
+    def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
+        """Return the good unit whose first output is nearest to a quantile [m]."""
+        return self.redraw()[[self.nearest(share)]]
 
 
 def proportion(units: int, rejected: int) -> Yield:
@@ -129,14 +151,15 @@ def monte_carlo(
     at once and solves them in chunks of its own, so that an executor has many chunks to spread.
     """
     errors, seeds = experiment.errors, experiment.seeds
-    chunks = uniform_chunks(design, seeds, units, len(errors.columns))
-    x = np.concatenate([experiment.deviations(errors.standard_values(uniform)) for uniform in chunks])
+    x = np.empty((units, len(errors.columns)))
+    for index, uniform in enumerate(uniform_chunks(design, seeds, units, len(errors.columns))):
+        x[index * CHUNK : (index + 1) * CHUNK] = experiment.deviations(errors.standard_values(uniform))
     result = MonteCarlo(x=x, evaluation=experiment.response(x))
     require_few_failures(result, ".".join(seeds.path), experiment.largest_failed_share)
     return result
 
 
-def require_few_failures(result: MonteCarlo, name: str, largest_failed_share: float = LARGEST_FAILED_SHARE) -> None:
+def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share: float = LARGEST_FAILED_SHARE) -> None:
     """Raise a `SolveError` if more units failed than a trustworthy figure admits."""
     units = result.evaluation.status.size
     if result.failed > largest_failed_share * units:

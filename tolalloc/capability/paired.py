@@ -11,8 +11,8 @@ from tolalloc.capability.monte_carlo import CONFIDENCE, proportion
 
 _RESAMPLES = 1000
 """Resamples of the units behind the interval of a quantile's change [-]."""
-_BATCH = 50
-"""Resamples at a time, for the sake of memory [-]."""
+_BATCH, _UNITS_AT_ONCE = 50, 2**20
+"""Resamples at a time, and units of all of them unless one alone has more, for the sake of memory [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ def quantile_change(
         paired=True,
         vectorized=True,
         n_resamples=_RESAMPLES,
-        batch=_BATCH,
+        batch=max(1, min(_BATCH, _UNITS_AT_ONCE // both.size)),
         confidence_level=CONFIDENCE,
         method="percentile",
         rng=generator,

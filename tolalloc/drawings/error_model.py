@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -161,10 +162,18 @@ class ErrorModel:
                 mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), ABOVE_ZERO, BELOW_ONE)
         return mixed
 
-    def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
-        parts = zip(self._varying, self.columns_of_source, strict=True)
-        return np.concatenate([source.standard_values(uniform[:, own]) for source, own in parts], axis=1)
+    def marginal_values(
+        self, uniform: Float[np.ndarray, "sample column"], only: Collection[int] | None = None
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return all deviations per unit of zone for uniform numbers that already have their correlation.
+
+        Those of some sources alone, and zero elsewhere, if their positions are given.
+        """
+        values, varying = np.zeros_like(uniform), self._varying
+        for at in range(len(varying)) if only is None else only:
+            own = self.columns_of_source[at]
+            values[:, own] = varying[at].standard_values(uniform[:, own])
+        return values
 
     def deviations(
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]

@@ -24,7 +24,6 @@ from tolalloc.report.figure import Figure, HeatMap
 from tolalloc.report.glossary import words_in
 from tolalloc.report.html_table import html_table
 from tolalloc.report.page import as_json, scripts, style
-from tolalloc.report.plots import drawn, save_png
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
@@ -46,6 +45,8 @@ def _is_large(frame: pd.DataFrame) -> bool:
 
 def inline_png(figure: Figure | HeatMap) -> str:
     """Return a figure as an image that stands in the page itself."""
+    from tolalloc.report.plots import drawn
+
     buffer = BytesIO()
     drawn(figure).savefig(buffer, dpi=80, format="png")
     return f'<img alt="{escape(figure.title)}" src="data:image/png;base64,{b64encode(buffer.getvalue()).decode()}">'
@@ -60,8 +61,10 @@ def versions() -> dict[str, str]:
 def write_document(document: Document, folder: Path) -> None:
     """Write ``report.html``, ``results.xlsx``, ``summary.json``, tables, figures and, last, ``manifest.json``.
 
-    The folder has no such files yet.
+    The folder has no such files yet. What draws is imported here: many ask this module for a table alone.
     """
+    from tolalloc.report.plots import save_png
+
     figures = folder / "figures"
     figures.mkdir(parents=True)
     _write_page(document, folder / "report.html")

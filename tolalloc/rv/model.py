@@ -190,6 +190,10 @@ class ReducerModel(Model):
         """Return the model whose kernel has its chunks solved by a mapper."""
         return replace(self, kernel=replace(self.kernel, mapper=mapper))
 
+    def put_away(self) -> None:
+        """Let go of the kernel's tables."""
+        self.kernel.put_away()
+
     @property
     def outcomes(self) -> Mapping[int, str]:
         """Status → outcome of an equilibrium in words."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from jaxtyping import Float
 from numpy.polynomial import polynomial
 
 from tolalloc.chunks import map_chunks
-from tolalloc.models import Evaluation, Response
+from tolalloc.models import Evaluation, KeepsTables, Response
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.records import AngleSearch
 from tolalloc.rv.response.kernel import KernelResponse
@@ -40,10 +41,14 @@ class Corrected:
         evaluation = self.response(x)
         return replace(evaluation, values=self.offset + self.factor * evaluation.values)
 
+    def put_away(self) -> None:
+        """Let go of the tables of what answers."""
+        if isinstance(self.response, KeepsTables):
+            self.response.put_away()
 
-def corrected(response: Response, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Corrected:
-    """Return the response with the line of least squares that brings it to the answers ``y``."""
-    evaluation = response(x)
+
+def corrected(response: Response, evaluation: Evaluation, y: Float[np.ndarray, " sample"]) -> Corrected:
+    """Return the response with the line of least squares that brings what it said to the answers ``y``."""
     offset, factor = polynomial.polyfit(evaluation.values[evaluation.good, 0], y[evaluation.good], 1)
     return Corrected(response=response, offset=float(offset), factor=float(factor))
 
@@ -59,6 +64,8 @@ class ContactCandidate:
 
     kernel: KernelResponse  # The model with the full search
     angles: int  # Angles of the turn [-]
+    # Columns of a sample → value and status at these angles: a sample is fitted to in most folds, and solved once
+    _known: dict[bytes, tuple[float, int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def name(self) -> str:
@@ -67,9 +74,21 @@ class ContactCandidate:
 
     def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Corrected:
         """Return the model at fewer angles, brought to the answers."""
+        keys = [row.tobytes() for row in x]
+        new = [at for at, key in enumerate(keys) if key not in self._known]
+        if new:
+            found = self._fewer(x[new])
+            answers = zip(found.values[:, 0].tolist(), found.status.tolist(), strict=True)
+            self._known.update(zip((keys[at] for at in new), answers, strict=True))
+        values, status = zip(*(self._known[key] for key in keys), strict=True)
+        known = Evaluation(values=np.array(values)[:, np.newaxis], status=np.array(status, np.uint8))
+        return corrected(self._fewer, known, y)
+
+    @cached_property
+    def _fewer(self) -> KernelResponse:
+        """The model at these angles."""
         model, search = self.kernel.model, AngleSearch(coarse=self.angles, nodes_per_coarse=1, levels=0)
-        fewer = EquivalentModel(model.reducer, search, model.orders)
-        return corrected(replace(self.kernel, model=fewer), x, y)
+        return replace(self.kernel, model=EquivalentModel(model.reducer, search, model.orders))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +145,7 @@ class CurveCandidate:
             modes=modes,
             estimator=fitted(on_products_of_two(MultiOutputRegressor(lasso())), x, amounts),
         )
-        return corrected(regression, x, y)
+        return corrected(regression, regression(x), y)
 
     def _curves(self, x: Float[np.ndarray, "chunk column"]) -> Float[np.ndarray, "chunk angle"]:
         """Return the curves at the coarse angles [arcsec]."""

@@ -14,7 +14,7 @@ from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.models import Model
+from tolalloc.models import KeepsTables, Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Answer, Header
 from tolalloc.report.document import Section
@@ -209,11 +209,11 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         with record.stage("random units"):
             sample = measures.sample()
         with record.stage("Sobol indices"):
-            sobol = measures.sobol("sobol", tuple(name for names in spectra.values() for name in names))
             effect = measures.uncertain(sample)
+            sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
             dimensions = measures.dimensions(sobol.growth.history[-1].blocks)
         with record.stage("Sobol, second seed"):
-            again = measures.sobol("second seed", blocks=sobol.growth.history[-1].blocks)
+            again = measures.second_seed(sobol.growth.history[-1].blocks)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()
@@ -228,6 +228,8 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
             choice = measures.choice(sample)
         with record.stage("zones alone"):
             inverse = measures.inverse(choice)
+            if isinstance(choice.chosen, KeepsTables):
+                choice.chosen.put_away()
     return RankingAnswer(
         header=replace(
             header,
@@ -246,7 +248,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         design=effort.design,
         sobol=sobol,
         dimensions=dimensions,
-        reproduction=sobol.of(leading).reproduced_by(again.of(leading)),
+        reproduction=sobol.of(leading).reproduced_by(again),
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,
         shapley=shapley,

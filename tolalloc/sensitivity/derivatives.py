@@ -156,14 +156,15 @@ def _squared_gradients(
 ) -> Float[np.ndarray, "unit block"]:
     """Return the squared length of the gradient by each block's standard normal numbers [output²].
 
-    Blocks do not mix, so one number of every block is moved at a time.
+    Blocks do not mix, so one number of every block is moved at a time, and sources of blocks with fewer numbers stay.
     """
     members = np.array(blocks)[:, np.newaxis] == list(dict.fromkeys(blocks))
-    number_in_block = (members.cumsum(axis=0) * members).sum(axis=1)
+    number_in_block, numbers = (members.cumsum(axis=0) * members).sum(axis=1), members @ members.sum(axis=0)
     normal, squares = ndtri(uniform), np.zeros((uniform.shape[0], members.shape[1]))
     for number in range(1, int(number_in_block.max()) + 1):
         move = _STEP * (number_in_block == number)
-        ahead, behind = (errors.standard_values(ndtr(normal + way * move)) for way in (1, -1))
+        moved = [at for at, own in enumerate(errors.columns_of_source) if numbers[own.start] >= number]
+        ahead, behind = (errors.marginal_values(errors.dependent(ndtr(normal + way * move)), moved) for way in (1, -1))
         squares += ((by_standard * (ahead - behind) / (2.0 * _STEP)) @ members) ** 2
     return squares
 

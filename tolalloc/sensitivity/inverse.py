@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -22,8 +23,10 @@ _SLOPE_STEP = 0.1
 """Change of a factor that its slope is taken over, wide enough to move many units past each other [-]."""
 _CONFIDENCE = 0.9
 """Confidence of the two-sided interval of every factor [-]."""
-_ROWS_AT_ONCE = 2**17
+_ROWS_AT_ONCE = 2**14
 """Units of all trials that one call of the response takes, unless one trial alone has more [-]."""
+_WORST = 1 / 16
+"""Share of the units, the worst ones at the present zones, that may show alone that a closed zone is not enough [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,10 +82,11 @@ def inverse_sensitivity(
     Notes
     -----
     All trials use the same uniform numbers, so the quantile is a continuous function of each factor. Opening goes in
-    doublings, so the first crossing is found unless the quantile returns within one. Sources of a group that share a
-    zone on the drawing open one at a time here. The interval is that of the quantile by order statistics, over its
-    slope; the middle of a size does not move. What counts is the empirical quantile, without the margin that shows a
-    yield with confidence.
+    doublings, so the first crossing is found unless the quantile returns within one. A zone whose closing leaves too
+    many of the worst units beyond the limit cannot repair the design alone, and no other unit is solved with it closed.
+    Sources of a group that share a zone on the drawing open one at a time here. The interval is that of the quantile by
+    order statistics, over its slope; the middle of a size does not move. What counts is the empirical quantile, without
+    the margin that shows a yield with confidence.
 
     References
     ----------
@@ -95,7 +99,7 @@ def inverse_sensitivity(
         raise InputError.at("inverse sensitivity", "largest factor", largest_factor, "a number above 1")
     errors = experiment.errors
     openings = _Openings(experiment, errors.standard_values(experiment.uniform(units)), target)
-    now = float(openings.quantiles(np.zeros(1, int), np.ones(1))[0, 0])
+    now = openings.quantile(*openings.present)[0]
     meets, count = now <= limit, len(errors.active)
     factor = np.full(count, np.inf if meets else np.nan)
     low, high = np.full((2, count), np.nan)
@@ -132,31 +136,64 @@ class _Openings:
         self.standard, self.target = standard, target
         self.calls = self.failed = 0
 
+    @cached_property
+    def present(self) -> tuple[Float[np.ndarray, " unit"], Bool[np.ndarray, " unit"]]:
+        """Output of every unit with the zones as they are, and which are good."""
+        values, good = self._solved(self.standard, np.zeros(1, int), np.ones(1))
+        self._require_few_failures(good, np.zeros(1, int), np.ones(1))
+        return values[0], good[0]
+
     def quantiles(
         self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
     ) -> Float[np.ndarray, "trial 3"]:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
-        trials = max(1, _ROWS_AT_ONCE // self.standard.shape[0])
-        parts = (slice(start, start + trials) for start in range(0, sources.size, trials))
-        return np.concatenate([self._quantiles_at_once(sources[part], factors[part]) for part in parts])
+        trials, found = max(1, _ROWS_AT_ONCE // self.standard.shape[0]), []
+        for start in range(0, sources.size, trials):
+            own, by = sources[start : start + trials], factors[start : start + trials]
+            values, good = self._solved(self.standard, own, by)
+            self._require_few_failures(good, own, by)
+            found += [self.quantile(*trial) for trial in zip(values, good, strict=True)]
+        return np.array(found)
 
-    def _quantiles_at_once(
-        self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
-    ) -> Float[np.ndarray, "trial 3"]:
-        """Return the same from one call of the response."""
-        zones = np.repeat(self.experiment.zones[np.newaxis], sources.size, axis=0)
-        zones[np.arange(sources.size), sources] *= factors
-        evaluation = self.experiment.response(
-            np.concatenate([self.errors.deviations(self.standard, own) for own in zones])
-        )
-        good, values = (part.reshape(sources.size, -1) for part in (evaluation.good, evaluation.values[:, 0]))
+    def quantile(
+        self, values: Float[np.ndarray, " unit"], good: Bool[np.ndarray, " unit"]
+    ) -> tuple[float, float, float]:
+        """Return the quantile of the good units at the target yield, and the ends of its interval [output]."""
+        found = quantile_interval(values[good], self.target, _CONFIDENCE)
+        return found.estimate, found.low, found.high
+
+    def may_repair(self, sources: Int[np.ndarray, " trial"], limit: float) -> Bool[np.ndarray, " trial"]:
+        """Return which zones may keep the limit if they are closed: all that the worst units alone do not refute.
+
+        A quantile lies beyond the limit if as many units do as lie above it, and the unit just below it too.
+        """
+        values, good = self.present
+        needed = good.size - int(np.floor((good.size - 1) * self.target))
+        worst = np.argsort(np.where(good, values, -np.inf))[-max(needed, int(_WORST * good.size)) :]
+        trials, beyond = max(1, _ROWS_AT_ONCE // worst.size), []
+        for start in range(0, sources.size, trials):
+            own = sources[start : start + trials]
+            values, good = self._solved(self.standard[worst], own, np.zeros(own.size))
+            beyond += [int(np.count_nonzero(trial)) for trial in good & (values > limit)]
+        return np.array(beyond, int) < needed
+
+    def _solved(
+        self,
+        standard: Float[np.ndarray, "unit column"],
+        sources: Int[np.ndarray, " trial"],
+        factors: Float[np.ndarray, " trial"],
+    ) -> tuple[Float[np.ndarray, "trial unit"], Bool[np.ndarray, "trial unit"]]:
+        """Return the outputs of units in every trial from one call of the response, and which are good."""
+        x = np.empty((sources.size, *standard.shape))
+        for own, source, factor in zip(x, sources, factors, strict=True):
+            zones = self.experiment.zones.copy()
+            zones[source] *= factor
+            own[:] = self.errors.deviations(standard, zones)
+        evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
+        values, good = (part.reshape(x.shape[:2]) for part in (evaluation.values[:, 0], evaluation.good))
         self.calls += 1
         self.failed += int(np.count_nonzero(~good))
-        self._require_few_failures(good, sources, factors)
-        found = [
-            quantile_interval(own[usable], self.target, _CONFIDENCE) for own, usable in zip(values, good, strict=True)
-        ]
-        return np.array([(own.estimate, own.low, own.high) for own in found])
+        return values, good
 
     def _require_few_failures(
         self,
@@ -185,6 +222,8 @@ def _bracket(
     doublings = 2.0 ** np.arange(1, int(np.ceil(np.log2(largest_factor))))
     trials = [*doublings.tolist(), largest_factor] if now <= limit else [0.0]
     left = np.arange(len(openings.errors.active))
+    if now > limit:
+        left = left[openings.may_repair(left, limit)]
     near, near_excess, found = 1.0, np.full(left.size, now - limit), []
     for far in trials:
         if not left.size:
@@ -194,7 +233,7 @@ def _bracket(
         ends = np.full((2, left.size), [[near], [far]])
         found.append(np.stack([left, *ends, near_excess, excess])[:, crossed])
         left, near, near_excess = left[~crossed], far, excess[~crossed]
-    sources, bracket = np.split(np.concatenate(found, axis=1), [1])
+    sources, bracket = np.split(np.concatenate([np.empty((5, 0)), *found], axis=1), [1])
     return sources[0].astype(int), bracket
 
 

@@ -74,26 +74,20 @@ class Measures:
         units = self.experiment("units", self.model.reading(self.outputs))
         return monte_carlo(units, self.effort.units, self.effort.design)
 
-    def sobol(self, name: str, waves: tuple[str, ...] = (), blocks: int = 0) -> SobolAnalysis:
-        """Return the indices of all outputs and waves, what is uncertain of the model among the sources.
+    def sobol(self, waves: tuple[str, ...]) -> SobolAnalysis:
+        """Return the indices of all outputs and of waves of the model's spectra, with as many blocks as are needed.
 
-        Parameters
-        ----------
-        name
-            Node of the seed tree.
-        waves
-            Outputs of the model's spectra.
-        blocks
-            Number of blocks, without pairs; as many as the ranking needs if 0 [-].
+        What is uncertain of the model is among the sources. Blocks are added for the order of the sources of what is
+        limited, so that alone is asked for in those after the first number.
         """
-        outputs, effort = (*self.outputs, *waves), self.effort.sobol
-        joint = replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
-        response = self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
-        return sobol_indices(
-            self.experiment(name, response, joint),
-            replace(effort, start=blocks, limit=blocks, second_order=False) if blocks else effort,
-            ranked=tuple(self.limits),
-        )
+        limited = tuple(self.limits)
+        experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
+        return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further)
+
+    def second_seed(self, blocks: int) -> SobolIndices:
+        """Return the indices of the leading output from other random numbers, with so many blocks and no pairs."""
+        effort = replace(self.effort.sobol, start=blocks, limit=blocks, second_order=False)
+        return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort).of(0)
 
     def dimensions(self, blocks: int) -> SobolIndices | None:
         """Return the indices of the leading output by the dimensions of the drawing, with so many blocks.
@@ -101,13 +95,21 @@ class Measures:
         All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
         every dimension has one member, or as many as are correlated with it.
         """
-        joint = replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
-        groups, outputs = joint.dimension_of_column, (self.leading,)
-        if len(set(groups)) == len(joint.blocks):
+        groups, effort = self._with_joint.dimension_of_column, SobolEffort(start=blocks, limit=blocks)
+        if len(set(groups)) == len(self._with_joint.blocks):
             return None
-        response = self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
-        experiment = self.experiment("dimensions", response, joint)
-        return sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), factor_groups=groups).of(0)
+        return sobol_indices(self._sobol_experiment("dimensions", (self.leading,)), effort, factor_groups=groups).of(0)
+
+    @property
+    def _with_joint(self) -> ErrorModel:
+        """The sources of the drawing and what is uncertain of the model."""
+        return replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
+
+    def _with_uncertain(self, outputs: tuple[str, ...]) -> Response:
+        return self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
+
+    def _sobol_experiment(self, name: str, outputs: tuple[str, ...]) -> Experiment[Response]:
+        return self.experiment(name, self._with_uncertain(outputs), self._with_joint)
 
     def uncertain(self, sample: MonteCarlo) -> UncertainEffect | None:
         """Return what not knowing the model itself does to the leading output; none where all of it is known."""
@@ -177,13 +179,15 @@ class Measures:
                     ("sparse quadratic regression", sparse_quadratic_regression),
                 )
             ]
+        learnt = _first(sample, self.effort.surrogate_units)
         return choose(
             self.response,
             candidates,
-            sample.x[: self.effort.surrogate_units],
+            learnt.x,
             self.seeds.child("surrogates"),
             quantile=self.target,
             largest_failed_share=self.largest_failed_share,
+            evaluation=learnt.evaluation,
         )
 
 

@@ -9,7 +9,7 @@ design comes in chunks of whole blocks, bit for bit the samples of SALib.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -55,24 +55,41 @@ class SaltelliDesign:
         return tuple(dict.fromkeys(self.factor_groups))
 
     @property
+    def columns_of_names(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of each player's columns."""
+        return tuple(tuple(np.flatnonzero(own).tolist()) for own in self._own)
+
+    @property
     def samples_per_block(self) -> int:
         """Samples of a block [-]."""
         return (1 + self.second_order) * len(self.names) + 2
 
-    def chunks(self, start: int, stop: int) -> Iterator[Float[np.ndarray, "sample column"]]:
-        """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1)."""
+    def chunks(self, start: int, stop: int, only: tuple[str, ...] = ()) -> Iterator[Float[np.ndarray, "sample column"]]:
+        """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1).
+
+        If players are named, of every block only the samples AB of these, in this order.
+        """
         sequence = qmc.Sobol(d=2 * len(self.factor_groups), scramble=True, seed=self.seed)
         if start:
             sequence.fast_forward(start)
         # A power of two, as the first draw from the sequence ought to be.
-        at_once = 1 << max(0, (SAMPLES_AT_ONCE // self.samples_per_block).bit_length() - 1)
+        at_once = 1 << max(0, (SAMPLES_AT_ONCE // (len(only) or self.samples_per_block)).bit_length() - 1)
         for first in range(start, stop, at_once):
-            yield self._samples(sequence.random(min(at_once, stop - first)))
+            base = sequence.random(min(at_once, stop - first))
+            yield self._exchanged(base, only) if only else self._samples(base)
 
     @cached_property
     def _own(self) -> Bool[np.ndarray, "group column"]:
         """Which columns belong to each factor group."""
         return np.asarray(np.array(self.factor_groups) == np.array(self.names)[:, np.newaxis])
+
+    def _exchanged(
+        self, base: Float[np.ndarray, "block base_column"], only: tuple[str, ...]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the samples AB of some players."""
+        a, b = np.split(base[:, np.newaxis], 2, axis=2)
+        own = self._own[[self.names.index(name) for name in only]]
+        return np.where(own, b, a).reshape(-1, len(self.factor_groups))
 
     def _samples(self, base: Float[np.ndarray, "block base_column"]) -> Float[np.ndarray, "sample column"]:
         """Return the samples of the blocks whose A and B stand side by side."""
@@ -113,6 +130,15 @@ class SaltelliIndices:
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Positions of the two sources of every pair."""
         return tuple(combinations(range(self.first.shape[1]), 2)) if self.second.size else ()
+
+    def instead_of(self, other: SaltelliIndices, places: list[int]) -> SaltelliIndices:
+        """Return indices in which these stand at some places among the outputs, and those of other blocks elsewhere."""
+        joined = {}
+        for name, own in vars(self).items():
+            if isinstance(own, np.ndarray):
+                joined[name] = getattr(other, name).copy()
+                joined[name][places] = own
+        return replace(self, **joined)
 
 
 def saltelli_indices(

@@ -2,7 +2,8 @@
 
 SALib's traps and the guards against them: one NaN makes every figure NaN, so only good samples are passed; its own
 seeding and delta's resampling set numpy's global state, so resamples are drawn here; ``conf`` is a multiple of a
-standard deviation, so intervals here are percentiles.
+standard deviation, so intervals here are percentiles; PAWN and delta ask for one distribution at a time, so
+`tolalloc.sensitivity.given_data` computes them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.compiled import in_threads
@@ -21,6 +21,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Response
 from tolalloc.sensitivity.effort import CLASSES, FEWEST_TRAJECTORIES, FEWEST_UNITS_OF_CLASS
+from tolalloc.sensitivity.given_data import delta_index, pawn_index
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
@@ -31,8 +32,6 @@ _TRIM = 0.001
 """Share of the distribution left out at either end, where a normal number would be infinite [-]."""
 _RESAMPLES = 400
 """Bootstrap resamples of the trajectories [-]."""
-_CURVE_POINTS = 100
-"""Points at which delta compares two densities, SALib's number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,11 +186,10 @@ def moment_independent(
         raise SolveError("Moment-independent indices: the output is the same for all units; no source can be ranked.")
     widest, shuffle = max(known, key=lambda own: own.shape[1]), seeds.child("dummies").generator()
     known += [shuffle.permutation(widest) for _ in range(dummies)]
-    pawns = np.array([_pawn(columns, y).max() for columns in known])
+    pawns = np.array([max(pawn_index(column, y) for column in columns.T) for columns in known])
     generator = seeds.child("resamples").generator()
-    with one_blas_thread():
-        chosen = [columns[:, np.argmax([_delta(column, y) for column in columns.T])] for columns in known]
-        deltas = np.column_stack([_reduced_deltas(column, y, resamples, generator) for column in chosen])
+    chosen = [columns[:, np.argmax([delta_index(column, y) for column in columns.T])] for columns in known]
+    deltas = np.column_stack([_reduced_deltas(column, y, resamples, generator) for column in chosen])
     count = len(known) - dummies
     return MomentIndependent(
         sources=tuple(dict.fromkeys(errors.source_of_column)),
@@ -228,23 +226,6 @@ def _known(errors: ErrorModel, x: Float[np.ndarray, "unit column"]) -> list[Floa
     return found
 
 
-def _pawn(columns: Float[np.ndarray, "unit measure"], y: Float[np.ndarray, " unit"]) -> Float[np.ndarray, " measure"]:
-    """Return SALib's PAWN index of every measure [-]."""
-    from SALib.analyze import pawn
-
-    problem = {"num_vars": columns.shape[1], "names": [str(at) for at in range(columns.shape[1])]}
-    return np.asarray(pawn.analyze(problem, columns, y, S=CLASSES)["median"])
-
-
-def _delta(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]) -> float:
-    """Return SALib's delta of one measure, with its bias [-]."""
-    from SALib.analyze.delta import calc_delta
-
-    exponent = 2.0 / (7.0 + np.tanh((1500.0 - y.size) / 500.0))
-    edges = np.linspace(0, y.size, min(int(np.ceil(y.size**exponent)), 48) + 1)
-    return float(calc_delta(y, np.linspace(y.min(), y.max(), _CURVE_POINTS), column, edges))
-
-
 def _reduced_deltas(
     column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"], resamples: int, generator: np.random.Generator
 ) -> Float[np.ndarray, " resample"]:
@@ -252,7 +233,7 @@ def _reduced_deltas(
     drawn, found = [generator.integers(y.size, size=y.size) for _ in range(resamples)], np.empty(resamples)
 
     def resample(part: slice) -> None:
-        found[part] = [_delta(column[own], y[own]) for own in drawn[part]]
+        found[part] = [delta_index(column[own], y[own]) for own in drawn[part]]
 
     in_threads(resample, resamples, size=1)
-    return 2.0 * _delta(column, y) - found
+    return 2.0 * delta_index(column, y) - found

@@ -37,7 +37,8 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             heading="One ranking over all requirements",
             paragraphs=(
                 "Sources by their largest total index over the outputs that have a limit "
-                f"({', '.join(name.split(' [')[0] for name in answer.sobol.ranked)}); the others stand beside them.",
+                f"({', '.join(name.split(' [')[0] for name in answer.sobol.ranked)}), {answer.sobol.blocks} blocks; "
+                f"the others stand beside them, {answer.sobol.blocks_of_others} blocks.",
             ),
             figures=(figures.requirements_figure(answer),),
             tables=(("all requirements", driver_tables.overall_table(answer)),),
@@ -81,7 +82,10 @@ def _orders(answer: RankingAnswer) -> tuple[Section, ...]:
     return (
         Section(
             heading="Which error makes which order",
-            paragraphs=(f"{note}what a source adds only together with others is the difference of the two shares.",),
+            paragraphs=(
+                f"{note}what a source adds only together with others is the difference of the two shares. "
+                f"{answer.sobol.blocks_of_others} blocks.",
+            ),
             figures=(figures.orders_figure(answer),),
             tables=(("orders", driver_tables.orders_table(answer)),),
         ),

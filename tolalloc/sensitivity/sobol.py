@@ -8,7 +8,11 @@ whole, so `tolalloc.sensitivity.saltelli` gives the same samples in chunks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
@@ -16,7 +20,7 @@ from tolalloc.models import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import Resampled, grow_until_stable
 from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, overall_ranking
+from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SolvedDesign, overall_ranking
 
 _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
@@ -27,6 +31,7 @@ def sobol_indices(
     effort: SobolEffort,
     ranked: tuple[str, ...] = (),
     factor_groups: tuple[str, ...] = (),
+    further: Response | None = None,
 ) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
@@ -41,6 +46,9 @@ def sobol_indices(
     factor_groups
         Name of what every column belongs to, such as its dimension of the drawing; independent of each other. The
         sources, or blocks of dependent ones, unless given.
+    further
+        Response of the outputs that count, which is asked alone after the first number of blocks: no other output needs
+        a stable order. All outputs are asked for in all blocks unless it is given.
 
     Raises
     ------
@@ -50,46 +58,21 @@ def sobol_indices(
     Notes
     -----
     Correlations act between the columns of one block only, so exchanging all its independent uniform numbers exchanges
-    the block and nothing else. A sample without one of its outputs is a failed one for all of them.
+    the block and nothing else. A sample without one of its outputs is a failed one for all that were asked for.
 
     References
     ----------
     Saltelli et al. 2010 (first order), Jansen 1999 (total), Saltelli 2002 (second order), as SALib implements them;
     groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
     """
-    errors, seeds, outputs = experiment.errors, experiment.seeds, experiment.response.outputs
-    counted, sample = ranked or outputs, seeds.child("sample").integer()
+    errors, outputs = experiment.errors, experiment.response.outputs
+    counted, sample = ranked or outputs, experiment.seeds.child("sample").integer()
     design = SaltelliDesign(
         factor_groups=factor_groups or errors.block_of_column, seed=sample, second_order=effort.second_order
     )
-    answers, steps = list[Evaluation](), list[SaltelliIndices]()
-
-    def resampled(blocks: int) -> Resampled:
-        solved = steps[-1].blocks + steps[-1].dropped if steps else 0
-        for uniform in design.chunks(solved, blocks):
-            standard = errors.standard_values(np.maximum(uniform, _HALF_STEP))
-            answers.append(experiment.response(experiment.deviations(standard)))
-        answers[:] = [
-            Evaluation(
-                values=np.concatenate([part.values for part in answers]),
-                status=np.concatenate([part.status for part in answers]),
-            )
-        ]
-        steps.append(
-            saltelli_indices(
-                answers[0],
-                len(design.names),
-                seeds.child("resamples"),
-                second_order=effort.second_order,
-                resamples=effort.resamples,
-                largest_failed_share=experiment.largest_failed_share,
-            )
-        )
-        ranking = overall_ranking(design.names, outputs, counted, steps[-1])
-        return ranking.total, ranking.total_resamples
-
+    blocks = _Blocks(experiment, design, effort, counted, further or experiment.response)
     growth = grow_until_stable(
-        resampled,
+        blocks.resampled,
         _groups(errors, design.names),
         min(effort.places, len(design.names)),
         start=effort.start,
@@ -100,9 +83,75 @@ def sobol_indices(
         outputs=outputs,
         ranked=counted,
         sources=design.names,
-        indices=steps[-1],
+        indices=blocks.indices,
         growth=growth,
-        samples=answers[0].status.size,
+        samples=blocks.answers.status.size,
+        blocks_of_others=blocks.steps[0 if further else -1].blocks,
+        solved=SolvedDesign(design=design, answers=replace(blocks.answers, values=blocks.answers.values[:, :1])),
+    )
+
+
+class _Blocks:
+    """Blocks that are solved when they are first asked for."""
+
+    def __init__(
+        self,
+        experiment: Experiment[Response],
+        design: SaltelliDesign,
+        effort: SobolEffort,
+        counted: tuple[str, ...],
+        further: Response,
+    ) -> None:
+        self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
+        self.further = further
+        self.kept = [experiment.response.outputs.index(name) for name in further.outputs]
+        self.answers: Evaluation
+        self.steps = list[SaltelliIndices]()
+
+    def resampled(self, blocks: int) -> Resampled:
+        """Return the indices of the ranking over all outputs that count."""
+        if self.steps:
+            start = self.steps[-1].blocks + self.steps[-1].dropped
+            more = solved(self.experiment, self.further, self.design.chunks(start, blocks))
+            self.answers = joined([self.answers, more])
+            self.steps.append(self._indices(self.answers))
+        else:
+            first = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
+            self.answers = replace(first, values=first.values[:, self.kept])
+            self.steps.append(self._indices(first))
+        outputs = self.experiment.response.outputs if len(self.steps) == 1 else self.further.outputs
+        ranking = overall_ranking(self.design.names, outputs, self.counted, self.steps[-1])
+        return ranking.total, ranking.total_resamples
+
+    @property
+    def indices(self) -> SaltelliIndices:
+        """Indices of all outputs, each from all blocks in which it was asked for."""
+        return self.steps[0] if len(self.steps) == 1 else self.steps[-1].instead_of(self.steps[0], self.kept)
+
+    def _indices(self, answers: Evaluation) -> SaltelliIndices:
+        return saltelli_indices(
+            answers,
+            len(self.design.names),
+            self.experiment.seeds.child("resamples"),
+            second_order=self.effort.second_order,
+            resamples=self.effort.resamples,
+            largest_failed_share=self.experiment.largest_failed_share,
+        )
+
+
+def solved(
+    experiment: Experiment[Response], response: Response, chunks: Iterable[Float[np.ndarray, "sample column"]]
+) -> Evaluation:
+    """Return what a response says of the samples of a design, uniform numbers chunk by chunk."""
+    errors = experiment.errors
+    standard = (errors.standard_values(np.maximum(uniform, _HALF_STEP)) for uniform in chunks)
+    return joined([response(experiment.deviations(own)) for own in standard])
+
+
+def joined(parts: Sequence[Evaluation]) -> Evaluation:
+    """Return the answers of several parts together."""
+    return Evaluation(
+        values=np.concatenate([part.values for part in parts]), status=np.concatenate([part.status for part in parts])
     )
 
 

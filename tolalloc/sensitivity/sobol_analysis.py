@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.models import Evaluation
 from tolalloc.sensitivity.ranking import Growth, SourceRanking, indistinguishable_from_zero, percentile_interval
-from tolalloc.sensitivity.saltelli import SaltelliIndices
+from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +47,14 @@ class SobolIndices(SourceRanking):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SolvedDesign:
+    """A Saltelli design whose samples are solved."""
+
+    design: SaltelliDesign  # Which samples they are
+    answers: Evaluation  # The first output, block by block
+
+
+@dataclass(frozen=True, kw_only=True)
 class SobolAnalysis:
     """Indices of all outputs from the same samples."""
 
@@ -55,10 +64,12 @@ class SobolAnalysis:
     indices: SaltelliIndices  # Indices of all outputs
     growth: Growth  # How the order of the first places settled; one step for a fixed number of blocks
     samples: int  # Samples evaluated [-]
+    blocks_of_others: int  # Saltelli blocks used for outputs that do not count [-]
+    solved: SolvedDesign | None = None  # What the indices of the first output come from, where it is kept
 
     @property
     def blocks(self) -> int:
-        """Saltelli blocks used [-]."""
+        """Saltelli blocks used for the outputs that count [-]."""
         return self.indices.blocks
 
     @property
@@ -100,22 +111,36 @@ class SobolAnalysis:
         SolveError
             The output is the same for all samples.
         """
-        at, found = self.position(output), self.indices
-        if not found.varies[at]:
-            raise SolveError(f"Sobol indices: {self.outputs[at]} is the same for all samples; no source can be ranked.")
-        return SobolIndices(
-            sources=self.sources,
-            first=found.first[at],
-            total=found.total[at],
-            first_resamples=found.first_resamples[at],
-            total_resamples=found.total_resamples[at],
-            pairs=found.pairs,
-            second=found.second[at],
-            second_resamples=found.second_resamples[at],
-            blocks=found.blocks,
-            dropped=found.dropped,
-            samples=self.samples,
-        )
+        at, counts = self.position(output), self.outputs[self.position(output)] in self.ranked
+        blocks = self.blocks if counts else self.blocks_of_others
+        return indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples)
+
+
+def indices_of(
+    found: SaltelliIndices, at: int, output: str, sources: tuple[str, ...], blocks: int, samples: int
+) -> SobolIndices:
+    """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-].
+
+    Raises
+    ------
+    SolveError
+        The output is the same for all samples.
+    """
+    if not found.varies[at]:
+        raise SolveError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
+    return SobolIndices(
+        sources=sources,
+        first=found.first[at],
+        total=found.total[at],
+        first_resamples=found.first_resamples[at],
+        total_resamples=found.total_resamples[at],
+        pairs=found.pairs,
+        second=found.second[at],
+        second_resamples=found.second_resamples[at],
+        blocks=blocks,
+        dropped=found.dropped,
+        samples=samples,
+    )
 
 
 def overall_ranking(

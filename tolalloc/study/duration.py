@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _TIMED = 128
 """Units that are timed [-]."""
-_TRIALS = 16
+_TRIALS = 8
 """Units of the surrogates and their trials over those that they learn from, as counted in shipped studies [-]."""
 _CONFIRMATIONS = (0.3, 8.0)
 """Units of a confirmation over its largest number for one design, as counted in shipped studies [-]."""
@@ -76,23 +76,27 @@ class _Part:
 
 
 def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
-    """Return random units with all outputs, Saltelli blocks of them, and units of the leading output alone."""
+    """Return random units, Saltelli blocks and units of the leading output alone, each with what is asked of them."""
     model, errors, effort = prepared.model, prepared.errors, prepared.study.effort.ranking
     leading = prepared.requirements[0].output
     outputs = tuple(name for name in model.outputs if name in {*model.ranked, *prepared.study.limits})
     waves = tuple(name for names in model.spectra.values() for name in names)
-    whole = _seconds(prepared, outputs)
-    analysed = _seconds(prepared, (*outputs, *waves), uncertain=True)
-    alone = _seconds(prepared, (leading,))
+    limited = tuple(dict.fromkeys(own.output for own in prepared.requirements))
+    whole, alone = _seconds(prepared, outputs), _seconds(prepared, (leading,))
+    of_all, of_limited, again = (
+        _seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), limited, (leading,))
+    )
     sources, dimensions = len(errors.blocks) + len(model.uncertain), len({*errors.dimension_of_column})
     inverse = max(effort.inverse_units, fewest_units(prepared.target))
     trials = effort.trajectories * (sources + 1) + 4 * effort.derivative_units + (sources + 2) * inverse
-    blocks = (effort.sobol.start, effort.sobol.limit)
+    block, (start, limit) = sources + 2, (effort.sobol.start, effort.sobol.limit)
     most = trials + _TRIALS * effort.surrogate_units + 3 * effort.units
     return (
         _Part(units=(effort.units, effort.units), seconds=whole),
-        _Part(units=(blocks[0] * 2 * (sources + 2), blocks[1] * 2 * (sources + 2)), seconds=analysed),
-        _Part(units=(0, blocks[1] * (dimensions + 3) + most), seconds=alone),
+        _Part(units=(start * block, start * block), seconds=of_all),
+        _Part(units=(0, (limit - start) * block), seconds=of_limited),
+        _Part(units=(start * block, limit * block), seconds=again),
+        _Part(units=(0, limit * (dimensions + 3) + most), seconds=alone),
     )
 
 

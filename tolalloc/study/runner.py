@@ -92,6 +92,8 @@ def run(
         from tolalloc.report.writer import write_document
 
         document = _document(prepared, answers)
+        if study.model is not None:
+            prepared.model.put_away()  # drawing the figures takes as much memory
         for answer in answers.values():
             answer.add_files(beside)
         write_document(document, beside)

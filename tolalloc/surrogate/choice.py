@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.models import Response
+from tolalloc.models import Evaluation, Response
 from tolalloc.surrogate.regression import NEEDED_Q2
 from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
 
@@ -88,6 +88,7 @@ def choose(
     seeds: SeedTree,
     quantile: float = 0.9973,
     largest_failed_share: float = 0.01,
+    evaluation: Evaluation | None = None,
 ) -> Choice:
     """Return the candidate with the highest Q² among those tried that pass the gate, fitted to all answers.
 
@@ -105,6 +106,8 @@ def choose(
         Share of the units below the quantile that is compared, the yield that the surrogate is asked about [-].
     largest_failed_share
         Share of samples that may fail in the response [-].
+    evaluation
+        What the response says of the samples, where that is known.
 
     Raises
     ------
@@ -120,7 +123,7 @@ def choose(
     """
     if not candidates:
         raise InputError.at("surrogate", "candidates", tuple(candidates), "one or more")
-    answers = answers_of(response, x, seeds, largest_failed_share=largest_failed_share)
+    answers = answers_of(response, x, seeds, largest_failed_share=largest_failed_share, evaluation=evaluation)
     scores = list[Score]()
     for candidate in candidates:
         scores.append(cross_validate(candidate, answers, quantile))

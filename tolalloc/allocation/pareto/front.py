@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import FrontEffort
 from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
+from tolalloc.allocation.pareto.answers import RememberedResponse
 from tolalloc.allocation.pareto.found import SearchedDesigns, knee, spread_over
 from tolalloc.allocation.pareto.problem import DesignProblem, Ladders
-from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
@@ -60,7 +60,8 @@ def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front
 
 
 def pareto_front(
-    response: QuantileResponse,
+    space: DesignSpace,
+    kernel: RememberedResponse,
     baseline: Baseline,
     floor: float,
     designs: Float[np.ndarray, "design variable"],
@@ -70,15 +71,16 @@ def pareto_front(
     ladders: Ladders | None = None,
     large: tuple[str, ...] = (),
     sides: tuple[Side, ...] = (),
-    checkpoint: Checkpoint | None = None,
     largest_failed_share: float = 0.05,
 ) -> tuple[Front, Score]:
     """Return the front, improved by kernel runs along it, and what the surrogate that it was found on is worth.
 
     Parameters
     ----------
-    response
-        Quantile of a design on the real kernel.
+    space
+        The design variables.
+    kernel
+        Quantile of a design on the real kernel; several searches may share what it remembers.
     baseline
         Convex model of the quantile, which the surrogate corrects.
     floor
@@ -97,8 +99,6 @@ def pareto_front(
         Settings that shall be large, further objectives.
     sides
         Limited sides of other requirements, kept by their local models.
-    checkpoint
-        Where the kernel's answers are kept, so that an interrupted search goes on with the same bits.
     largest_failed_share
         Share of the kernel's designs that may fail; a design fails with the first of its units [-].
 
@@ -109,15 +109,14 @@ def pareto_front(
     """
     from tolalloc.allocation.pareto.genetic import search
 
-    kernel = RememberedResponse(response, checkpoint)
-    problem = DesignProblem(space=response.space, quantile=kernel, ladders=ladders or {}, large=large, sides=sides)
+    problem = DesignProblem(space=space, quantile=kernel, ladders=ladders or {}, large=large, sides=sides)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
     candidate = RegressionCandidate(
         name="corrected convex model",
-        columns=response.columns,
-        outputs=response.outputs,
-        estimator=lambda: gaussian_process(len(response.columns)),
+        columns=kernel.columns,
+        outputs=kernel.outputs,
+        estimator=lambda: gaussian_process(len(kernel.columns)),
         # Far from its design the convex model may fall below zero.
         baseline=lambda x: np.maximum(baseline(x), floor),
     )

@@ -26,7 +26,7 @@ GROUPS: tuple[Callable[[Positions], SpringGroup], ...] = (
     crank_carrier,
     carrier_support,
 )
-_ANGLES_AT_ONCE = 512
+_ANGLES_AT_ONCE = 64
 
 
 class CondensedAngles(NamedTuple):
@@ -194,8 +194,12 @@ def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray,
 
     Theory page, equations (19)–(21).
     """
-    parts = [
-        _condense_some(Positions(reducer, angle[start : start + _ANGLES_AT_ONCE], orders))
-        for start in range(0, angle.size, _ANGLES_AT_ONCE)
-    ]
-    return CondensedAngles(*(np.ascontiguousarray(np.concatenate(field)) for field in zip(*parts, strict=True)))
+    whole: CondensedAngles | None = None
+    for start in range(0, angle.size, _ANGLES_AT_ONCE):
+        part = _condense_some(Positions(reducer, angle[start : start + _ANGLES_AT_ONCE], orders))
+        if whole is None:
+            whole = CondensedAngles(*(np.empty((angle.size, *field.shape[1:]), field.dtype) for field in part))
+        for field, own in zip(whole, part, strict=True):
+            field[start : start + _ANGLES_AT_ONCE] = own
+    assert whole is not None
+    return whole

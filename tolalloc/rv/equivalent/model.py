@@ -92,6 +92,11 @@ class EquivalentModel:
         angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
         return angle, self.tables_at(angle)
 
+    def put_away(self) -> None:
+        """Let go of the tables; they are made again when they are needed."""
+        for name in ("_tables", "_turn"):
+            vars(self).pop(name, None)
+
     def _given(
         self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]
     ) -> tuple[Any, Any, Any, Any, Any]:

@@ -81,16 +81,14 @@ class KernelResponse:
 
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> WithDerivatives:
         """Return the peak-to-peak of every sample and its derivatives, at hardly more cost than without."""
-        varied = [self.model.columns.index(name) for name in self.columns]
-        amounts = [self.model.columns.index(name) for name in self.model.reducer.modification.deviations]
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
         by_stiffness: dict[str, Float[np.ndarray, " sample"]] = defaultdict(lambda: np.empty(x.shape[0]))
         for rows, (extremes, derivatives) in map_chunks(self.alone._derivatives, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND
             status[rows] = extremes.status
-            by_column[rows] = derivatives.by_error[:, varied] / ARCSECOND
-            by_modification[rows] = derivatives.by_error[:, amounts] / ARCSECOND
+            by_column[rows] = derivatives.by_error[:, : len(self.columns)] / ARCSECOND
+            by_modification[rows] = derivatives.by_error[:, len(self.columns) :] / ARCSECOND
             for name, derivative in derivatives.by_stiffness.items():
                 by_stiffness[name][rows] = derivative / ARCSECOND
             self.observe(extremes.status)
@@ -106,11 +104,23 @@ class KernelResponse:
         """The response without what must stay in this process."""
         return replace(self, observe=unobserved, mapper=map)
 
+    def put_away(self) -> None:
+        """Let go of the model's tables."""
+        self.model.put_away()
+
     def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
         return self.model.extremes(self.errors(x), self.torque)
 
     def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[Extremes, Derivatives]:
-        return self.model.peak_to_peak_derivatives(self.errors(x), self.torque)
+        """Return the extremes of a chunk and their derivatives, of the columns those that vary and the amounts alone.
+
+        What is asked for is a fraction of all columns, and a chunk's answer is kept in a file or sent by a worker.
+        """
+        extremes, found = self.model.peak_to_peak_derivatives(self.errors(x), self.torque)
+        asked = [
+            self.model.columns.index(name) for name in (*self.columns, *self.model.reducer.modification.deviations)
+        ]
+        return extremes, replace(found, by_error=found.by_error[:, asked])
 
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m]."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import exp, inf
 from typing import Any
 
@@ -114,15 +113,16 @@ class OutputsWithStiffness:
         """The outputs without the peak-to-peak, which no difference is taken of."""
         return tuple(name for name in self.outputs if name != PEAK_TO_PEAK)
 
-    @cached_property
-    def _raised(self) -> dict[int, Response]:
-        """Position of every stiffness that is not known → the others with it raised; tables are made once for each."""
-        raised = ((at, step * np.eye(len(self.steps))[at]) for at, step in enumerate(self.steps) if step > 0.0)
-        # These solves belong to a unit that is counted already.
-        return {
-            at: self.reading(replace(self.peak.changed(change), observe=unobserved), self._others)
-            for at, change in raised
-        }
+    def _raised(self) -> Iterator[tuple[int, Response]]:
+        """Yield the position of every stiffness that is not known, and the others with it raised.
+
+        One at a time, as the tables of each take tens of megabytes and are made in less time than a chunk is solved in.
+        """
+        for at, step in enumerate(self.steps):
+            if step > 0.0:
+                kernel = self.peak.changed(step * np.eye(len(self.steps))[at])
+                # These solves belong to a unit that is counted already.
+                yield at, self.reading(replace(kernel, observe=unobserved), self._others)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
@@ -139,7 +139,7 @@ class OutputsWithStiffness:
         sample, change = np.ascontiguousarray(x[:, :own]), x[:, own:]
         base = self.reading(kernel, self._others)(sample)
         values, status = base.values.copy(), base.status.copy()
-        for at, response in self._raised.items():
+        for at, response in self._raised():
             found = response(sample)
             values += (found.values - base.values) * (change[:, [at]] / self.steps[at])
             status = np.maximum(status, found.status)
