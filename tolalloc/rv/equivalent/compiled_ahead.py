@@ -12,11 +12,10 @@ import numpy as np
 
 from tolalloc.compiled import compile_elsewhere, is_kept
 from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.design import Clearances
+from tolalloc.rv.equivalent.solvers.records import CONVERGED, AngleSearch, SolvedExtremes, SolvedTurn
 from tolalloc.rv.reducer.files import load_reducer
 
-_FILES = ("extremes", "interpolation", "refinement", "searches")
+_FILES = ("extremes", "interpolation", "lending", "refinement", "searches")
 
 
 def compile_ahead(discs: int) -> None:
@@ -27,9 +26,23 @@ def compile_ahead(discs: int) -> None:
 
 
 def _search(discs: int) -> None:
-    play = Clearances(gear_mesh=1e-9)  # with it no sample goes in lanes, which the first process compiles
-    model = EquivalentModel(replace(load_reducer("rv20e"), disc_count=discs, clearances=play), AngleSearch(coarse=8))
-    model.extremes(np.zeros((1, len(model.columns))), -1.0)
+    """Search a turn that nobody has solved: solving it is what the first process compiles."""
+    from tolalloc.rv.equivalent.solvers.extremes import refine
+
+    model = EquivalentModel(replace(load_reducer("rv20e"), disc_count=discs), AngleSearch(coarse=8))
+    columns, angles = model.error_columns, model.search.coarse + 2
+    turn = SolvedTurn(
+        np.zeros((1, angles)),
+        np.zeros((1, angles, 3 * discs)),
+        np.full((1, angles), CONVERGED, np.uint8),
+        np.zeros((1, angles)),
+        np.zeros((1, angles), np.uint16),
+    )
+    extreme, position, left_over, residual = np.zeros((1, 2)), np.zeros((1, 2)), np.zeros(1), np.zeros(1)
+    found = SolvedExtremes(extreme, position, left_over, np.zeros(1, np.int64), np.zeros(1, np.uint8), residual)
+    tables, errors = model.tables_at(model.search.node_angle), np.zeros((1, len(model.columns)))
+    given = (columns.layout, columns.map, model.design, errors, -1.0, model.search)
+    refine((0,) * discs, tables, *given, turn, found)
 
 
 if __name__ == "__main__":

@@ -14,31 +14,24 @@ from tolalloc.compiled import in_threads, jit
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.lending import make_lent
 from tolalloc.rv.equivalent.solvers.problem import values_of
-from tolalloc.rv.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes
+from tolalloc.rv.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
 from tolalloc.rv.equivalent.solvers.refinement import search_peaks
-from tolalloc.rv.equivalent.solvers.searches import gain, make_peaks, make_searches
+from tolalloc.rv.equivalent.solvers.searches import Peaks, gain, make_peaks, make_searches
 from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_tile, tile_size
 
 
-@jit
-def _highest(turn, sides, found):
+def _highest(turn: SolvedTurn, found: SolvedExtremes) -> Peaks:
     """Return the highest peak of every side of every sample."""
-    sample, side, coarse = np.empty(sides, np.int64), np.empty(sides, np.int64), np.empty(sides, np.int64)
-    count = 0
-    for s in range(found.status.size):
-        if found.status[s] != NOT_FINITE:
-            inside = turn.rotation[s, 1:-1]
-            for one, at in ((0, inside.argmax()), (1, inside.argmin())):
-                sample[count], side[count], coarse[count] = s, one, at
-                count += 1
-    return make_peaks(sample[:count], side[:count], coarse[:count])
+    sample = np.flatnonzero(found.status != NOT_FINITE)
+    inside = turn.rotation[sample, 1:-1]
+    coarse = np.concatenate([inside.argmax(axis=1), inside.argmin(axis=1)])
+    return make_peaks(np.stack([np.tile(sample, 2), np.repeat([0, 1], sample.size), coarse]))
 
 
 @jit
 def _others(turn, search, best, highest, found):
-    """Return the other peaks that may reach what was found at the highest ones."""
-    room = turn.rotation.size
-    sample, side, coarse = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
+    """Return sample, side and coarse angle of the other peaks that may reach what was found at the highest ones."""
+    others = np.empty((3, turn.rotation.size), np.int64)
     count, known = 0, np.full((found.status.size, 2), -1)
     for p in range(highest.coarse.size):
         known[highest.sample[p], highest.side[p]] = highest.coarse[p]
@@ -55,9 +48,9 @@ def _others(turn, search, best, highest, found):
                 )
                 peak = centre >= left and centre >= right and i != known[s, one]
                 if peak and centre + search.safety * gain(left, centre, right) > best[s, one]:
-                    sample[count], side[count], coarse[count] = s, one, i
+                    others[0, count], others[1, count], others[2, count] = s, one, i
                     count += 1
-    return make_peaks(sample[:count], side[:count], coarse[:count])
+    return others[:, :count]
 
 
 @jit
@@ -83,7 +76,7 @@ def _prepare(layout, mapped, errors, torque, elements, turn, values, found):
     return alone
 
 
-def _refine(
+def refine(
     discs: Any,
     tables: Any,
     layout: Any,
@@ -105,10 +98,10 @@ def _refine(
     own, lent = make_searches(turn.retained.shape[2]), make_lent(layout, 3 * len(discs), contacts)
     memory = make_memory(design.law, tables)
     given = (discs, alone, tables, layout, design, values, search, turn, best)
-    highest = _highest(turn, 2 * errors.shape[0], found)
+    highest = _highest(turn, found)
     search_peaks(*given, highest, own, memory, lent, found)
     _keep_best(highest, best, left_over, found)
-    others = _others(turn, search, best, highest, found)
+    others = make_peaks(_others(turn, search, best, highest, found))
     search_peaks(*given, others, own, memory, lent, found)
     _keep_best(others, best, left_over, found)
     found.left_over[:] = left_over.sum(axis=1)
@@ -123,6 +116,6 @@ def solve_extremes(
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
         solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)
-        _refine(discs, *given, search, turn, SolvedExtremes(*(values[part] for values in found)))
+        refine(discs, *given, search, turn, SolvedExtremes(*(values[part] for values in found)))
 
     in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.compiled import jit, jit_in_place
+from tolalloc.compiled import jit_in_place
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, MARGIN
 
@@ -45,8 +45,7 @@ class Searches(NamedTuple):
     new_q: Float[np.ndarray, "lane 2 retained"]
 
 
-@jit
-def make_searches(retained):
+def make_searches(retained: int) -> Searches:
     """Return lanes without a search."""
     return Searches(
         np.full(WIDTH, -1),
@@ -62,10 +61,10 @@ def make_searches(retained):
     )
 
 
-@jit
-def make_peaks(sample, side, coarse):
+def make_peaks(found: Int[np.ndarray, "3 peak"]) -> Peaks:
     """Return peaks in the order of their angles, so that searches side by side read the same tables."""
-    order = np.argsort(coarse, kind="mergesort")
+    sample, side, coarse = found
+    order = np.argsort(coarse, kind="stable")
     return Peaks(
         sample[order],
         side[order],
