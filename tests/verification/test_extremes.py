@@ -44,6 +44,16 @@ def test_interpolated_tables_agree_with_exact_ones(rv20e, table4, generator):
     assert max(deviation) < 0.05
 
 
+def test_searches_that_leave_pins_out_end_where_those_with_all_do(rv20e, table4, generator):
+    """A disc that is tilted by nothing to speak of sends its unit to the solver for one sample, which takes all pins."""
+    units = random_units(table4, rv20e.columns, generator, 24)
+    tilted = units.copy()
+    tilted[:, rv20e.columns.index("disc1.tilt.x")] = 1e-15
+    found, expected = rv20e.extremes(units, -1.0), rv20e.extremes(tilted, -1.0)
+    np.testing.assert_allclose(found.peak_to_peak, expected.peak_to_peak, rtol=0, atol=1e-7 * ARCSECOND)
+    np.testing.assert_allclose(found.carrier_angle, expected.carrier_angle, rtol=0, atol=1e-12)
+
+
 def test_remaining_error_is_stated(rv20e, table4):
     result = rv20e.extremes(table4, -1.0)
     assert 0 <= result.remaining[0] < 0.05 * ARCSECOND

@@ -20,7 +20,7 @@ from tolalloc.rv.equivalent.solvers.problem import fill_loads
 from tolalloc.rv.equivalent.solvers.tile import Tile, make_tile
 
 _SLOTS = 8  # nodes whose loads a lane keeps: a search stays within five
-_MARGIN = 2.0
+_MARGIN = 4.0
 """Times the distance between the two equilibria that the guess lies between."""
 _LEAST_MARGIN = 1e-9  # metres
 _NOWHERE = -1.0
