@@ -72,8 +72,8 @@ def _balance(discs, stiffness, v, tile):
 
 
 @jit_in_place
-def _first_touch(discs, tables, v, tile):
-    """Return how many steps away the next pin touches, and one bit per lane that meets one.
+def _first_touch(discs, tables, v, tile, lanes):
+    """Return how many steps away the next pin touches in some lanes, and one bit per lane that meets one.
 
     Quotients are compared by products, because a division takes as long as sixteen.
     """
@@ -87,7 +87,9 @@ def _first_touch(discs, tables, v, tile):
             a, b = normal(tables, d, pins, c)
             depth = fma(b, y, fma(a, x, load(tile.undisturbed, v * contacts + c * WIDTH)))
             rate = fma(b, across, multiply(a, along))
-            meets = above(rate, zero) & (ALL ^ above(depth, zero))
+            meets = above(rate, zero) & (lanes & ~above(depth, zero))
+            if not meets:
+                continue
             # −depth/rate < gap/speed
             sooner = meets & above(multiply(gap, rate), multiply(subtract(zero, depth), speed))
             gap, speed = choose(sooner, subtract(zero, depth), gap), choose(sooner, rate, speed)
@@ -122,7 +124,7 @@ def settle(law, discs, tables, v, tile, done, steps):
         singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:
-            reach, met = _first_touch(discs, tables, v, tile)
+            reach, met = _first_touch(discs, tables, v, tile, singular)
             careful |= singular & (ALL ^ met)
             length = choose(singular, multiply(spread(_BEYOND), reach), length)
         moving = ALL ^ (done | careful)

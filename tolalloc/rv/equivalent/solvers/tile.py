@@ -11,7 +11,7 @@ from tolalloc.compiled import jit, jit_in_place, jit_within
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH, aligned, fma, load, spread, store
 from tolalloc.rv.equivalent.solvers.pressing import Pressing, make_pressing
 
-TILE = 128
+TILE = 256
 """Largest number of samples that share one look at an angle's tables."""
 
 FOUR = 4 * WIDTH
