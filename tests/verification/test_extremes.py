@@ -45,7 +45,7 @@ def test_interpolated_tables_agree_with_exact_ones(rv20e, table4, generator):
 
 
 def test_searches_that_leave_pins_out_end_where_those_with_all_do(rv20e, table4, generator):
-    """A disc that is tilted by nothing to speak of sends its unit to the solver for one sample, which takes all pins."""
+    """A disc that is hardly tilted sends its unit to the solver for one sample, which takes all pins."""
     units = random_units(table4, rv20e.columns, generator, 24)
     tilted = units.copy()
     tilted[:, rv20e.columns.index("disc1.tilt.x")] = 1e-15
