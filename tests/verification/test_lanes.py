@@ -13,7 +13,7 @@ from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
 from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, spread, store
-from tolalloc.rv.equivalent.solvers.pressing import DEEPEST, _line_contact
+from tolalloc.rv.equivalent.solvers.line_contact import DEEPEST, line_contact
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.tile import ROW, TILE, make_tile, nonzero_rows, nonzero_waves
 from tolalloc.rv.reducer.files import load_reducer
@@ -29,7 +29,7 @@ def logarithms(numbers, found):
 @jit
 def line_contacts(stiffness, log_length, depth, force, slope, far):
     for at in range(0, depth.size, WIDTH):
-        own_force, own_slope, own_far = _line_contact(spread(stiffness), spread(log_length), load(depth, at))
+        own_force, own_slope, own_far = line_contact(spread(stiffness), spread(log_length), load(depth, at))
         store(force, at, own_force)
         store(slope, at, own_slope)
         far[at // WIDTH] = own_far
