@@ -31,9 +31,9 @@ from tolalloc.rv.response.outputs import (
     WITH_FRICTION,
     OutputsResponse,
     limited_outputs,
-    orders_reading,
     readings_of,
     wave_outputs,
+    with_orders,
 )
 from tolalloc.rv.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
 from tolalloc.rv.rigidity import against_catalogue, rated_pin_force
@@ -108,7 +108,7 @@ class ReducerModel(Model):
             if name not in self.outputs and name not in waves:
                 raise UnknownNameError.among(self.name, "output", name, self.outputs)
         orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
-        readings = (*readings_of(outputs), *((orders_reading(orders),) if orders else ()))
+        readings = with_orders(readings_of(outputs), orders) if orders else readings_of(outputs)
         response = OutputsResponse(kernel=self.kernel, readings=readings)
         return response if response.outputs == outputs else replace(response, chosen=outputs)
 

@@ -39,7 +39,8 @@ def _search(discs: int) -> None:
         np.zeros((1, angles), np.uint16),
     )
     extreme, position, left_over, residual = np.zeros((1, 2)), np.zeros((1, 2)), np.zeros(1), np.zeros(1)
-    found = SolvedExtremes(extreme, position, left_over, np.zeros(1, np.int64), np.zeros(1, np.uint8), residual)
+    solves, status, curve = np.zeros(1, np.int64), np.zeros(1, np.uint8), np.zeros((1, 0))
+    found = SolvedExtremes(extreme, position, left_over, solves, status, residual, curve)
     tables, errors = model.tables_at(model.search.node_angle), np.zeros((1, len(model.columns)))
     given = (columns.layout, columns.map, model.design, errors, -1.0, model.search)
     refine((0,) * discs, tables, *given, turn, found)

@@ -148,6 +148,19 @@ class EquivalentModel:
 
     def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
         """Return the refined extremes of every sample over one output turn."""
+        return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
+
+    def extremes_and_curve(
+        self, errors: Float[np.ndarray, "sample column"], torque: float
+    ) -> tuple[Extremes, Float[np.ndarray, "sample angle"]]:
+        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad]."""
+        curve = np.empty((errors.shape[0], self.search.coarse))
+        return self._searched(errors, torque, curve), curve
+
+    def _searched(
+        self, errors: Float[np.ndarray, "sample column"], torque: float, curve: Float[np.ndarray, "sample angle"]
+    ) -> Extremes:
+        """Return the extremes, the curve filled as far as there is room."""
         from tolalloc.rv.equivalent.solvers.extremes import solve_extremes
 
         samples, search = errors.shape[0], self.search
@@ -158,6 +171,7 @@ class EquivalentModel:
             np.empty(samples, np.int64),
             np.empty(samples, np.uint8),
             np.empty(samples),
+            curve,
         )
         given = self._given(errors, torque)
         solve_extremes(self._discs, self._tables, *given, search, found)

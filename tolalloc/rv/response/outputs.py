@@ -107,13 +107,14 @@ def _radial_clearance(
 
 _FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
 
+_PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
 WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
 """Outputs of the loop with friction."""
 _FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
 REQUIREMENTS = (
-    Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak),
+    _PEAK_TO_PEAK,
     _LOOP,
     Reading(
         outputs=(
@@ -147,16 +148,37 @@ def wave_outputs(order: int) -> tuple[str, str]:
     return (f"order {order} cosine [arcsec]", f"order {order} sine [arcsec]")
 
 
+def _waves(
+    orders: tuple[int, ...], transmission_error: Float[np.ndarray, "chunk angle"]
+) -> Float[np.ndarray, "chunk output"]:
+    """Return cosine and sine of every order [arcsec]."""
+    # An unconverged angle is NaN and would spread over all waves; the status keeps the sample out.
+    wave = waves(np.nan_to_num(transmission_error))[:, np.array(orders) - 1] / ARCSECOND
+    return np.stack([wave.real, -wave.imag], axis=2).reshape(wave.shape[0], -1)
+
+
 def orders_reading(orders: tuple[int, ...]) -> Reading:
     """Return the reading of the waves of the transmission error, cosine and sine of every order."""
 
     def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
         found = model.equilibria(errors, torque)
-        # An unconverged angle is NaN and would spread over all waves; the status keeps the sample out.
-        wave = waves(np.nan_to_num(found.transmission_error))[:, np.array(orders) - 1] / ARCSECOND
-        return np.stack([wave.real, -wave.imag], axis=2).reshape(errors.shape[0], -1), found.status.max(axis=1)
+        return _waves(orders, found.transmission_error), found.status.max(axis=1)
 
     return Reading(outputs=tuple(name for order in orders for name in wave_outputs(order)), read=read)
+
+
+def with_orders(readings: tuple[Reading, ...], orders: tuple[int, ...]) -> tuple[Reading, ...]:
+    """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on."""
+
+    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+        found, curve = model.extremes_and_curve(errors, torque)
+        return np.hstack([found.peak_to_peak[:, np.newaxis] / ARCSECOND, _waves(orders, curve)]), found.status
+
+    apart = orders_reading(orders)
+    if _PEAK_TO_PEAK not in readings:
+        return (*readings, apart)
+    others = tuple(own for own in readings if own is not _PEAK_TO_PEAK)
+    return (Reading(outputs=(PEAK_TO_PEAK, *apart.outputs), read=read), *others)
 
 
 @dataclass(frozen=True, kw_only=True)

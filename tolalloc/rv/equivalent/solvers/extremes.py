@@ -116,6 +116,8 @@ def solve_extremes(
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
         solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)
-        refine(discs, *given, search, turn, SolvedExtremes(*(values[part] for values in found)))
+        own = SolvedExtremes(*(values[part] for values in found))
+        own.curve[:] = turn.rotation[:, 1 : 1 + own.curve.shape[1]]
+        refine(discs, *given, search, turn, own)
 
     in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))

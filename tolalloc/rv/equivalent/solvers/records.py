@@ -80,6 +80,9 @@ class SolvedExtremes(NamedTuple):
     # Worst outcome, and largest residual over the largest force [-]
     status: UInt8[np.ndarray, " sample"]
     residual: Float[np.ndarray, " sample"]
+    curve: Float[
+        np.ndarray, "sample angle"
+    ]  # Carrier rotation at the first coarse angles, as many as there is room for [rad]
 
 
 class SolvedDerivatives(NamedTuple):
