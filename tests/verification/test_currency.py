@@ -16,6 +16,8 @@ from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError
 from tolalloc.report.answer import Header
+from tolalloc.report.currency import in_currency
+from tolalloc.report.feature_frame import FeatureFrame, Frames
 from tolalloc.study.comparison import ComparisonAnswer
 from tolalloc.study.finished_run import read_run
 from tolalloc.study.prepared import Prepared
@@ -127,3 +129,10 @@ def test_prices_of_a_shop_are_fitted_in_their_currency(tmp_path):
     assert said.exit_code == 0
     assert "[CHF]" in said.output.replace("\n", "")
     assert "cost units" not in said.output
+
+
+def test_a_frame_stays_a_frame_in_a_currency():
+    frames = Frames([FeatureFrame("position", "⌀0.0047", ("A",))])
+    found = in_currency(pd.DataFrame({"cost [cost units]": [1.0], "write [mm]": [frames]}), "EUR")
+    assert list(found.columns) == ["cost [EUR]", "write [mm]"]
+    assert str(found["write [mm]"][0]) == "⌖ ⌀0.0047 A"

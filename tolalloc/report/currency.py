@@ -30,7 +30,7 @@ def _said(said: Any, currency: str) -> Any:
 
     if isinstance(said, str):
         return said.replace(COST_UNITS, currency)
-    if isinstance(said, tuple):
+    if type(said) is tuple:  # a record of its own keeps its kind
         return tuple(_said(one, currency) for one in said)
     if isinstance(said, pd.DataFrame):
         return said.rename(columns=lambda header: _said(header, currency)).map(lambda cell: _said(cell, currency))
