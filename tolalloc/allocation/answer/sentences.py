@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
+_WRITTEN = 0.005
+"""Difference of two amounts below which they are written alike, in their units."""
 _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
@@ -40,6 +42,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     found.append(_cost(answer))
     return (
         *found,
+        *other_amounts(answer),
         *_solved(chosen),
         _compared(answer),
         *_certificate(answer),
@@ -48,6 +51,24 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         *_good_unit(answer),
         *_settled(answer),
         *answer.model.remarks,
+    )
+
+
+def other_amounts(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return what must be made with the zones: amounts of the settings, where they are not those of today."""
+    drawn = answer.model.drawn_amounts
+    if not answer.space.settings:
+        return ()
+    today, chosen = (drawn.by_setting @ design.settings for design in (answer.free.baseline, answer.chosen))
+    if np.allclose(today, chosen, rtol=1e-6, atol=_WRITTEN):
+        return ()
+    amounts = (
+        f"{short(name)} {with_unit(f'{new:.2f}', name)} instead of {was:.2f}"
+        for name, was, new in zip(drawn.names, today, chosen, strict=True)
+    )
+    return (
+        f"These zones hold only with another {answer.model.settings_word}: {' and '.join(amounts)}. It belongs on the "
+        "drawing with them.",
     )
 
 
