@@ -14,7 +14,7 @@ from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models import Model, Observer, Response, SettingDerivatives, Units
+from tolalloc.models import Examination, Model, Observer, Response, SettingDerivatives, Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD, TORQUE
@@ -384,7 +384,7 @@ class ReducerModel(Model):
         sentence, _ = against_catalogue(self.reducer, self._exact_loop)
         return (sentence,) if sentence else ()
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:
         """Return nominal clearances, how many random units are jammed, and what is said of the catalogue."""
         from tolalloc.rv.examination import examined
 
