@@ -97,19 +97,39 @@ def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> li
     Raises
     ------
     InputError
-        A source that lists only some of its pins or teeth.
+        Sources that list more or fewer pins or teeth than there are.
     """
-    absent = []
+    own = {source.name: list[str]() for source in errors.sources}
+    for column in model.columns:
+        own.get(source_name(column), []).append(column)
+    _require_each(errors, own, model.reducer, place)
+    return [
+        column for source in errors.sources for column in own[source.name] if column not in frozenset(source.columns)
+    ]
+
+
+def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer: Reducer, place: str) -> None:
+    """Raise unless every source has as many like features as its columns say, one line for all that have not.
+
+    Raises
+    ------
+    InputError
+        The sources of single pins and teeth, and how many there are.
+    """
+    wrong: dict[int, list[str]] = {}
     for source in errors.sources:
-        own = [column for column in model.columns if source_name(column) == source.name]
-        missing = [column for column in own if column not in source.columns]
-        if missing and not source.spectrum:
-            features = len({column.removesuffix(".x").removesuffix(".y") for column in own})
-            raise InputError.at(
-                f"{place}, tolerance table, {source.name}", "each", source.each, f"{features}, one per feature"
-            )
-        absent += missing
-    return absent
+        plain = {column.removesuffix(".x").removesuffix(".y") for column in own[source.name]}
+        numbered = [column for column in plain if column.removeprefix(f"{source.name}.").isdecimal()]
+        if own[source.name] and source.each != (len(numbered) or 1):
+            wrong.setdefault(source.each, []).append(source.name)
+    if not wrong:
+        return
+    stage, table = reducer.cycloid_stage, f"tolerance table {errors.table}".strip()
+    stated = " and ".join(f"{each} in {', '.join(names)}" for each, names in wrong.items())
+    raise InputError(
+        f"{place}, {table}: each is {stated}; allowed is pin_count of the reducer, {stage.pin_count}, in all rows of "
+        f"single pins, its disc_teeth, {stage.disc_teeth}, in all rows of single teeth, and 1 in all others."
+    )
 
 
 _FARTHEST = 50.0
