@@ -162,3 +162,15 @@ def test_another_fault_of_a_row_is_not_said_to_be_one_of_its_count():
         bound({"pin.diameter": {"feature": Feature.POSITION}})
     with pytest.raises(UnknownNameError, match=r"disc1\.pitch"):
         bound({"disc1.pitch": {"feature": Feature.SIZE, "spectrum": ()}})
+
+
+def test_a_check_remarks_a_nominal_size_that_is_not_the_reducers():
+    other = bound({"pin.diameter": {"nominal": 8e-3}, "housing.groove.radius": {"nominal": 2.019e-3}})
+    (said,) = other.mismatches
+    assert said.startswith(
+        "The table and the reducer differ: nominal of pin.diameter is 8 mm in zones.csv, and twice its pin radius is "
+        "4 mm in reducer "
+    )
+    assert other.examined(np.zeros((1, len(other.columns)))).sentences[0] == said
+    assert bound({"housing.groove.radius": {"nominal": 2.05e-3}}).mismatches[0].count("groove.radius is 2.05 mm") == 1
+    assert bound({"pin.diameter": {"nominal": 0.0}}).mismatches == ()

@@ -25,7 +25,7 @@ from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.settings import clearance_settings
 from tolalloc.settings import require_settings
-from tolalloc.units import MICROMETRE
+from tolalloc.units import MICROMETRE, MILLIMETRE
 
 if TYPE_CHECKING:
     from tolalloc.rv.model import ReducerModel
@@ -132,6 +132,26 @@ def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer:
     )
 
 
+_LARGEST_MISMATCH = 0.01
+"""Largest share by which a nominal size of a table may differ from that of the reducer without a remark [-]."""
+
+
+def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
+    """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
+    radius = reducer.cycloid_stage.pin_radius
+    meant = {"pin.diameter": ("twice its pin radius", 2 * radius), "housing.groove.radius": ("its pin radius", radius)}
+    sentences = []
+    for source in errors.sources:
+        what, size = meant.get(source.name, ("", 0.0))
+        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * size:
+            sentences.append(
+                f"The table and the reducer differ: nominal of {source.name} is {source.nominal / MILLIMETRE:g} mm in "
+                f"{errors.table or 'the table'}, and {what} is {size / MILLIMETRE:g} mm in reducer {reducer.name}; the "
+                "model takes the reducer's, so correct the one that is wrong."
+            )
+    return tuple(sentences)
+
+
 _FARTHEST = 50.0
 """Largest clearance that a modification may be asked to leave, either way [µm]."""
 
@@ -202,6 +222,7 @@ class ReducerChoice:
             identified=self.identified,
             unit=self.unit,
             left_out=assumptions,
+            mismatches=_other_sizes(errors, self.reducer),
         )
 
 

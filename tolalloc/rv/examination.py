@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def examined(model: ReducerModel, x: Float[np.ndarray, "sample column"]) -> Examination:
-    """Return nominal clearances, how many random units are jammed, and what is said of the catalogue.
+    """Return sizes that differ, clearances, how many random units are jammed, and what is said of the catalogue.
 
     Parameters
     ----------
@@ -32,10 +32,13 @@ def examined(model: ReducerModel, x: Float[np.ndarray, "sample column"]) -> Exam
     solved = found.status == 0
     if not solved.any():
         none = f"None of {len(x)} random units has an equilibrium without torque."
-        return Examination((none, *model.remarks), f"none of its units has an equilibrium: {_advice(model)}")
+        return Examination(
+            (*model.mismatches, none, *model.remarks), f"none of its units has an equilibrium: {_advice(model)}"
+        )
     jammed, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
     unsolved = "" if solved.all() else f" ({(~solved).sum()} have no equilibrium)"
     sentences = (
+        *model.mismatches,
         f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
         f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
         f"Of {len(x)} random units {jammed.mean():.1%} are jammed{unsolved}: without torque their pins press with "

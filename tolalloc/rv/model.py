@@ -62,6 +62,7 @@ class ReducerModel(Model):
     clearances: tuple[float, float] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
     left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
+    mismatches: tuple[str, ...] = ()  # Where sizes of the drawing are not those of the reducer, in sentences
 
     @property
     def reducer(self) -> Reducer:
