@@ -55,6 +55,14 @@ class Evaluation:
         return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
 
 
+@dataclass(frozen=True)
+class Examination:
+    """What a check of a study says of a model and of some random units."""
+
+    sentences: tuple[str, ...] = ()
+    but: str = ""  # What speaks against the study though it is in order, as the end of a sentence; empty if nothing
+
+
 @runtime_checkable
 class Response(Protocol):
     """Anything that maps named columns to named outputs, sample by sample."""
@@ -313,9 +321,9 @@ class Model(ABC):
         """What every report says of the model itself beside what is asked, in sentences."""
         return ()
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:  # noqa: ARG002
-        """Return what a check of a study says of the model and of some random units, in sentences."""
-        return ()
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
+        """Return what a check of a study says of the model and of some random units."""
+        return Examination()
 
     def put_away(self) -> None:  # noqa: B027
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""

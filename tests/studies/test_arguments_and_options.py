@@ -27,6 +27,24 @@ def test_a_command_says_its_option_where_the_package_says_an_argument(words, sai
     refused(tolalloc(*words), said)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["rank", "x.py", "--seed", "x"], "Error: tolalloc rank: --seed is 'x'; allowed is a whole number."),
+        (
+            ["assemble", "rv20e", "--seed", "1.5"],
+            "Error: tolalloc assemble: --seed is '1.5'; allowed is a whole number.",
+        ),
+        (["whatif", "x.py", "a=1", "--units", "many"], "--units is 'many'; allowed is a whole number."),
+        (["allocate", "x.py", "--limit", "60 arcsec"], "--limit is '60 arcsec'; allowed is a number."),
+    ],
+)
+def test_an_option_that_is_no_number_is_refused_in_one_sentence(words, said):
+    result = tolalloc(*words)
+    refused(result, said)
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
 def test_the_package_says_its_argument():
     with pytest.raises(InputError, match=r"^diagnosis: noise_arcsec is 70; allowed is above 0 up to 60\.$") as error:
         DiagnosisRequest(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import tolalloc as ta
 from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.exceptions import InputError
+from tolalloc.rv.choice import ReducerChoice
 from tolalloc.rv.equivalent.preload import preload
 from tolalloc.rv.rigidity import rated_pin_force
 from tolalloc.study.prepared import Prepared
@@ -67,3 +69,28 @@ def test_a_check_for_a_program_says_the_same(tmp_path):
     said = json.loads(tolalloc("check", script, "--json").stdout)
     assert list(said["limits"]) == [ta.PEAK_TO_PEAK, ta.PRELOAD]
     assert any("are jammed" in sentence for sentence in said["examined"])
+    assert "are jammed: a tooth modification that leaves more than the present 1.04 µm" in said["but"]
+
+
+def test_the_last_sentence_of_a_check_says_that_units_are_jammed_and_what_frees_them(tmp_path):
+    *_, said, last = tolalloc("check", study_script(tmp_path, reducer={"name": "rv20e"})).stdout.splitlines()
+    assert said.startswith("A study is a Python program")
+    assert re.search(r"is in order, but \d+\.\d% of its units are jammed: a tooth modification that leaves more", last)
+    assert "`tolalloc modify` proposes one, and flank_clearance" in last
+
+
+def test_jammed_units_matter_in_no_verdict_where_the_model_has_no_limit_for_them_or_few_are_jammed():
+    def verdict(reducer: ReducerChoice, scale: float) -> str:
+        asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_baseline"), limits=LIMITS))
+        errors, uniform = asked.errors, np.random.default_rng(5).uniform(size=(200, len(asked.errors.columns)))
+        return asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones)).but
+
+    assert "jammed" in verdict(ta.reducer("rv20e"), 1.0)
+    assert verdict(ta.reducer("rv20e"), 1e-3) == ""
+    assert verdict(ta.reducer("rv20e_liu2020"), 1.0) == ""
+    opened = verdict(ta.reducer("rv20e", flank_clearance=(1.0, 12.0)), 1.0)
+    assert opened.endswith("lets the allocation open it, at present from 1 to 12 µm")
+
+
+def test_a_model_of_a_user_is_in_order_without_a_but():
+    assert tolalloc("check", "studies/choi2000_clutch.py").stdout.splitlines()[-1].endswith(" is in order.")

@@ -13,6 +13,7 @@ import tolalloc as ta
 from tests.studies.command import tolalloc
 from tolalloc.capability.paired import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.study.prepared import Prepared
 
@@ -75,6 +76,19 @@ def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
     assert little.high < 0.0
 
 
+def test_a_neglected_source_is_refused_as_such():
+    rows = [{"id": "housing", **ZONE}, {"id": "shaft", **ZONE, "plus": 0, "minus": 0, "locked": True}]
+    neglected = replace(fit(), drawing=ta.Drawing.of_rows(rows))
+    sentence = (
+        "^difference: source 'shaft' is neglected, because its zone is 0 in the tolerance table; give it a zone "
+        r"above 0 there\.$"
+    )
+    with pytest.raises(InputError, match=sentence):
+        neglected.ask(ta.Difference(zones={"shaft": 5.0}))
+    with pytest.raises(UnknownNameError, match="source 'shafts' is not known; the nearest known is housing"):
+        neglected.ask(ta.Difference(zones={"shafts": 5.0}))
+
+
 def test_units_are_in_memory_some_at_a_time_and_the_same_ones(monkeypatch):
     whole = fit().ask(ta.Difference(zones={"housing": 20.0}, units=5000))
     monkeypatch.setattr("tolalloc.allocation.difference._CHUNKS_AT_ONCE", 2)
@@ -112,7 +126,7 @@ def test_a_process_prices_the_zone_that_it_holds():
     study = fit(costs=costs)
     ground = study.ask(ta.Difference(zones={"housing": 10.0}))  # ± 0.005 mm
     assert ground.after[0].cost == pytest.approx(3.0 + 0.02 / 0.005)
-    with pytest.raises(ta.InputError, match=r"housing is '1 µm'; allowed is 5 to 100 µm, what its processes hold"):
+    with pytest.raises(InputError, match=r"housing is '1 µm'; allowed is 5 to 100 µm, what its processes hold"):
         study.ask(ta.Difference(zones={"housing": 1.0}))
 
 

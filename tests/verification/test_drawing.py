@@ -91,6 +91,12 @@ def test_a_notebook_shows_the_table():
         ({"unit": None}, InputError, r"drawing, row 1 \(hub\): unit is missing"),
         ({"plus": "wide"}, InputError, r"row 1 \(hub\): plus is 'wide'; allowed is a number"),
         ({"plus": 3.0}, InputError, "the zone plus − minus is 3100 µm and must be 0 to 2000 µm"),
+        (
+            {"plus": 0.0, "minus": 0.0},
+            InputError,
+            r"^drawing, row 1 \(hub\): the zone is 0 but the row is not locked; allowed is 0 with locked = yes, which "
+            "neglects the source, or a zone above 0 up to 2000 µm\\.$",
+        ),
         ({"feature": "weight"}, InputError, "feature is 'weight'; allowed is one of size"),
         ({"process": "grond"}, UnknownNameError, "process for feature size 'grond' is not known"),
         ({"id": "cage"}, InputError, r"row 2 \(cage\): id is 'cage' for the second time"),
@@ -100,6 +106,12 @@ def test_a_notebook_shows_the_table():
 def test_rows_in_python_are_checked_like_those_of_a_file(changes, error, sentence):
     with pytest.raises(error, match=sentence):
         Drawing.of_rows([{**HUB, **changes}, CAGE])
+
+
+@pytest.mark.parametrize("changes", [{"locked": True}, {"min": 0.0, "cost": 0.0}])
+def test_a_zone_of_0_is_neglected_where_the_row_is_locked_or_states_nothing_to_ask_for(changes):
+    drawing = Drawing.of_rows([{**HUB, "plus": 0.0, "minus": 0.0, **changes}, CAGE])
+    assert [own.name for own in drawing.errors.active] == ["cage"]
 
 
 def test_a_row_without_a_field_that_is_needed_is_refused_by_name():

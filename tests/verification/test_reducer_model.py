@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import tolalloc as ta
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.exceptions import UnknownNameError
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.rv import PEAK_TO_PEAK
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.model import ReducerModel
@@ -19,6 +22,7 @@ from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
 from tolalloc.rv.response.stiffness import StiffnessResponse
+from tolalloc.study.prepared import Prepared
 
 LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
 WAVE = "order 1 cosine [arcsec]"
@@ -129,3 +133,44 @@ def test_waves_and_stand_ins(model):
     names = [candidate.name for candidate in model.stand_ins()]
     assert names[:2] == ["contact at 468 angles", "contact at 936 angles"]
     assert len(names) == 3
+
+
+def bound(changed: dict[str, dict[str, object]]) -> ReducerModel:
+    """Return the RV-20E at a table of all its sources, some of them changed."""
+    drawing = ta.drawing("rv20e_all_sources")
+    changes = [replace(own, **changed[own.name]) for own in drawing.sources if own.name in changed]
+    return Prepared(
+        study=ta.Study(
+            ta.reducer("rv20e"), drawing.with_sources(changes, "zones.csv"), limits={PEAK_TO_PEAK: ta.Limit(upper=60)}
+        )
+    ).model
+
+
+def test_rows_of_single_pins_and_teeth_that_do_not_follow_the_reducer_are_refused_together():
+    wrong = {"each_pin.position": 52, "each_pin.groove": 52, "disc2.each_tooth.pitch": 38, "pin.diameter": 2}
+    sentence = (
+        "study study, tolerance table zones.csv: each is 2 in pin.diameter and 52 in each_pin.position, "
+        "each_pin.groove and 38 in disc2.each_tooth.pitch; allowed is pin_count of the reducer, 40, in all rows of "
+        "single pins, its disc_teeth, 39, in all rows of single teeth, and 1 in all others."
+    )
+    with pytest.raises(InputError, match=f"^{re.escape(sentence)}$"):
+        bound({name: {"each": each} for name, each in wrong.items()})
+
+
+def test_another_fault_of_a_row_is_not_said_to_be_one_of_its_count():
+    with pytest.raises(UnknownNameError, match=r"pin\.diameter\.x"):
+        bound({"pin.diameter": {"feature": Feature.POSITION}})
+    with pytest.raises(UnknownNameError, match=r"disc1\.pitch"):
+        bound({"disc1.pitch": {"feature": Feature.SIZE, "spectrum": ()}})
+
+
+def test_a_check_remarks_a_nominal_size_that_is_not_the_reducers():
+    other = bound({"pin.diameter": {"nominal": 8e-3}, "housing.groove.radius": {"nominal": 2.019e-3}})
+    (said,) = other.mismatches
+    assert said.startswith(
+        "The table and the reducer differ: nominal of pin.diameter is 8 mm in zones.csv, and twice its pin radius is "
+        "4 mm in reducer "
+    )
+    assert other.examined(np.zeros((1, len(other.columns)))).sentences[0] == said
+    assert bound({"housing.groove.radius": {"nominal": 2.05e-3}}).mismatches[0].count("groove.radius is 2.05 mm") == 1
+    assert bound({"pin.diameter": {"nominal": 0.0}}).mismatches == ()

@@ -205,7 +205,7 @@ def difference(
         A pattern that fits no source with a zone, a zone that is not above 0 or that no process holds.
     """
     errors = space.errors
-    wanted = named_zones(errors.active, zones)
+    wanted = named_zones(errors, zones)
     changed = repriced(space, wanted)
     outputs = tuple(dict.fromkeys(own.output for own in requirements))
     drawings = [np.array([source.zone for source in own]) for own in (errors.active, changed)]

@@ -8,27 +8,33 @@ import numpy as np
 
 from tolalloc.allocation.cost.model import Process
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.units import MICROMETRE
 
 
-def named_zones(sources: tuple[Source, ...], zones: Mapping[str, float]) -> dict[str, float]:
+def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, float]:
     """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
 
     Raises
     ------
     InputError, UnknownNameError
-        No zone, a pattern that fits no source, a zone that is not above 0.
+        No zone, a pattern that fits no source or only neglected ones, a zone that is not above 0.
     """
     found: dict[str, float] = {}
     if not zones:
         raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
     for pattern, zone in zones.items():
-        own = meant(pattern, sources)
+        own = meant(pattern, errors.active)
+        if not own and meant(pattern, errors.sources):
+            raise InputError(
+                f"difference: source {pattern!r} is neglected, because its zone is 0 in the tolerance table; give it a "
+                "zone above 0 there."
+            )
         if not own:
-            raise UnknownNameError.among("difference", "source", pattern, known_as(sources))
+            raise UnknownNameError.among("difference", "source", pattern, known_as(errors.active))
         if not (isinstance(zone, int | float) and 0 < zone < 1e6):
             raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
         found |= dict.fromkeys(own, zone * MICROMETRE)

@@ -33,23 +33,23 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
     study = load_study(script)
     if any(question.reads for question in study.questions):
         prepared = Prepared(study=study)
-        summary, lines = _checked(prepared, script)
+        summary, lines, verdict = _checked(prepared, script)
         if timed:
             found, said = _timed(prepared)
             summary, lines = {**summary, **found}, [*lines, *said]
     else:
         kinds = ", ".join(question.kind for question in study.questions)
         summary = {"study": study.name, "questions": kinds}
-        lines = [f"{script}: study {study.name} is in order; it asks: {kinds}."]
+        lines, verdict = [], f"Study {study.name} is in order; it asks: {kinds}."
     if as_json:
         print_json(summary)
     else:
-        lines.append(f"A study is a Python program: {script} was run to read it.")
+        lines += [f"A study is a Python program: {script} was run to read it.", verdict]
         typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
 
 
-def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return what a check found, for a program and in lines for a person."""
+def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
+    """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
     kinds = [question.kind for question in study.questions]
@@ -63,7 +63,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         "questions": kinds,
     }
     lines = [
-        f"{script}: study {study.name} is in order.",
+        f"{script}: study {study.name}.",
         f"{model.name}: {len(errors.active)} of {len(errors.sources)} sources vary, in {len(space.groups)} groups; "
         f"it asks: {', '.join(kinds)}.",
         *(f"  limit: {requirement.sentence}" for requirement in requirements),
@@ -82,7 +82,9 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     examined = model.examined(_random_units(prepared))
     lines += study.drawing.notes if study.drawing else ()
     summary |= {"neglected": [*neglected, *model.left_out]}
-    return {**summary, "examined": list(examined)}, [*lines, *examined]
+    summary |= {"examined": list(examined.sentences), "but": examined.but}
+    verdict = f"Study {study.name} is in order{f', but {examined.but}' if examined.but else ''}."
+    return summary, [*lines, *examined.sentences], verdict
 
 
 def _timed(prepared: Prepared) -> tuple[dict[str, Any], list[str]]:

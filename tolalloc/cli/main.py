@@ -23,7 +23,7 @@ from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new
 from tolalloc.cli.open import open_page
-from tolalloc.cli.options import saying_options
+from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.schema import schema
 from tolalloc.cli.series import series
@@ -33,6 +33,7 @@ from tolalloc.cli.whatif import whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 
 app = typer.Typer(
+    cls=SayingNumbers,
     help="Which drawing tolerance of an RV reducer drives its transmission error, and which tolerances are cheapest.",
     no_args_is_help=True,
     rich_markup_mode="markdown",  # rich's own markup would swallow [mm]

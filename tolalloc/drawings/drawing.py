@@ -96,7 +96,7 @@ class Drawing:
             correlations = load_correlations(correlations, sources) if correlations else Correlation()
         if currency and currency_in(currency) != currency:
             raise InputError.at(place, "currency", currency, "three letters such as EUR, or €, $, £ or ¥")
-        errors = ErrorModel(sources, correlation=correlations)
+        errors = ErrorModel(sources, correlation=correlations, table=place)
         return cls(name=place, errors=errors, costs=_placed(costs), currency=currency)
 
     def __repr__(self) -> str:
@@ -134,7 +134,7 @@ class Drawing:
         """Return the drawing with some of its sources changed, with the same correlations and process costs."""
         known = {source.name: source for source in self.sources}
         sources = tuple((known | {source.name: source for source in changed}).values())
-        errors = replace(self.errors, sources=sources)
+        errors = replace(self.errors, sources=sources, table=name or self.name)
         return replace(self, name=name or self.name, errors=errors)
 
     def to_frame(self) -> pd.DataFrame:
@@ -204,7 +204,7 @@ def load_drawing(
     notes, currency = _read_beside(found_from_here(beside(folder, table)), sheet)
     return Drawing(
         name=str(table),
-        errors=ErrorModel(sources, correlation=correlation),
+        errors=ErrorModel(sources, correlation=correlation, table=str(table)),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=notes,
         currency=currency,

@@ -30,6 +30,8 @@ class ErrorModel:
     joint: tuple[CorrelatedSource, ...] = ()
     # Correlations between the sources of the table; a joint source is independent of all others
     correlation: Correlation = field(default_factory=Correlation)
+    # Table that the sources come from, as its user named it, for messages alone; empty where there is none
+    table: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)

@@ -277,6 +277,11 @@ class ToleranceRow(Record):
         zone, factor = self.zone, UNITS[self.unit]
         if not 0 <= zone * factor <= LARGEST_ZONE:
             raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
+        if self.plus == self.minus and not self.locked and (self.min > 0 or self.cost > 0):
+            raise ValueError(
+                "the zone is 0 but the row is not locked; allowed is 0 with locked = yes, which neglects the source, "
+                f"or a zone above 0 up to {LARGEST_ZONE:g} µm"
+            )
         if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
             raise ValueError(f"minus and shift must be 0 for feature {self.feature.value}, whose zone is plus")
         if zone > 0 and not self.locked and not 0 < self.min <= zone <= self.max <= LARGEST_ZONE / factor:

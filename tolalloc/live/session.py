@@ -153,7 +153,7 @@ class Session:
 
     def examined(self, design: LiveDesign) -> list[str]:
         """Return what a check of the study says of the first random units, such as how many of them are jammed."""
-        return list(self.model(design).examined(self.deviations(design, slice(0, FIRST))))
+        return list(self.model(design).examined(self.deviations(design, slice(0, FIRST))).sentences)
 
     @property
     def described(self) -> dict[str, Any]:

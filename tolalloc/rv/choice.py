@@ -25,7 +25,7 @@ from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.rv.settings import clearance_settings
 from tolalloc.settings import require_settings
-from tolalloc.units import MICROMETRE
+from tolalloc.units import MICROMETRE, MILLIMETRE
 
 if TYPE_CHECKING:
     from tolalloc.rv.model import ReducerModel
@@ -97,19 +97,59 @@ def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> li
     Raises
     ------
     InputError
-        A source that lists only some of its pins or teeth.
+        Sources that list more or fewer pins or teeth than there are.
     """
-    absent = []
+    own = {source.name: list[str]() for source in errors.sources}
+    for column in model.columns:
+        own.get(source_name(column), []).append(column)
+    _require_each(errors, own, model.reducer, place)
+    return [
+        column for source in errors.sources for column in own[source.name] if column not in frozenset(source.columns)
+    ]
+
+
+def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer: Reducer, place: str) -> None:
+    """Raise unless every source has as many like features as its columns say, one line for all that have not.
+
+    Raises
+    ------
+    InputError
+        The sources of single pins and teeth, and how many there are.
+    """
+    wrong: dict[int, list[str]] = {}
     for source in errors.sources:
-        own = [column for column in model.columns if source_name(column) == source.name]
-        missing = [column for column in own if column not in source.columns]
-        if missing and not source.spectrum:
-            features = len({column.removesuffix(".x").removesuffix(".y") for column in own})
-            raise InputError.at(
-                f"{place}, tolerance table, {source.name}", "each", source.each, f"{features}, one per feature"
+        plain = {column.removesuffix(".x").removesuffix(".y") for column in own[source.name]}
+        numbered = [column for column in plain if column.removeprefix(f"{source.name}.").isdecimal()]
+        if own[source.name] and source.each != (len(numbered) or 1):
+            wrong.setdefault(source.each, []).append(source.name)
+    if not wrong:
+        return
+    stage, table = reducer.cycloid_stage, f"tolerance table {errors.table}".strip()
+    stated = " and ".join(f"{each} in {', '.join(names)}" for each, names in wrong.items())
+    raise InputError(
+        f"{place}, {table}: each is {stated}; allowed is pin_count of the reducer, {stage.pin_count}, in all rows of "
+        f"single pins, its disc_teeth, {stage.disc_teeth}, in all rows of single teeth, and 1 in all others."
+    )
+
+
+_LARGEST_MISMATCH = 0.01
+"""Largest share by which a nominal size of a table may differ from that of the reducer without a remark [-]."""
+
+
+def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
+    """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
+    radius = reducer.cycloid_stage.pin_radius
+    meant = {"pin.diameter": ("twice its pin radius", 2 * radius), "housing.groove.radius": ("its pin radius", radius)}
+    sentences = []
+    for source in errors.sources:
+        what, size = meant.get(source.name, ("", 0.0))
+        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * size:
+            sentences.append(
+                f"The table and the reducer differ: nominal of {source.name} is {source.nominal / MILLIMETRE:g} mm in "
+                f"{errors.table or 'the table'}, and {what} is {size / MILLIMETRE:g} mm in reducer {reducer.name}; the "
+                "model takes the reducer's, so correct the one that is wrong."
             )
-        absent += missing
-    return absent
+    return tuple(sentences)
 
 
 _FARTHEST = 50.0
@@ -182,6 +222,7 @@ class ReducerChoice:
             identified=self.identified,
             unit=self.unit,
             left_out=assumptions,
+            mismatches=_other_sizes(errors, self.reducer),
         )
 
 

@@ -14,7 +14,7 @@ from tolalloc.chunks import Mapper
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models import Model, Observer, Response, SettingDerivatives, Units
+from tolalloc.models import Examination, Model, Observer, Response, SettingDerivatives, Units
 from tolalloc.report.document import Section
 from tolalloc.report.figure import Figure
 from tolalloc.rv import PEAK_TO_PEAK, PRELOAD, TORQUE
@@ -62,6 +62,7 @@ class ReducerModel(Model):
     clearances: tuple[float, float] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
     left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
+    mismatches: tuple[str, ...] = ()  # Where sizes of the drawing are not those of the reducer, in sentences
 
     @property
     def reducer(self) -> Reducer:
@@ -384,7 +385,7 @@ class ReducerModel(Model):
         sentence, _ = against_catalogue(self.reducer, self._exact_loop)
         return (sentence,) if sentence else ()
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> tuple[str, ...]:
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:
         """Return nominal clearances, how many random units are jammed, and what is said of the catalogue."""
         from tolalloc.rv.examination import examined
 
