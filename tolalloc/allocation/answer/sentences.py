@@ -294,7 +294,7 @@ def _fronts(answer: AllocationAnswer) -> list[str]:
         return []
     found, lost = [], answer.fronts.searched.failed
     if not answer.fronts.score.q2 >= NEEDED_Q2:
-        found.append("The corrected model of the front has not earned its place; its search ran on the kernel, short.")
+        found.append("The stand-in for the front was not exact enough: fewer designs were searched, on the model itself.")
     if lost:
         found.append(
             f"{lost} design{'' if lost == 1 else 's'} of the search for the front failed on the kernel; the front is "
