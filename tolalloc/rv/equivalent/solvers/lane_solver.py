@@ -164,6 +164,7 @@ def _take_back_late(first, count, tile):
 def _settle_all(law, discs, here, samples, tile, careful):
     """Bring the first samples of a tile to equilibrium: register by register, then those that are late together."""
     late, brought, v = 0, 0, 0
+    # One loop for both, so that `settle`, which is written out where it is called, is compiled once.
     while v < samples or brought < late:
         among = v < samples
         count = WIDTH if among else min(late - brought, WIDTH)
