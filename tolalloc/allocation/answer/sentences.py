@@ -32,17 +32,16 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units:,} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
+    found += [*other_amounts(answer), _cost(answer)]  # the first three stand in the headline of a report
     if len(answer.requirements) > 1:
-        found.append(f"{chosen.joint.estimate:.2%} of them keep the limits of all requirements at once.")
+        found.append(f"{chosen.joint.estimate:.2%} of the units keep the limits of all requirements at once.")
     if answer.met and not answer.header.quick:
         found.append(
             "No search has seen these units; over all designs that were tried on such units, the probability that a "
             f"design is called met that misses a limit is at most {answer.error:.0%}."
         )
-    found.append(_cost(answer))
     return (
         *found,
-        *other_amounts(answer),
         *_solved(chosen),
         _compared(answer),
         *_certificate(answer),
@@ -294,7 +293,7 @@ def _fronts(answer: AllocationAnswer) -> list[str]:
         return []
     found, lost = [], answer.fronts.searched.failed
     if not answer.fronts.score.q2 >= NEEDED_Q2:
-        found.append("The stand-in for the front was not exact enough: fewer designs were searched, on the model itself.")
+        found.append("The stand-in for the front was not exact enough: fewer designs were tried, on the model itself.")
     if lost:
         found.append(
             f"{lost} design{'' if lost == 1 else 's'} of the search for the front failed on the kernel; the front is "
