@@ -50,6 +50,20 @@ class Setting(NamedFields):
         if self.step <= 0:
             raise InputError.at(place, "step", self.step, "above 0")
 
+    @property
+    def strays(self) -> bool:
+        """Whether the setting as it is today lies outside what may be chosen."""
+        return not self.lower - _ROUNDING <= self.value <= self.upper + _ROUNDING
+
+    @property
+    def sentence(self) -> str:
+        """How it is today, and what it may become."""
+        name, _, unit = self.name.rstrip("]").partition(" [")
+        present, range_ = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
+        if self.strays:
+            return f"{present} today, not among the {range_} that it may become; only the table as it is may keep it"
+        return f"{present}; {f'may become {range_}' if self.lower < self.upper else 'locked'}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnAmounts:

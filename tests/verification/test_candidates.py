@@ -102,3 +102,29 @@ def test_a_miss_is_titled_so(graded):
     answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))
     assert not answer.met
     assert answer.title.startswith("No drawing shown to keep its limits")
+
+
+def spring(part, preload):
+    return part - preload
+
+
+@pytest.mark.parametrize("grades", [False, True])
+def test_a_setting_outside_what_it_may_become_is_not_drawn_though_it_is_cheapest(grades):
+    """At 0 the setting leaves the zones most room; it may be −3 to −1, and −1 leaves the most of these."""
+    setting = ta.Setting(name="preload [mm]", value=0.0, lower=-3.0, upper=-1.0, step=0.01)
+    study = ta.Study(
+        ta.model(spring, inputs=("part",), outputs=("force [N]",), settings=(setting,)),
+        ta.Drawing.of_rows([{"id": "part", "nominal": 0.0, **ZONE}]),
+        limits={"force [N]": ta.Limit(upper=1.04)},
+        questions=[ta.Allocation(grades=grades, what_if=False, front=False)],
+        name="preloaded",
+    )
+    found = study.allocate(effort="quick")
+    (value,) = found.chosen.settings
+    assert value == pytest.approx(-1.0, abs=0.01)
+    assert found.met
+    assert found.cost > found.fixed.chosen.cost
+    (said,) = [sentence for sentence in found.warnings if sentence.startswith("preload")]
+    assert said == (
+        "preload: 0 mm today, not among the -3…-1 mm that it may become; only the table as it is may keep it."
+    )

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tolalloc.allocation.confirmation import Confirmed
+from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.search import ROUNDING, ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, answer
@@ -46,7 +45,7 @@ class Candidates:
         found = self.designs(free_label)
         if self.graded:
             return {TABLE: found[TABLE], GRADES: found[GRADES]}
-        return {name: design for name, design in found.items() if name == TABLE or _inside(design)}
+        return {name: design for name, design in found.items() if name == TABLE or self._space.allows(design.design)}
 
     @property
     def drawn(self) -> VerifiedDesign:
@@ -90,15 +89,16 @@ class Candidates:
 
     @property
     def _searches(self) -> dict[str, ZoneAllocation]:
-        return {FREE: self.free, **({ALONE: self.fixed} if self.fixed else {})}
+        """The searches whose zones and settings may be drawn, off the ladders."""
+        alone = self.fixed if self.fixed and self._space.holds_present_settings else None
+        return {FREE: self.free, **({ALONE: alone} if alone else {})}
+
+    @property
+    def _space(self) -> DesignSpace:
+        """The design variables with every setting free."""
+        return self.free.chosen.space
 
 
 def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:
     """Return the cheapest design that was shown to keep the limits."""
     return min((own for own in designs.values() if own.met), key=lambda own: own.cost, default=None)
-
-
-def _inside(design: VerifiedDesign) -> bool:
-    """Return whether zones and settings of a design lie between what they may be."""
-    low, high = design.space.lower * (1 - ROUNDING), design.space.upper * (1 + ROUNDING)
-    return bool(np.all((design.design >= low) & (design.design <= high)))

@@ -19,7 +19,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.settings import Setting
 
 _ROUNDING = 1e-9
-"""Distance of a scale from a process's range up to which it is rounding [-]."""
+"""Distance from a bound, over the bound, up to which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +94,11 @@ class DesignSpace:
         return replace(self, settings=tuple(locked))
 
     @property
+    def holds_present_settings(self) -> bool:
+        """Whether every setting as it is today lies between what it may be."""
+        return not any(setting.strays for setting in self.settings)
+
+    @property
     def setting_steps(self) -> Float[np.ndarray, " setting"]:
         """Step of every setting to either side of a difference [unit of its name]."""
         return np.array([setting.step for setting in self.settings], float)
@@ -118,6 +123,11 @@ class DesignSpace:
         """Largest value of every variable."""
         scales = [max(process.maximum for process in feature.processes) for feature in self.features]
         return np.append(scales, self.shared.upper)
+
+    def allows(self, design: Float[np.ndarray, " variable"]) -> bool:
+        """Return whether zones and settings of a design lie between what they may be."""
+        room = _ROUNDING * np.maximum(np.abs(self.lower), np.abs(self.upper))
+        return bool(np.all((design >= self.lower - room) & (design <= self.upper + room)))
 
     def problem(self, stacks: tuple[Stack, ...]) -> AllocationProblem:
         """Return the allocation that keeps the stacks."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import SearchEffort
 from tolalloc.allocation.program import process_choice
@@ -16,7 +14,7 @@ from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
 
 ROUNDING = 1e-9
-"""Distance from a bound, over the bound, up to which it is rounding [-]."""
+"""Distance of a cost from a bound, over the bound, up to which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,8 +159,9 @@ def allocate(
     """
     first, space = start or answer(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
-    is_allowed = np.all((first.design >= space.lower * (1 - ROUNDING)) & (first.design <= space.upper * (1 + ROUNDING)))
-    tried = ((first,) if is_allowed else ()) + step_to_optimum(verifier, first, effort.steps, effort.reach)
+    tried = ((first,) if space.allows(first.design) else ()) + step_to_optimum(
+        verifier, first, effort.steps, effort.reach
+    )
     chosen = answer(tried)
     return ZoneAllocation(
         limit=verifier.limit,

@@ -158,7 +158,7 @@ class DrawingQuestion:
         """Return the cheaper allocation on ladders of zones, with the settings free or as they are."""
         steps = self.effort.graded_steps
         found = [allocate_grades(self.verifier("graded", self.space), free.chosen, steps)]
-        if fixed:
+        if fixed and self.space.holds_present_settings:
             found.append(allocate_grades(self.verifier("graded alone", self.space.fixed), fixed.chosen, steps))
         best = answer(tuple(own.chosen for own in found))
         return next(own for own in found if own.chosen is best)

@@ -72,6 +72,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
         own = f"{source.own_id} ({source.name})" if source.own_id else source.name
         lines.append(f"  {own}: {source.mapping}; {'locked' if source.locked else span}")
+    lines += [f"  {setting.sentence}" for setting in model.settings]
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
     neglected = [source.name for source in errors.sources if source.zone == 0.0]
     if neglected:

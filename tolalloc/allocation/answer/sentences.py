@@ -282,6 +282,7 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
             f"With {lost} of {len(uncertain)} drawn {answer.model.uncertain[0].name.split(' (')[0]} values the free "
             "zones are no longer shown to keep every limit."
         )
+    found += [f"{own.sentence}." for own in answer.space.settings if own.strays]
     found += answer.model.cautions(chosen.settings)
     found += _fronts(answer)
     return (*found, *_failed(answer))
