@@ -278,7 +278,7 @@ def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched
     assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
-    assert front.series[0].label == f"exact by the local models (±{results.chosen.sides[0].standard_error:.2g}″)"
+    assert front.series[0].label == f"cheapest by the local models (±{results.chosen.sides[0].standard_error:.2g}″)"
 
 
 def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_first_page(results):

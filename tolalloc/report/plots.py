@@ -17,7 +17,7 @@ _UPRIGHT = 7
 """Letters of a line that stand below a cell of a map without meeting those of the next one [-]."""
 _LETTERS = 10.5
 """Letters of a title per width of a picture [1/inch]."""
-COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b")
+COLOURS = ("#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b", "#6a4fc3")
 
 
 def _draw_bars(axes: Any, figure: Figure, number: int) -> None:

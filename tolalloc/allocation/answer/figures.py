@@ -37,14 +37,19 @@ def front_figure(answer: AllocationAnswer, fronts: Fronts) -> Figure:
         y_label="cost [cost units]",
         series=(
             Series(
-                label=f"exact by the local models (±{error})",
+                label=f"cheapest by the local models (±{error})",
                 kind="line",
                 x=list(exact.limits),
                 y=list(exact.cost),
             ),
-            Series(label="NSGA-II, told", kind="line", x=list(searched.quantile), y=list(searched.cost)),
             Series(
-                label="NSGA-II, on the kernel",
+                label="NSGA-II, as its stand-in tells",
+                kind="line",
+                x=list(searched.quantile),
+                y=list(searched.cost),
+            ),
+            Series(
+                label="NSGA-II, solved on the kernel",
                 kind="points",
                 x=list(searched.on_kernel[checked]),
                 y=list(searched.cost[checked]),

@@ -118,7 +118,8 @@ def _optimality(answer: AllocationAnswer) -> Section:
         heading="How far from optimal",
         paragraphs=(
             "The bound is a Lagrange dual that takes no solver's word. It holds for the convex models around the "
-            "verified design, not for designs far from it; the front below was searched with other means. One "
+            "verified design, not for designs far from it. The front of NSGA-II was searched with other "
+            "means and may lie on either side of it: none of its points was verified for all limits. One "
             "column has the budget of the limits themselves, the other one standard error less, where the search "
             "aims; where the verified design takes more of a limit than that, what it takes counts.",
             "The last table shows the free zones. Each lies between what its process can hold and the smallest and "

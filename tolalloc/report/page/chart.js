@@ -1,7 +1,7 @@
 // Charts of a report and of the live page: SVG that prints, tells its values under the pointer, and needs no library.
 
 const SVG = "http://www.w3.org/2000/svg";
-const COLOURS = ["#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b"];
+const COLOURS = ["#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b", "#6a4fc3"];
 const LETTER = 6.6; // width of a letter at 12 px, on average
 const NARROW = 520; // below, the names of bars stand above them
 
