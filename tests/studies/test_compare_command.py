@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import refused, tolalloc
+from tolalloc.study.comparison import ComparisonAnswer
+from tolalloc.study.finished_run import read_run
 
 SUMMARY = {
     "reducer": "RV-20E",
@@ -73,6 +75,20 @@ def test_two_runs_side_by_side(runs, tmp_path):
     assert "rankings" in said
     assert "zones" in said
     assert "differ beyond their 90 % intervals: disc1.pitch." in " ".join(said.split())
+
+
+def test_two_runs_of_one_study_are_told_apart_by_their_folders_and_by_what_differs(tmp_path):
+    amounts = [{"flank clearance [µm]": value, "radial clearance [µm]": 7.0} for value in (1.0, 2.5)]
+    runs = [run_folder(tmp_path / part / "mine", **own) for part, own in zip("ab", amounts, strict=True)]
+    neglected = "sun.assembly,µm,0.0,0.0,0.0\n"
+    for run in runs:
+        zones = run / "allocation.csv"
+        zones.write_text(zones.read_text(encoding="utf-8") + neglected, encoding="utf-8")
+    compared = ComparisonAnswer.of(*map(read_run, runs))
+    assert compared.names == (f"A: mine in {runs[0]}", f"B: mine in {runs[1]}")
+    assert list(compared.to_frame("zones")["source"]) == ["disc1.pitch", "pin.diameter"]
+    (row,) = compared.differing.to_dict("records")
+    assert (row["quantity"], row["B − A"]) == ("flank clearance [µm]", 1.5)
 
 
 def test_runs_of_other_questions_and_the_same_run_are_told(runs, tmp_path):

@@ -23,4 +23,5 @@ def compare(
     answer = ComparisonAnswer.of(read_run(first), read_run(second))
     if out:
         answer.save(out)
-    tell(answer, as_json, *((answer.to_frame(name), name) for name in ("rankings", "zones")))
+    own = ((answer.to_frame(name), name) for name in ("rankings", "zones"))
+    tell(answer, as_json, (answer.differing, "answers that differ"), *own)

@@ -94,7 +94,7 @@ class ComparisonAnswer(Answer):
         """Every source with its rank and total index in both, and whether their intervals lie apart."""
         columns = ["rank [-]", TOTAL, LOW, HIGH]
         first, second = (run.ranking.set_index("source")[columns] for run in self.runs)
-        joint = first.join(second, how="outer", lsuffix=" A", rsuffix=" B")
+        joint = first.add_suffix(" A").join(second.add_suffix(" B"), how="outer")
         apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
         missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
         return pd.DataFrame(
@@ -107,6 +107,12 @@ class ComparisonAnswer(Answer):
                 "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
             }
         ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
+
+    @cached_property
+    def differing(self) -> pd.DataFrame:
+        """Every number and word of the two answers that is not the same in both."""
+        table = self.to_frame("answers")
+        return table[table[self.names[0]] != table[self.names[1]]]
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -143,8 +149,11 @@ class ComparisonAnswer(Answer):
 
     @property
     def names(self) -> tuple[str, str]:
-        """Names of both runs; ``A`` and ``B`` in front tell runs of one name apart."""
-        return f"A: {self.first.name}", f"B: {self.second.name}"
+        """Names of both runs, with their folders where two are of one study."""
+        names = [run.name for run in self.runs]
+        if names[0] == names[1]:
+            names = [f"{run.name} in {run.folder}" for run in self.runs]
+        return f"A: {names[0]}", f"B: {names[1]}"
 
     @property
     def same_question(self) -> bool:
@@ -176,7 +185,8 @@ def _zones_table(comparison: ComparisonAnswer) -> pd.DataFrame:
         zone = run.zones["plus [unit]"] - run.zones["minus [unit]"]
         parts.append(pd.DataFrame({"zone": zone, "cost": run.zones["cost [cost units]"], "unit": run.zones["unit"]}))
         parts[-1].index = pd.Index(_names(run.zones), name="source")
-    joint = parts[0].join(parts[1], how="outer", lsuffix=" A", rsuffix=" B")
+    joint = parts[0].add_suffix(" A").join(parts[1].add_suffix(" B"), how="outer")
+    joint = joint[(joint[["zone A", "zone B"]] != 0.0).any(axis=1)]  # what both neglect is left out
     change = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
     return pd.DataFrame(
         {

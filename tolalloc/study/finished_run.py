@@ -28,7 +28,9 @@ class FinishedRun:
     Parameters
     ----------
     name
-        How the comparison calls it.
+        That of its study.
+    folder
+        Its folder, as it was named.
     summary, manifest
         Answers of all its questions in one, and circumstances, units in the names.
     ranking
@@ -38,6 +40,7 @@ class FinishedRun:
     """
 
     name: str
+    folder: Path
     summary: dict[str, Any]
     manifest: dict[str, Any]
     ranking: pd.DataFrame
@@ -82,6 +85,7 @@ def read_run(folder: Path) -> FinishedRun:
     zones = "allocation.csv" if "allocation" in said else "tables/tolerances.csv"
     return FinishedRun(
         name=str(summary["study"]),
+        folder=folder,
         summary=summary,
         manifest=manifest,
         ranking=_read_table(folder / "tables" / f"{ranked}.csv", _RANKED),
