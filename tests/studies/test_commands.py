@@ -100,6 +100,13 @@ def test_check_is_in_order():
     assert "is in order" in result.stdout
     assert "σ =" in result.stdout
     assert "Neglected: not in the tolerance table and taken as exact: " in result.stdout
+    # Rows that say the same stand in one line, others do not; the zones of the shipped table cost what they add up to.
+    assert "  disc*.pitch (2 rows, each): 23.3 µm" in result.stdout
+    assert "  disc1.bore1.position: 4 µm" in result.stdout
+    table = load_tolerance_table("rv20e_baseline")
+    cost = sum(source.cost for source in table if source.zone > 0)
+    assert f"The zones of the table cost {cost:.2f} cost units." in result.stdout
+    assert "  flank clearance: 1.04 µm; may become 1…5 µm" in result.stdout
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import Float
 
+    from tolalloc.drawings.sources import Source
     from tolalloc.study.prepared import Prepared
 
 
@@ -50,6 +51,9 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
 
 def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
+    from tolalloc.report.currency import in_currency
+    from tolalloc.report.wording import COST_UNITS
+
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
     kinds = [question.kind for question in study.questions]
@@ -68,15 +72,18 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         f"it asks: {', '.join(kinds)}.",
         *(f"  limit: {requirement.sentence}" for requirement in requirements),
     ]
-    for source in errors.active:
-        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
-        own = f"{source.own_id} ({source.name})" if source.own_id else source.name
-        lines.append(f"  {own}: {source.mapping}; {'locked' if source.locked else span}")
-    lines += [f"  {setting.sentence}" for setting in model.settings]
+    lines += _zones(errors.active)
     lines += [f"  {sentence}" for sentence in errors.correlation.mappings(errors.sources)]
+    lines += [f"  {setting.sentence}" for setting in model.settings]
+    if "allocation" in kinds:
+        cost = float(space.cost(space.uniform(1.0)))
+        locked = f", those that are locked {space.locked_cost:.2f} of it" if space.locked_cost else ""
+        said = f"The zones of the table cost {cost:.2f} {COST_UNITS}{locked}."
+        lines.append(in_currency(said, prepared.currency))
+        summary |= {"cost of the tolerance table [cost units]": cost}
     neglected = [source.name for source in errors.sources if source.zone == 0.0]
     if neglected:
-        kinds_of = dict.fromkeys(re.sub(r"\d+", "*", name) for name in neglected)
+        kinds_of = dict.fromkeys(map(_without_numbers, neglected))
         share = f"{len(neglected)} of {len(errors.sources)} rows"
         lines.append(f"Neglected, with a zone of 0: {', '.join(kinds_of)} ({share}).")
     lines += [f"Neglected: {sentence}." for sentence in model.left_out]
@@ -86,6 +93,27 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     summary |= {"examined": list(examined.sentences), "but": examined.but}
     verdict = f"Study {study.name} is in order{f', but {examined.but}' if examined.but else ''}."
     return summary, [*lines, *examined.sentences], verdict
+
+
+def _zones(sources: tuple[Source, ...]) -> list[str]:
+    """Return a line for every source, or one for all whose names differ by their numbers alone, if they are alike."""
+    said: dict[str, dict[str, str]] = {}
+    for source in sources:
+        name = f"{source.own_id} ({source.name})" if source.own_id else source.name
+        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
+        mapping = f"{source.mapping}; {'locked' if source.locked else span}"
+        said.setdefault(_without_numbers(name), {})[name] = mapping
+    lines = []
+    for pattern, own in said.items():
+        alike = len(own) > 1 and len({*own.values()}) == 1
+        together = {f"{pattern} ({len(own)} rows, each)": next(iter(own.values()))} if alike else own
+        lines += [f"  {name}: {mapping}" for name, mapping in together.items()]
+    return lines
+
+
+def _without_numbers(name: str) -> str:
+    """Return the name of a source with a star for every number."""
+    return re.sub(r"\d+", "*", name)
 
 
 def _timed(prepared: Prepared) -> tuple[dict[str, Any], list[str]]:
