@@ -20,6 +20,8 @@ _LONGEST_VALUE = 200
 """Most characters of a value that a sentence quotes [-]."""
 _LONGEST_SENTENCE = 2000
 """Most characters of a sentence [-]."""
+_MOST_NAMES = 30
+"""Most names that a sentence lists where none is spelled nearly as the unknown one [-]."""
 _UNBROKEN = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
 """What is written without a blank and is longer than any word or path that a sentence needs."""
 
@@ -80,9 +82,17 @@ class UnknownNameError(TolallocError):
     def among(cls, place: Path | str, what: str, name: str, known: Iterable[str]) -> UnknownNameError:
         """Name the unknown, the kind of thing it should be, and the nearest known names."""
         names, name = sorted(known), in_short(name)
-        near: Sequence[str] = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or names[:6]
-        nearest = f"the nearest known {'is' if len(near) == 1 else 'are'} {', '.join(near)}" if near else "it has none"
-        return cls(f"{place}: {what} {name!r} is not known; {nearest}.")
+        return cls(f"{place}: {what} {name!r} is not known; {_what_is_known(name, names)}.")
+
+
+def _what_is_known(name: str, names: Sequence[str]) -> str:
+    """Return the names that are spelled nearly so; where none is, all of them, or the first of many."""
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if near:
+        return f"the nearest known {'is' if len(near) == 1 else 'are'} {', '.join(near)}"
+    more = len(names) - _MOST_NAMES
+    shown = f"{', '.join(names[:_MOST_NAMES])}{f' and {more} more' if more > 0 else ''}"
+    return f"known {'is' if len(names) == 1 else 'are'} {shown}" if names else "it has none"
 
 
 class RunFolderError(TolallocError):

@@ -134,7 +134,7 @@ def test_other_units_separators_and_columns(folder):
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("name =", "title =", "measurement.toml: field 'title' is not known; the nearest known are"),
+        ("name =", "title =", "measurement.toml: field 'title' is not known; known are"),
         ('name = "three units"\n', "", "measurement.toml: name is missing."),
         ('units = "units.csv"', "units = []", "measurement.toml: units is []; "),
         ('units = "units.csv"', "units = 5", "measurement.toml: units is 5; "),
@@ -152,7 +152,7 @@ def test_other_units_separators_and_columns(folder):
             "measurement.toml, peak_to_peak: torque_nm is 0; a torque of 0 is not allowed, as no pin carries; below 0 "
             "it resists the rotation.",
         ),
-        ('"2"\nfile', '"4"\nfile', "measurement.toml, curve 1: unit '4' is not known; the nearest known are 1, 2, 3."),
+        ('"2"\nfile', '"4"\nfile', "measurement.toml, curve 1: unit '4' is not known; known are 1, 2, 3."),
         ('"3"\nfile', '"33"\nfile', "measurement.toml, loop 1: unit '33' is not known; the nearest known is 3"),
         ("noise_arcsec = 0.5", "noise_arcsec = 0", "measurement.toml, curve 1: noise_arcsec is 0; "),
         ("noise_arcsec = 0.5", "noise_arcsec = nan", "measurement.toml, curve 1: noise_arcsec is nan; "),

@@ -85,7 +85,7 @@ def test_a_neglected_source_is_refused_as_such():
     )
     with pytest.raises(InputError, match=sentence):
         neglected.ask(ta.Difference(zones={"shaft": 5.0}))
-    with pytest.raises(UnknownNameError, match="source 'shafts' is not known; the nearest known is housing"):
+    with pytest.raises(UnknownNameError, match="source 'shafts' is not known; known is housing"):
         neglected.ask(ta.Difference(zones={"shafts": 5.0}))
 
 

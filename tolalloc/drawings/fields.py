@@ -287,7 +287,7 @@ class ToleranceRow(Record):
         if zone > 0 and not self.locked and not 0 < self.min <= zone <= self.max <= LARGEST_ZONE / factor:
             raise ValueError(
                 f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:g} µm: "
-                f"min {self.min:g}, zone {zone:g}, max {self.max:g} {self.unit}"
+                f"min {self.min:g}, zone {zone:g}, max {self.max:g}, all in the {self.unit} of the row"
             )
         if self.plus != self.minus and zone * factor < SMALLEST_ZONE:
             raise ValueError(
