@@ -11,6 +11,7 @@ import pytest
 
 from tests.studies.command import refused, tolalloc
 from tests.validation_manual import shown
+from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces, order_spectrum
@@ -167,3 +168,25 @@ def test_a_catalogue_in_wrong_units_is_refused(tmp_path, old, new, words):
     path.write_text(before + "[catalogue]" + table.replace(old, new), encoding="utf-8")
     result = tolalloc("te", "--reducer", path)
     refused(result, "own.reducer.toml", words)
+
+
+def test_spur_gears_take_their_teeth_from_the_first_stage_and_no_gear_has_fewer_virtual_ones(tmp_path):
+    path, text = tmp_path / "own.reducer.toml", (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    assert "virtual_teeth" not in text
+
+    def mesh(teeth: int, virtual: str = "") -> float:
+        changed = text.replace("sun_teeth = 10", f"sun_teeth = {teeth}")
+        path.write_text(changed.replace("contact_ratio", f"{virtual}contact_ratio"), encoding="utf-8")
+        parts = load_reducer(path).parts  # the mesh itself yields in series with the twist of the crank
+        return 1.0 / next(part.compliance(0.0) for part in parts if part.name == "gear mesh")
+
+    # ISO 6336-1 with 26 planet teeth and its printed coefficients, 10 mm wide.
+    for teeth in (10, 12):
+        expected = 1.375 / (0.04723 + 0.15551 / teeth + 0.25791 / 26) * 1e7
+        assert mesh(teeth) == pytest.approx(expected, rel=1e-12)
+        assert mesh(10, f"sun_virtual_teeth = {teeth}.0, ") == pytest.approx(expected, rel=1e-12)
+    words = (
+        r"stiffness.gear_mesh.sun_virtual_teeth is 10; allowed is sun_teeth = 12 or more, and nothing for spur gears"
+    )
+    with pytest.raises(InputError, match=words):
+        mesh(12, "sun_virtual_teeth = 10, ")

@@ -104,7 +104,7 @@ class ReducerRecord(Record):
             cycloid_stage=self.cycloid_stage,
             disc_material=disc,
             pin_material=pin,
-            stiffness=self.stiffness.stiffness(disc, pin, self.cycloid_stage),
+            stiffness=self.stiffness.stiffness(disc, pin, self.first_stage, self.cycloid_stage),
             modification=Modification.from_convention(
                 grinding.convention, equidistant=grinding.equidistant_um, shift=grinding.shift_um
             ),

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from tolalloc.files import Record, times
-from tolalloc.rv.reducer.design import CycloidStage, Reducer
+from tolalloc.rv.reducer.design import CycloidStage, FirstStage, Reducer
 from tolalloc.rv.reducer.friction import FrictionDimensions
 from tolalloc.rv.reducer.parts import Part
 from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
@@ -53,12 +53,34 @@ class Rollers:
 
 @dataclass(frozen=True, kw_only=True)
 class GearPair:
-    """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness."""
+    """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness.
+
+    Virtual teeth that are not given are those of the first stage, as spur gears have them; helical gears have more.
+    """
 
     contact_ratio: Annotated[float, Field(ge=1, le=2.5)]
-    sun_virtual_teeth: Annotated[float, Field(ge=5)]
-    planet_virtual_teeth: Annotated[float, Field(ge=5)]
     face_width: Annotated[float, Field(alias="face_width_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
+    sun_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
+    planet_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
+
+    def of(self, stage: FirstStage) -> GearPair:
+        """Return the data with the virtual teeth of every gear.
+
+        Raises
+        ------
+        ValueError
+            Fewer virtual teeth than the gear has.
+        """
+        found = {}
+        for gear, teeth in (("sun", stage.sun_teeth), ("planet", stage.planet_teeth)):
+            name = f"{gear}_virtual_teeth"
+            found[name] = float(teeth) if getattr(self, name) is None else getattr(self, name)
+            if found[name] < teeth:
+                raise ValueError(
+                    f"stiffness.gear_mesh.{name} is {found[name]:g}; allowed is {gear}_teeth = {teeth} or more, and "
+                    "nothing for spur gears"
+                )
+        return replace(self, **found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,11 +151,19 @@ class StiffnessRecord(Record):
     pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
     pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
 
-    def stiffness(self, disc: Material, pin: Material, stage: CycloidStage) -> Stiffness:
-        """Return all stiffnesses, given or by formula [N/m]."""
+    def stiffness(self, disc: Material, pin: Material, gears: FirstStage, stage: CycloidStage) -> Stiffness:
+        """Return all stiffnesses, given or by formula [N/m].
+
+        Raises
+        ------
+        ValueError
+            Gears of fewer virtual teeth than they have.
+        """
         bearings: dict[str, Any] = {}
         for name, formula in FORMULAS.items():
             own = getattr(self, name)
+            if isinstance(own, GearPair):
+                own = own.of(gears)
             if isinstance(own, RollingBearing):
                 bearings[name] = inf  # its parts say it, at the load that they carry
             else:
