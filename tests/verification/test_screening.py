@@ -20,7 +20,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Evaluation
-from tolalloc.sensitivity.given_data import delta_index, pawn_index
+from tolalloc.sensitivity.given_data import OutputDensity, delta_index, pawn_index
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 
 
@@ -161,7 +161,7 @@ def test_pawn_and_delta_are_those_of_salib(units, resampled):
     exponent = 2.0 / (7.0 + np.tanh((1500.0 - units) / 500.0))
     edges = np.linspace(0, units, min(int(np.ceil(units**exponent)), 48) + 1)
     theirs = delta.calc_delta(y, np.linspace(y.min(), y.max(), 100), column, edges)
-    assert delta_index(column, y) == pytest.approx(theirs, rel=1e-12)
+    assert delta_index(column, OutputDensity.of(y)) == pytest.approx(theirs, rel=1e-12)
     problem = {"num_vars": 1, "names": ["x"]}
     theirs = pawn.analyze(problem, column[:, np.newaxis], y, S=10)["median"][0]
     assert pawn_index(column, y) == pytest.approx(theirs, rel=1e-12)
@@ -169,7 +169,7 @@ def test_pawn_and_delta_are_those_of_salib(units, resampled):
 
 def test_a_class_of_equal_outputs_adds_nothing():
     y = np.repeat([1.0, 2.0, 3.0], 100)
-    assert np.isfinite(delta_index(np.arange(300.0), y))
+    assert np.isfinite(delta_index(np.arange(300.0), OutputDensity.of(y)))
 
 
 @pytest.mark.slow

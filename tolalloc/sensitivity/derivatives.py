@@ -162,10 +162,14 @@ def _squared_gradients(
     number_in_block, numbers = (members.cumsum(axis=0) * members).sum(axis=1), members @ members.sum(axis=0)
     normal, squares = ndtri(uniform), np.zeros((uniform.shape[0], members.shape[1]))
     for number in range(1, int(number_in_block.max()) + 1):
-        move = _STEP * (number_in_block == number)
         moved = [at for at, own in enumerate(errors.columns_of_source) if numbers[own.start] >= number]
-        ahead, behind = (errors.marginal_values(errors.dependent(ndtr(normal + way * move)), moved) for way in (1, -1))
-        squares += ((by_standard * (ahead - behind) / (2.0 * _STEP)) @ members) ** 2
+        sides, own = [], number_in_block == number
+        for way in (_STEP, -_STEP):
+            beside = uniform.copy()
+            beside[:, own] = ndtr(normal[:, own] + way)
+            sides.append(errors.marginal_values(errors.dependent(beside), moved))
+        change, felt = (sides[0] - sides[1]) / (2.0 * _STEP), numbers >= number
+        squares += ((by_standard[:, felt] * change[:, felt]) @ members[felt]) ** 2
     return squares
 
 

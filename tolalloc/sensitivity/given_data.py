@@ -6,6 +6,7 @@ processor time. Here the units of all classes stand beside each other; the numbe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -40,7 +41,22 @@ def pawn_index(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]
     return float(np.median(found))
 
 
-def delta_index(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]) -> float:
+@dataclass(frozen=True, kw_only=True)
+class OutputDensity:
+    """The density of an output over all units, which delta compares that of every class with."""
+
+    y: Float[np.ndarray, " unit"]  # The output [output]
+    grid: Float[np.ndarray, " point"]  # Where densities are compared [output]
+    density: Float[np.ndarray, "point 1"]  # The density there [1/output]
+
+    @classmethod
+    def of(cls, y: Float[np.ndarray, " unit"]) -> OutputDensity:
+        """Return the density of the output of units."""
+        grid = np.linspace(y.min(), y.max(), _CURVE_POINTS)
+        return cls(y=y, grid=grid, density=_densities(y, np.array([0, y.size]), grid))
+
+
+def delta_index(column: Float[np.ndarray, " unit"], output: OutputDensity) -> float:
     """Return half the mean distance of the density in classes of a measure from that of all units, with its bias [-].
 
     A class whose units are all alike has no density and adds nothing.
@@ -49,11 +65,11 @@ def delta_index(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"
     ----------
     Plischke, Borgonovo & Smith 2013, eq. (26).
     """
-    grid = np.linspace(y.min(), y.max(), _CURVE_POINTS)
-    bounds = _class_bounds(y.size)
-    of_classes = _densities(y[np.argsort(column, kind="stable")], bounds, grid)
-    distance = np.trapezoid(np.abs(_densities(y, np.array([0, y.size]), grid) - of_classes), grid, axis=0)
-    return float(np.nansum(np.diff(bounds) / (2 * y.size) * distance))
+    units = output.y.size
+    bounds = _class_bounds(units)
+    of_classes = _densities(output.y[np.argsort(column, kind="stable")], bounds, output.grid)
+    distance = np.trapezoid(np.abs(output.density - of_classes), output.grid, axis=0)
+    return float(np.nansum(np.diff(bounds) / (2 * units) * distance))
 
 
 def _class_bounds(units: int) -> Int[np.ndarray, " bound"]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
@@ -21,7 +21,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models import Response
 from tolalloc.sensitivity.effort import CLASSES, FEWEST_TRAJECTORIES, FEWEST_UNITS_OF_CLASS
-from tolalloc.sensitivity.given_data import delta_index, pawn_index
+from tolalloc.sensitivity.given_data import OutputDensity, delta_index, pawn_index
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 from tolalloc.sensitivity.target import limited_measures
@@ -187,9 +187,9 @@ def moment_independent(
     widest, shuffle = max(known, key=lambda own: own.shape[1]), seeds.child("dummies").generator()
     known += [shuffle.permutation(widest) for _ in range(dummies)]
     pawns = np.array([max(pawn_index(column, y) for column in columns.T) for columns in known])
-    generator = seeds.child("resamples").generator()
-    chosen = [columns[:, np.argmax([delta_index(column, y) for column in columns.T])] for columns in known]
-    deltas = np.column_stack([_reduced_deltas(column, y, resamples, generator) for column in chosen])
+    output, generator = OutputDensity.of(y), seeds.child("resamples").generator()
+    strongest = [columns[:, np.argmax([delta_index(column, output) for column in columns.T])] for columns in known]
+    deltas = _reduced_deltas(np.column_stack(strongest), y, generator.integers(y.size, size=(resamples, y.size)))
     count = len(known) - dummies
     return MomentIndependent(
         sources=tuple(dict.fromkeys(errors.source_of_column)),
@@ -227,13 +227,23 @@ def _known(errors: ErrorModel, x: Float[np.ndarray, "unit column"]) -> list[Floa
 
 
 def _reduced_deltas(
-    column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"], resamples: int, generator: np.random.Generator
-) -> Float[np.ndarray, " resample"]:
-    """Return twice the estimate less that of each resample; their mean is the estimate without its bias [-]."""
-    drawn, found = [generator.integers(y.size, size=y.size) for _ in range(resamples)], np.empty(resamples)
+    columns: Float[np.ndarray, "unit source"],
+    y: Float[np.ndarray, " unit"],
+    drawn: Int[np.ndarray, "resample unit"],
+) -> Float[np.ndarray, "resample source"]:
+    """Return twice the estimates less those of each resample; their mean is the estimate without its bias [-].
+
+    All sources have their units resampled alike, so that the density over all units is made once a resample.
+    """
+
+    def deltas(units: Int[np.ndarray, " unit"]) -> list[float]:
+        output = OutputDensity.of(y[units])
+        return [delta_index(column[units], output) for column in columns.T]
+
+    found = np.empty((len(drawn), columns.shape[1]))
 
     def resample(part: slice) -> None:
-        found[part] = [delta_index(column[own], y[own]) for own in drawn[part]]
+        found[part] = [deltas(units) for units in drawn[part]]
 
-    in_threads(resample, resamples, size=1)
-    return 2.0 * delta_index(column, y) - found
+    in_threads(resample, len(drawn), size=1)
+    return 2.0 * np.array(deltas(np.arange(y.size))) - found
