@@ -14,8 +14,6 @@ from tolalloc.chunks import map_chunks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
 from tolalloc.rv.equivalent.answers import Equilibria
-from tolalloc.rv.equivalent.condensation import CondensedAngles
-from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.response.kernel import KernelResponse
 from tolalloc.units import ARCSECOND, DEGREE
 
@@ -96,22 +94,6 @@ def thinned(curve: MeasuredCurve, noise: Noise, most: int) -> ThinnedCurve:
     )
 
 
-@dataclass(frozen=True)
-class _OneTurn(EquivalentModel):
-    """An equivalent model that is asked for the same few sets of angles again and again."""
-
-    @cached_property
-    def _kept(self) -> dict[bytes, CondensedAngles]:
-        return {}
-
-    def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
-        """Return the condensed tables at the carrier angles [rad], made once."""
-        key = carrier_angle.tobytes()
-        if key not in self._kept:
-            self._kept[key] = super().tables_at(carrier_angle)
-        return self._kept[key]
-
-
 @dataclass(frozen=True, kw_only=True)
 class CurveProblem:
     """Errors of one unit as standard normal numbers, and how badly they explain its curve."""
@@ -120,11 +102,6 @@ class CurveProblem:
     errors: ErrorModel  # What is known of the errors before the curve is read
     zones: Float[np.ndarray, " source"]  # Zones of the sources that vary [m]
     readings: ThinnedCurve  # The curve
-
-    @cached_property
-    def _model(self) -> EquivalentModel:
-        model = self.kernel.model
-        return _OneTurn(model.reducer, model.search, model.orders)
 
     @property
     def size(self) -> int:
@@ -145,7 +122,7 @@ class CurveProblem:
 
     def _equilibria(self, x: Float[np.ndarray, "chunk column"]) -> Equilibria:
         kernel = self.kernel
-        return self._model.equilibria(kernel.errors(x), kernel.torque, self.readings.carrier_angle)
+        return self.kernel.model.equilibria(kernel.errors(x), kernel.torque, self.readings.carrier_angle)
 
     def misfit_of(self, deviations: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
         """Return half the sum of squared residuals, each in standard deviations; infinite where a curve failed [-]."""
@@ -164,7 +141,7 @@ class CurveProblem:
         samples, size = numbers.shape
         deviations = self.deviations(numbers)
         kernel, readings = self.kernel, self.readings
-        curve, derivatives = self._model.rotation_derivatives(
+        curve, derivatives = self.kernel.model.rotation_derivatives(
             kernel.errors(deviations), kernel.torque, readings.carrier_angle
         )
         columns = [kernel.model.columns.index(name) for name in self.errors.columns]

@@ -27,6 +27,9 @@ from tolalloc.rv.equivalent.solvers.records import (
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.series import at_torque
 
+_FEW_ANGLES = 200
+"""Angles up to which tables are kept, 6 MB at most for an RV-20E [-]."""
+
 
 @dataclass(frozen=True)
 class EquivalentModel:
@@ -105,8 +108,10 @@ class EquivalentModel:
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
 
     def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
-        """Return the condensed tables at the carrier angles [rad]."""
-        return condense(self.reducer, self.orders, carrier_angle)
+        """Return the condensed tables at the carrier angles [rad], those of few angles made once."""
+        if carrier_angle.size > _FEW_ANGLES:
+            return condense(self.reducer, self.orders, carrier_angle)
+        return _tables_at_few(self.reducer, self.orders, carrier_angle.tobytes())
 
     def equilibria(
         self,
@@ -272,6 +277,12 @@ class EquivalentModel:
             by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
             status=derivative.status,
         )
+
+
+@lru_cache(maxsize=8)  # a loop is read at six torques, each with its own stiffness
+def _tables_at_few(reducer: Reducer, orders: tuple[int, ...], carrier_angle: bytes) -> CondensedAngles:
+    """Return the tables that this process has made before, chunk after chunk of units, or new ones."""
+    return condense(reducer, orders, np.frombuffer(carrier_angle))
 
 
 @lru_cache(maxsize=2)
