@@ -5,19 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.prepared import prepared
 from tests.random_units import random_units
 from tolalloc.compiled import jit
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.rv.cycloid.solvers import LINEAR
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.answers import Status
 from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.rv.equivalent.solvers.guesses import guess_next, make_history
 from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
-from tolalloc.rv.equivalent.solvers.lanes import WIDTH, load, logarithm, spread, store
+from tolalloc.rv.equivalent.solvers.lanes import WIDTH, aligned, load, logarithm, spread, store
 from tolalloc.rv.equivalent.solvers.line_contact import DEEPEST, line_contact
 from tolalloc.rv.equivalent.solvers.problem import values_of
 from tolalloc.rv.equivalent.solvers.tile import ROW, TILE, make_tile, nonzero_rows, nonzero_waves
 from tolalloc.rv.reducer.files import load_reducer
 from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.units import ARCSECOND
 
 
 @jit
@@ -91,3 +95,43 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
     np.testing.assert_allclose(tile.rotation[:TILE][settled], found[settled], rtol=1e-9)
     assert careful.mean() < 0.1
+
+
+def test_what_repeats_with_the_crank_and_changes_evenly_is_guessed_exactly(generator):
+    """And what changes along a line, where a crank's turn is no whole number of angles or has not passed twice."""
+    turn, size, used, angles = 5, 6, 16, 30
+    repeated, change = generator.normal(size=(turn, size, ROW)), generator.normal(size=(size, ROW))
+    curve = np.array([repeated[angle % turn] + angle * change for angle in range(angles)])
+    q, history = aligned(size, ROW), make_history(turn, size)
+    for angle in range(angles - 1):
+        q[:] = curve[angle]
+        guess_next(angle, turn, used, q, history)
+        if angle >= 2 * turn:
+            np.testing.assert_allclose(q[:, :used], curve[angle + 1, :, :used], rtol=1e-12, atol=1e-12)
+    q, history = aligned(size, ROW), make_history(0, size)
+    for angle in range(4):
+        q[:] = repeated[0] + angle * change
+        guess_next(angle, 0, used, q, history)
+        expected = repeated[0] + (angle + 1) * change if angle else repeated[0]
+        np.testing.assert_allclose(q[:, :used], expected[:, :used], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["rv20e_liu2020", "rv20e"])
+def test_guesses_from_turns_of_the_crank_are_nearer_and_lead_to_the_same_equilibria(name):
+    study = prepared(reducer={"name": name})
+    model, uniform = study.model.kernel.model, next(SeedTree(1).uniform_chunks(24, len(study.errors.columns)))
+    units = study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+    errors, angles = study.model.kernel.errors(units), 2 * np.pi * np.arange(936) / 936
+    by_turns, by_lines = model.equilibria(errors, -1.0), model.equilibria(errors, -1.0, angles)
+    assert (by_turns.status == by_lines.status).all()
+    np.testing.assert_allclose(by_turns.transmission_error, by_lines.transmission_error, rtol=0, atol=1e-9 * ARCSECOND)
+
+    def off(turn: int) -> float:
+        q, history, found = aligned(6, ROW), make_history(turn, 6), []
+        for angle in range(935):
+            q[:, :24] = by_turns.retained[:, angle].T
+            guess_next(angle, turn, 24, q, history)
+            found.append(np.abs(q[:, :24] - by_turns.retained[:, angle + 1].T))
+        return float(np.median(found[48:]))
+
+    assert off(24) < 0.3 * off(0)

@@ -120,8 +120,11 @@ class EquivalentModel:
         carrier_angle: Float[np.ndarray, " angle"] | None = None,
     ) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles."""
-        angle, tables = self._turn if carrier_angle is None else (carrier_angle, self.tables_at(carrier_angle))
-        return self.equilibria_of(tables, errors, torque, angle)
+        if carrier_angle is not None:
+            return self.equilibria_of(self.tables_at(carrier_angle), errors, torque, carrier_angle)
+        angle, tables = self._turn
+        turn_of_crank = self.search.turn_of_crank(self.reducer.cycloid_stage.disc_teeth)
+        return self.equilibria_of(tables, errors, torque, angle, turn_of_crank)
 
     def equilibria_of(
         self,
@@ -129,12 +132,16 @@ class EquivalentModel:
         errors: Float[np.ndarray, "sample column"],
         torque: float,
         angle: Float[np.ndarray, " angle"],
+        turn_of_crank: int = 0,
     ) -> Equilibria:
-        """Return the equilibrium of every sample at the carrier angles, whose tables are there already."""
+        """Return the equilibrium of every sample at the carrier angles, whose tables are there already.
+
+        A crank turns once in so many of them, if they are equally far apart; what is known of that saves time only.
+        """
         from tolalloc.rv.equivalent.solvers.turn import make_turn, solve_curves
 
         turn = make_turn(errors.shape[0], angle.size, tables.load.shape[2])
-        solve_curves(self._discs, tables, *self._given(errors, torque), turn)
+        solve_curves(self._discs, turn_of_crank, tables, *self._given(errors, torque), turn)
         self._mark_out_of_range(turn.rotation, turn.status)
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(

@@ -115,7 +115,7 @@ def solve_extremes(
     def solve(part: slice) -> None:
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
-        solve_tile(discs, MARGIN, search.nodes_per_coarse, *given, turn)
+        solve_tile(discs, MARGIN, search.nodes_per_coarse, search.turn_of_crank(layout.teeth), *given, turn)
         own = SolvedExtremes(*(values[part] for values in found))
         own.curve[:] = turn.rotation[:, 1 : 1 + own.curve.shape[1]]
         refine(discs, *given, search, turn, own)

@@ -1,8 +1,8 @@
 """Equilibria of a tile of samples at one angle, side by side in registers, for pins and discs without play.
 
-Newton's steps start on the line through the last two angles' equilibria, and nearly all samples need whole ones only.
+Newton's steps start where the angles before let the discs be guessed, and nearly all samples need whole ones only.
 Where the tangent is singular, a small pivot replaces the vanishing one and the step ends where the next pin touches.
-A register waits for the slowest of its samples. So those that are not settled after the first steps, a fifth of all,
+A register waits for the slowest of its samples. So those that are not settled after the first steps, one in twenty,
 leave their registers and go on together. Samples not settled in more steps, or that meet no pin, need a line search and
 are left to the solver for one sample.
 """
@@ -34,7 +34,7 @@ from tolalloc.rv.equivalent.solvers.tile import FOUR, LATE, displace_nothing
 
 _FIRST_STEPS, _STEPS = 2, 10
 # Under a curved law, whose stiffness changes with every step
-_FIRST_CURVED_STEPS, _CURVED_STEPS = 5, 16
+_FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
 _BEYOND = 1.000001  # of the way to the next contact
 ALL = 2**WIDTH - 1
 """One bit for every lane."""

@@ -43,6 +43,10 @@ class AngleSearch(NamedTuple):
     levels: int = 10  # Halvings of the coarse step around a candidate [-]
     safety: float = 1.5  # A candidate is followed while this many times its flank's rise could make it the extreme [-]
 
+    def turn_of_crank(self, teeth: int) -> int:
+        """Return how many coarse angles a crank's turn has where a disc has so many teeth; 0 if no whole number [-]."""
+        return 0 if self.coarse % teeth else self.coarse // teeth
+
     @property
     def first(self) -> int:
         """Node of the turn's first angle; as many nodes stand before it and behind the turn [-]."""

@@ -33,9 +33,7 @@ class Tile(NamedTuple):
     undisturbed: Float[np.ndarray, "register contact lane"]
     force: Float[np.ndarray, "coordinate sample"]
     rotation: Float[np.ndarray, " sample"]
-    # Coordinates of the discs: guess, then equilibrium, and the equilibrium at the last angle [m]
-    q: Float[np.ndarray, "coordinate sample"]
-    last: Float[np.ndarray, "coordinate sample"]
+    q: Float[np.ndarray, "coordinate sample"]  # Coordinates of the discs: guess, then equilibrium [m]
     # Residual over the largest force; pins in contact [-]
     ratio: Float[np.ndarray, " sample"]
     touching: Float[np.ndarray, " sample"]
@@ -54,7 +52,6 @@ def make_tile(layout, size, contacts, samples):
         aligned(samples // WIDTH * contacts, WIDTH).reshape(samples // WIDTH, contacts, WIDTH),
         aligned(size, samples),
         aligned(1, samples).reshape(samples),
-        aligned(size, samples),
         aligned(size, samples),
         aligned(1, samples).reshape(samples),
         aligned(1, samples).reshape(samples),
@@ -165,16 +162,6 @@ def _undisturbed(at, tables, layout, waves, teeth_deviate, used, tile):
                     for v in range(0, used, WIDTH):
                         place = v * contacts + (first + k) * WIDTH
                         store(out, place, fma(factor, load(values, row + v), load(out, place)))
-
-
-@jit_in_place
-def guess_next(used, tile):
-    """Go on from the equilibrium as far as it is from that of the last angle."""
-    for i in range(tile.q.shape[0]):
-        for s in range(used):
-            q = tile.q[i, s]
-            tile.q[i, s] = 2.0 * q - tile.last[i, s]
-            tile.last[i, s] = q
 
 
 @jit_within

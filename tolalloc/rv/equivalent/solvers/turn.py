@@ -13,11 +13,12 @@ import numpy as np
 from tolalloc.compiled import in_threads, jit, jit_in_place, thread_count
 from tolalloc.rv.cycloid.solvers.contact_law import pin_force
 from tolalloc.rv.equivalent.solvers.energy import compress, play_force
+from tolalloc.rv.equivalent.solvers.guesses import guess_next, make_history
 from tolalloc.rv.equivalent.solvers.interpolation import make_memory
 from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
 from tolalloc.rv.equivalent.solvers.problem import problem_at_node, solve_at_node, values_of
 from tolalloc.rv.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
-from tolalloc.rv.equivalent.solvers.tile import FOUR, ROW, TILE, guess_next, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.rv.equivalent.solvers.tile import FOUR, ROW, TILE, make_tile, nonzero_rows, nonzero_waves
 
 
 def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
@@ -91,7 +92,7 @@ def _take_over(samples, angle, tile, turn):
 
 
 @jit
-def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn):
+def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn):
     """Solve up to a tile of samples at every ``stride``-th node, side by side."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
@@ -101,19 +102,17 @@ def _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, 
     _fill_tile(layout, values, finite, used, tile, tilted)
     rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
     teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
-    guess = np.empty(size)
+    guess, history = np.empty(size), make_history(turn_of_crank, size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
         solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, tile, careful)
         _take_over(samples, angle, tile, turn)
         for s in range(samples):
             if finite[s] and (careful[s] or tilted[s]):
-                guess[:] = tile.last[:, s]
+                guess[:] = history[(angle - 1) % history.shape[0], :, s]
                 _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
                 tile.q[:, s] = guess
-        if angle == 0:
-            tile.last[:] = tile.q
-        guess_next(used, tile)
+        guess_next(angle, turn_of_crank, used, tile.q, history)
     for s in range(samples):
         if not finite[s]:
             _give_up(turn, s)
@@ -123,6 +122,7 @@ def solve_tile(
     discs: Any,
     first: Any,
     stride: Any,
+    turn_of_crank: Any,
     tables: Any,
     layout: Any,
     mapped: Any,
@@ -131,24 +131,36 @@ def solve_tile(
     torque: Any,
     turn: Any,
 ) -> None:
-    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on."""
+    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on.
+
+    A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
+    apart.
+    """
     if tables.play_stiffness.shape[1] == 0:
-        _side_by_side(discs, first, stride, tables, layout, mapped, design, errors, torque, turn)
+        _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn)
     else:
         _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn)
 
 
 def solve_curves(
-    discs: Any, tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, turn: Any
+    discs: Any,
+    turn_of_crank: Any,
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    turn: Any,
 ) -> None:
-    """Fill the equilibria of every sample at every node of the tables.
+    """Fill the equilibria of every sample at every node of the tables, of which a crank's turn has so many.
 
     ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
     """
 
     def solve(part: slice) -> None:
         own = SolvedTurn(*(values[part] for values in turn))
-        solve_tile(discs, 0, 1, tables, layout, mapped, design, errors[part], torque, own)
+        solve_tile(discs, 0, 1, turn_of_crank, tables, layout, mapped, design, errors[part], torque, own)
 
     in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))
 
