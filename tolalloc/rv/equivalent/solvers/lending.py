@@ -128,6 +128,13 @@ def _blend_slots(kept, slots, weights, out):
 
 
 @jit_within
+def _pole_moves(lane, disc, along, across, turn, lent):
+    """Return by what x, y a disc's pole moves in a lane where the disc's three coordinates change so."""
+    pole = lent.tables.pole.entries
+    return along + pole[2 * disc, lane] * turn, across + pole[2 * disc + 1, lane] * turn
+
+
+@jit_within
 def _take_near(lane, guess, side, law, lent):
     """Put the contacts into a lane that are pressed at its guess or nearly so, and set what nearly is.
 
@@ -136,15 +143,12 @@ def _take_near(lane, guess, side, law, lent):
     here, (discs, pins), undisturbed = lent.tables, (lent.taken.shape[1], lent.pin.size), lent.tile.undisturbed
     margin = _LEAST_MARGIN
     for d in range(discs):
-        px, py = here.pole.entries[2 * d, lane], here.pole.entries[2 * d + 1, lane]
-        turn = side[3 * d + 2] - guess[3 * d + 2]
-        apart = abs(side[3 * d] - guess[3 * d] + px * turn) + abs(side[3 * d + 1] - guess[3 * d + 1] + py * turn)
-        margin = max(margin, _MARGIN * apart)
+        along, across = side[3 * d] - guess[3 * d], side[3 * d + 1] - guess[3 * d + 1]
+        x, y = _pole_moves(lane, d, along, across, side[3 * d + 2] - guess[3 * d + 2], lent)
+        margin = max(margin, _MARGIN * (abs(x) + abs(y)))
     lent.margin[lane] = margin
     for d in range(discs):
-        turn = guess[3 * d + 2]
-        x = guess[3 * d] + here.pole.entries[2 * d, lane] * turn
-        y = guess[3 * d + 1] + here.pole.entries[2 * d + 1, lane] * turn
+        x, y = _pole_moves(lane, d, guess[3 * d], guess[3 * d + 1], guess[3 * d + 2], lent)
         row, first, count = 3 * d * pins, d * pins, 0
         for k in range(pins):
             lent.gap[k] = -lent.depth[first + k] - (lent.normal[row + k] * x + lent.normal[row + pins + k] * y)
@@ -204,8 +208,7 @@ def moved_too_far(lane, guess, lent):
     """Return whether a lane's solution lies so far from its guess that a pin that it did not take may be met."""
     q, moved = lent.tile.q, 0.0
     for d in range(lent.taken.shape[1]):
-        turn = q[3 * d + 2, lane] - guess[3 * d + 2]
-        x = q[3 * d, lane] - guess[3 * d] + lent.tables.pole.entries[2 * d, lane] * turn
-        y = q[3 * d + 1, lane] - guess[3 * d + 1] + lent.tables.pole.entries[2 * d + 1, lane] * turn
+        along, across = q[3 * d, lane] - guess[3 * d], q[3 * d + 1, lane] - guess[3 * d + 1]
+        x, y = _pole_moves(lane, d, along, across, q[3 * d + 2, lane] - guess[3 * d + 2], lent)
         moved = max(moved, abs(x) + abs(y))
     return not moved <= lent.margin[lane]
