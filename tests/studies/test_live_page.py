@@ -163,6 +163,14 @@ def test_a_setting_moves_the_answer_and_keeps_its_bounds(desk):
         ask(desk, "units", design={"settings": {"shim [mm]": 0.06}}, units=256)
 
 
+def test_a_setting_outside_what_it_may_become_is_said_until_it_is_moved_inside(script):
+    script.write_text(STUDY.replace("lower=0.0", "lower=0.02"), encoding="utf-8")
+    desk = desk_of(script)
+    (said,) = ask(desk, "examined", design={})["sentences"]
+    assert said.startswith("shim: 0.01 mm today, not among the 0.02…0.05 mm that it may become")
+    assert ask(desk, "examined", design={"settings": {"shim [mm]": 0.03}})["sentences"] == []
+
+
 def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk):
     design = {"zones": {"housing": 22.22225, "shaft": 41.7}, "settings": {"shim [mm]": 0.0123}}
     found = ask(desk, "units", design=design, units=1024)

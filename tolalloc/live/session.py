@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
 from typing import Any
@@ -152,8 +152,11 @@ class Session:
                 self._known.pop(next(iter(self._known)))
 
     def examined(self, design: LiveDesign) -> list[str]:
-        """Return what a check of the study says of the first random units, such as how many of them are jammed."""
-        return list(self.model(design).examined(self.deviations(design, slice(0, FIRST))).sentences)
+        """Return what a check says of the settings and the first random units, such as how many of them are jammed."""
+        model, known = self.model(design), self.prepared.model.settings
+        chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
+        beyond = [f"{own.sentence}." for own in chosen if own.strays]
+        return [*beyond, *model.examined(self.deviations(design, slice(0, FIRST))).sentences]
 
     @property
     def described(self) -> dict[str, Any]:
