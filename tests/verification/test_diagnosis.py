@@ -345,3 +345,11 @@ def test_one_seed_gives_one_diagnosis(prepared: Prepared, unit: np.ndarray) -> N
     )
     assert np.array_equal(one.deviations, same.deviations)
     assert not np.array_equal(one.deviations, other.deviations)
+
+
+def test_the_tables_at_the_angles_of_a_diagnosis_are_made_once(prepared):
+    """A diagnosis asks for them again and again, with three more for derivatives; else it takes half as long again."""
+    model = prepared.model.kernel.model
+    for angles in (DiagnosisEffort().angles, DiagnosisEffort().angles + 3):
+        asked = 2 * np.pi * np.arange(angles) / angles
+        assert model.tables_at(asked) is model.tables_at(asked.copy())

@@ -27,8 +27,8 @@ from tolalloc.rv.equivalent.solvers.records import (
 from tolalloc.rv.reducer.design import Reducer
 from tolalloc.rv.reducer.series import at_torque
 
-_FEW_ANGLES = 200
-"""Angles up to which tables are kept, 6 MB at most for an RV-20E [-]."""
+_FEW_ANGLES = 256
+"""Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
 
 
 @dataclass(frozen=True)
