@@ -50,19 +50,23 @@ class Setting(NamedFields):
         if self.step <= 0:
             raise InputError.at(place, "step", self.step, "above 0")
 
+    def allows(self, value: float) -> bool:
+        """Return whether a value may be chosen."""
+        return self.lower - _ROUNDING <= value <= self.upper + _ROUNDING
+
     @property
     def strays(self) -> bool:
         """Whether the setting as it is today lies outside what may be chosen."""
-        return not self.lower - _ROUNDING <= self.value <= self.upper + _ROUNDING
+        return not self.allows(self.value)
 
     @property
     def sentence(self) -> str:
         """How it is today, and what it may become."""
         name, _, unit = self.name.rstrip("]").partition(" [")
-        present, range_ = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
+        present, allowed = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
         if self.strays:
-            return f"{present} today, not among the {range_} that it may become; only the table as it is may keep it"
-        return f"{present}; {f'may become {range_}' if self.lower < self.upper else 'locked'}"
+            return f"{present} today, not among the {allowed} that it may become; only the table as it is may keep it"
+        return f"{present}; {f'may become {allowed}' if self.lower < self.upper else 'locked'}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +100,6 @@ def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, 
     for name, value in wanted.items():
         if name not in own:
             raise UnknownNameError.among(place, "setting", name, own)
-        if not (is_number(value) and own[name].lower - _ROUNDING <= value <= own[name].upper + _ROUNDING):
+        if not (is_number(value) and own[name].allows(value)):
             allowed = f"{own[name].lower:g} to {own[name].upper:g}, the bounds of this setting"
             raise InputError.at(place, name, value, allowed)

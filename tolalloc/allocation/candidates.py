@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 from tolalloc.allocation.confirmation import Confirmed
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import GradedAllocation
-from tolalloc.allocation.search import ROUNDING, ZoneAllocation
+from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, answer
 from tolalloc.settings import DrawnAmounts
+
+_ROUNDING = 1e-9
+"""Distance of a cost from its bound, over the bound, up to which it is rounding [-]."""
 
 TABLE, ALIKE, ALONE = "tolerance table as it is", "all zones scaled alike", "tolerances alone"
 FREE, GRADES = "everything free", "grades"
@@ -85,7 +88,7 @@ class Candidates:
         free = min(own.bound for own in self._searches.values())
         bound = self.graded.bound if self.graded else free
         kept = [own.cost for own in self.admitted().values() if own.met]
-        return None if kept and min(kept) < bound * (1 - ROUNDING) else bound
+        return None if kept and min(kept) < bound * (1 - _ROUNDING) else bound
 
     @property
     def _searches(self) -> dict[str, ZoneAllocation]:

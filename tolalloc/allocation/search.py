@@ -13,9 +13,6 @@ from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.exceptions import InputError, SolveError
 
-ROUNDING = 1e-9
-"""Distance of a cost from a bound, over the bound, up to which it is rounding [-]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class ZoneAllocation:

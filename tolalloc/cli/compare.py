@@ -23,5 +23,7 @@ def compare(
     answer = ComparisonAnswer.of(read_run(first), read_run(second))
     if out:
         answer.save(out)
-    own = ((answer.to_frame(name), name) for name in ("rankings", "zones"))
-    tell(answer, as_json, (answer.differing, "answers that differ"), *own)
+    own = [(answer.to_frame(name), name) for name in ("rankings", "zones")]
+    if not answer.differing.empty:
+        own.insert(0, (answer.differing, "answers that differ"))
+    tell(answer, as_json, *own)

@@ -122,7 +122,7 @@ class CurveProblem:
 
     def _equilibria(self, x: Float[np.ndarray, "chunk column"]) -> Equilibria:
         kernel = self.kernel
-        return self.kernel.model.equilibria(kernel.errors(x), kernel.torque, self.readings.carrier_angle)
+        return kernel.model.equilibria(kernel.errors(x), kernel.torque, self.readings.carrier_angle)
 
     def misfit_of(self, deviations: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
         """Return half the sum of squared residuals, each in standard deviations; infinite where a curve failed [-]."""
@@ -141,7 +141,7 @@ class CurveProblem:
         samples, size = numbers.shape
         deviations = self.deviations(numbers)
         kernel, readings = self.kernel, self.readings
-        curve, derivatives = self.kernel.model.rotation_derivatives(
+        curve, derivatives = kernel.model.rotation_derivatives(
             kernel.errors(deviations), kernel.torque, readings.carrier_angle
         )
         columns = [kernel.model.columns.index(name) for name in self.errors.columns]
