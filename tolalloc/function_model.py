@@ -21,6 +21,10 @@ from tolalloc.user_function import UserFunction, identity
 
 _STEP = 1e-4
 """Step of a difference to either side, over the zone, for a function without noise [-]."""
+_AT_ONCE = 2**16
+"""Samples that a function is given at once, so that its arguments stay small [-]."""
+_ASKED = 16
+"""Samples that tell whether a function takes whole columns [-]."""
 _STEP_OF_SIMULATION = 0.02
 """The same for a simulation, whose solver leaves noise [-]."""
 
@@ -168,6 +172,13 @@ class BoundFunction(Model):
         """All outputs: a function is cheap enough for differences where it has no derivatives."""
         return self.source.outputs
 
+    @cached_property
+    def is_fast(self) -> bool:
+        """Whether the function takes whole columns: then a million samples take seconds."""
+        widths = self.steps / self.source.step
+        arguments = self._arguments(np.linspace(-0.5, 0.5, _ASKED)[:, np.newaxis] * widths)
+        return self._user_function(self.source.function, len(self.source.outputs)).takes_columns(arguments)
+
     @property
     def content(self) -> Any:
         """Names, settings, and the function's code."""
@@ -238,11 +249,19 @@ class BoundFunction(Model):
         self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
     ) -> Float[np.ndarray, "sample value"]:
         """Return what a function says of every sample, NaN where it says nothing."""
+        asked = self._user_function(function, count)
+        parts = np.split(x, range(_AT_ONCE, x.shape[0], _AT_ONCE))
+        return np.concatenate([asked(self._arguments(part)) for part in parts])
+
+    def _user_function(self, function: Callable[..., Any], count: int) -> UserFunction:
+        return UserFunction(function=function, values=count, place=f"model {self.name}")
+
+    def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
+        """Return what the function takes: inputs [mm, angles rad], then settings [units of their names]."""
         inputs = np.tile(self.offsets, (x.shape[0], 1))
         inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
         settings = np.tile(self.values, (x.shape[0], 1))
-        asked = UserFunction(function=function, values=count, place=f"model {self.name}")
-        return asked(np.concatenate([inputs * self._per_input, settings], axis=1))
+        return np.concatenate([inputs * self._per_input, settings], axis=1)
 
 
 def model(

@@ -191,6 +191,11 @@ class Model(ABC):
         return ()
 
     @property
+    def is_fast(self) -> bool:
+        """Whether a million units take seconds, as of a function that takes whole arrays."""
+        return False
+
+    @property
     def differentiable(self) -> tuple[str, ...]:
         """Names of the outputs whose exact derivatives cost much more than they do, and are asked of few samples."""
         return ()

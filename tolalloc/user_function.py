@@ -60,6 +60,11 @@ class UserFunction:
             raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
         return np.array(rows).reshape(-1, self.values)
 
+    def takes_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> bool:
+        """Return whether one call with whole columns gives the values of all samples."""
+        with np.errstate(all="ignore"):
+            return self._of_columns(arguments) is not None
+
     def _of_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"] | None:
         """Return the values by one call with whole columns; None unless they can be trusted."""
         samples = arguments.shape[0]

@@ -159,7 +159,7 @@ def test_the_answer_for_programs_is_finite(allocated):
     assert answer["met"] is True
     assert answer["blocking requirement"] is None
     assert all(math.isfinite(number) for number in numbers(answer))
-    assert answer["bound by the local models [cost units]"] <= answer["cost [cost units]"]
+    assert answer["lower bound [cost units]"] <= answer["cost [cost units]"]
     assert {row["source"] for row in answer["drawing"]} == set(KEPT)
     with_unit = [name for name, value in answer.items() if isinstance(value, float)]
     assert all(name.endswith("]") for name in with_unit)

@@ -163,7 +163,7 @@ def test_manifest_and_summary_say_what_was_done(run_folder):
     assert allocated["met"] is True
     assert allocated["saving [-]"] > 0
     assert allocated["yield lower bound, one-sided 95 % [-]"] >= 0.9973
-    assert allocated["bound by the local models [cost units]"] <= allocated["cost [cost units]"] * (1 + 1e-9)
+    assert allocated["lower bound [cost units]"] <= allocated["cost [cost units]"] * (1 + 1e-9)
     assert {own["study hash"] for own in summary.values()} == {manifest["study hash"]}
 
 

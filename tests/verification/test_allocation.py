@@ -53,7 +53,7 @@ def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int =
 class KnownTrial(OutputTrial):
     """A trial whose values are known."""
 
-    design, groups, failed, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95
+    design, groups, failed, confidence, law = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95, None
 
     def __init__(self, values, failed=0, confidence=0.95):
         vars(self).update(values=values, failed=failed, output="x [mm]", confidence=confidence)

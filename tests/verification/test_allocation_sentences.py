@@ -88,40 +88,38 @@ def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
     return replace(allocation, chosen=chosen)
 
 
-def test_the_certificate_says_what_the_dual_bound_says(results):
+def test_the_certificate_says_for_which_drawings_it_holds(results):
     joint = results.free
-    sentence = said(results, "By the local models around the verified design")
-    assert f"that keep the limits cost less than {joint.bound:.2f}, as far as these models hold;" in sentence
-    assert f"it costs {joint.gap:.1%} more" in sentence
-    points = 100 * (joint.inside.cost - joint.optimum.cost) / joint.bound
-    assert points > 0.1
-    assert f"{points:.1f} points of that for the margin of one standard error" in sentence
-    at_once = replace(results, free=replace(joint, inside=joint.optimum))
-    assert "margin" not in said(at_once, "By the local models")
+    below = f"{joint.bound:.2f} ({1 - joint.bound / joint.chosen.cost:.1%} below {joint.chosen.cost:.2f})"
+    assert joint.bound < joint.chosen.cost
+    sentence = said(results, "Lower bound by the local model around the free zones")
+    assert below in sentence
+    assert "95% confidence" in sentence
+    assert "not certified for drawings that differ much" in sentence
     graded = said(results, "On grades")
-    assert f"that keeps the limits costs less than {results.graded.bound:.2f}." in graded
+    assert graded.endswith(f"near by: {results.graded.bound:.2f}.")
 
 
 def test_nothing_is_certified_of_a_miss(results):
     graded = missing(results.graded)
     lost = replace(results, fixed=missing(results.fixed), free=missing(results.free), graded=graded)
     sentences = lost.sentences
-    assert lost.summary["bound by the local models [cost units]"] is None
-    assert not [
-        own for own in sentences if "By the local models" in own or "costs less than" in own or "at the rate of" in own
-    ]
+    assert lost.summary["lower bound [cost units]"] is None
+    assert not [own for own in sentences if "Lower bound" in own or "at the rate of" in own]
     assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
 
 
-def test_the_certificate_table_has_both_rooms(results):
+def test_the_certificate_table_has_bound_and_models(results):
     table = optimality_tables.certificate_table(results).set_index("search")
     row, joint = table.loc["tolerances and modification"], results.free
-    assert row["bound by the models, at the limits [cost units]"] == joint.bound
-    assert row["bound by the models, inside [cost units]"] == joint.inside.bound + joint.locked_cost
-    assert row["bound by the models, inside [cost units]"] > row["bound by the models, at the limits [cost units]"]
-    assert row["cheapest of the models, inside [cost units]"] <= row["verified cost [cost units]"]
-    assert 0 < row["of that for the margin [%]"] <= row["verified cost above the bound at the limits [%]"]
-    assert np.isnan(table.loc["grades", "bound by the models, inside [cost units]"])
+    assert row["lower bound, 95 % [cost units]"] == joint.bound
+    assert row["verified cost above the lower bound [%]"] == pytest.approx(100 * joint.gap)
+    assert row["lower bound holds for"] == "drawings near by"
+    inside, at_limits = (
+        row[f"cheapest by the local model, {where} [cost units]"] for where in ("inside", "at the limits")
+    )
+    assert row["verified cost [cost units]"] >= inside > at_limits
+    assert table.loc["grades", "lower bound holds for"] == "choices near by"
 
 
 def test_the_modification_saves_only_what_the_searches_can_tell(results):

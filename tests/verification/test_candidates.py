@@ -88,9 +88,9 @@ def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
     assert graded.bound <= graded.cost
     undercut = with_table(graded, 0.9 * graded.bound)
     assert undercut.bound is None
-    assert undercut.summary["bound by the local models [cost units]"] is None
-    assert any("bound nothing here" in sentence for sentence in undercut.sentences)
-    assert not any(sentence.startswith("By the local models") for sentence in undercut.sentences)
+    assert undercut.summary["lower bound [cost units]"] is None
+    assert any("so no lower bound is given" in sentence for sentence in undercut.sentences)
+    assert not any(sentence.startswith("Lower bound") for sentence in undercut.sentences)
 
 
 def test_a_miss_is_titled_so(graded):

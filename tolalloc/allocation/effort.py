@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -160,6 +160,23 @@ class AllocationEffort(NamedFields):
     yields: tuple[float, ...] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
     gain: float = 0.005
     error: float = 0.05
+
+    @property
+    def of_fast_model(self) -> AllocationEffort:
+        """The effort for a model that answers for whole arrays, unless its numbers are the user's own.
+
+        Quick or full, so many units then show a drawing kept with the usual error, at hardly any margin.
+        """
+        if self not in (AllocationEffort(), QUICK_ALLOCATION):
+            return self
+        return replace(
+            self,
+            verification_units=2**16,
+            confirmation_units=2**20 if self == QUICK_ALLOCATION else 2**22,
+            search=replace(self.search, steps=AllocationEffort().search.steps),
+            gain=0.002,
+            error=AllocationEffort().error,
+        )
 
     def __post_init__(self) -> None:
         _require_enough(self, "")

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.grade import Ladder, group_ladder
+from tolalloc.allocation.lower_bound import least_cost
 from tolalloc.allocation.program.discrete import DiscreteProblem, DiscreteSolution, Option, feature_options
 from tolalloc.allocation.program.problem import AllocationProblem, Shared, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks
@@ -35,14 +36,15 @@ class GradedAllocation:
     chosen: VerifiedDesign  # The cheapest verified design, or the least violating one
     tried: tuple[VerifiedDesign, ...]  # All verified designs, the free one in this space first
     labels: tuple[str, ...]  # Name of the zone of every group on the drawing
-    # Cheapest choice that the chosen design's local models let keep the limits, with its proven bound; without locked
-    # zones
+    # Cheapest choice that the chosen design's local models let keep the limits; without locked zones
     solution: DiscreteSolution
+
+    least: float  # Lower bound on the cost of every such choice near by, the errors of the units counted [cost units]
 
     @property
     def bound(self) -> float:
-        """Lower bound on the cost of every such choice [cost units]."""
-        return self.solution.bound + self.space.locked_cost
+        """The same with locked zones [cost units]."""
+        return self.least + self.space.locked_cost
 
     @property
     def scales(self) -> dict[str, Float[np.ndarray, " position"]]:
@@ -59,7 +61,12 @@ class GradedAllocation:
         """Return the allocation with another choice, which was found beside those of the search."""
         grid, every = _Grid(self.space, drawn, chosen.design), (*self.tried, *tried)
         return replace(
-            self, chosen=chosen, tried=every, labels=_labels(grid, chosen), solution=_proof(grid, chosen, every)
+            self,
+            chosen=chosen,
+            tried=every,
+            labels=_labels(grid, chosen),
+            solution=_proof(grid, chosen, every),
+            least=_least_cost(grid, chosen),
         )
 
 
@@ -220,6 +227,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         tried=tuple(tried),
         labels=_labels(grid, chosen),
         solution=_proof(grid, chosen, tuple(tried)),
+        least=_least_cost(grid, chosen),
     )
 
 
@@ -262,6 +270,16 @@ def _labels(grid: _Grid, chosen: VerifiedDesign) -> tuple[str, ...]:
         min(options, key=lambda option: abs(option.zone - scale)).label
         for options, scale in zip(grid.options, chosen.scales, strict=True)
     )
+
+
+def _least_cost(grid: _Grid, chosen: VerifiedDesign) -> float:
+    """Return what no choice near by that keeps the limits costs less than [cost units]."""
+
+    def cheapest(stacks: tuple[Stack, ...]) -> tuple[float, Float[np.ndarray, " variable"]] | None:
+        found = grid.problem(stacks).solve()
+        return (found.bound, grid.design(found)) if found else None
+
+    return least_cost(chosen, cheapest)
 
 
 def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteSolution:

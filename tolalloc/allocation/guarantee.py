@@ -8,18 +8,19 @@ from typing import ClassVar, Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.level import Level, order_statistic, reached, side_name, side_scale
+from tolalloc.allocation.level import Level, levels_of_law, order_statistic, reached, side_name, side_scale
+from tolalloc.allocation.limited_sample import LimitedSample
 from tolalloc.allocation.local_model import Side, root_sum_square_stack
-from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
-from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.exceptions import InputError
 from tolalloc.named_fields import NamedFields, is_number
 
 USUAL_YIELD = 0.9973
 """Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
+_BATCHES = 16
+"""Batches of units whose derivatives tell the error of their mean [-]."""
 
 
 @runtime_checkable
@@ -44,18 +45,12 @@ class Guarantee(Protocol):
 class Sampled(Guarantee, Protocol):
     """A guarantee that random units show, with an error."""
 
-    def levels(
-        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
-    ) -> tuple[Level, ...]:
-        """Return what units show of every limited side with one-sided confidence, the upper one first.
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what units show of every limited side with one-sided confidence, the upper one first."""
+        ...
 
-        Parameters
-        ----------
-        values
-            The output of every solved unit, not a number where it has none [unit of the output].
-        units
-            Which of the drawn units they are.
-        """
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least, with one-sided confidence: the other end of `levels`."""
         ...
 
 
@@ -104,15 +99,21 @@ class AtYield(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(*_solved(trial), limits, trial.confidence))
+        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
 
-    def levels(
-        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
-    ) -> tuple[Level, ...]:
-        """Return what units show of every limited side."""
-        excess = np.max([sign * (values - limit) for sign, limit in limits.turned], axis=0)
-        beyond = units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), self.target, confidence)
-        return tuple(order_statistic(values, units, sign, limit, beyond) for sign, limit in limits.turned)
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what units show of every limited side, or what its law does where they keep to it."""
+        if sample.law:
+            return levels_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
+        beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
+        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
+
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least."""
+        if sample.law:
+            return levels_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
+        beyond = sample.units.least_excess(sample.excess, self.target, confidence)
+        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
 
 @dataclass(frozen=True)
@@ -163,14 +164,15 @@ class AtCpk(NamedFields):
 
     def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(*_solved(trial), limits, trial.confidence))
+        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
 
-    def levels(
-        self, values: Float[np.ndarray, " solved"], units: SolvedUnits, limits: Limits, confidence: float
-    ) -> tuple[Level, ...]:
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
         """Return what units show of every limited side."""
-        good = values[units.whatever & np.isfinite(values)]
-        return tuple(self._level(good, sign, limit, confidence) for sign, limit in limits.turned)
+        return tuple(self._level(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
+
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least."""
+        return self.levels(sample, 1 - confidence)
 
     def _level(
         self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
@@ -182,45 +184,64 @@ class AtCpk(NamedFields):
         return Level(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
 
     def _needed(self, turned: Float[np.ndarray, " unit"], confidence: float) -> tuple[float, float]:
-        """Return the estimate whose lower bound is the target, and its standard error [-]."""
+        """Return the estimate whose lower bound is the target, and its standard error [-].
+
+        Below even odds the target is its upper bound.
+        """
         from scipy.stats import kurtosis, norm, skew
 
         z, units = float(norm.ppf(confidence)), turned.size
         lean, tails = float(skew(turned)), float(kurtosis(turned, fisher=False)) - 1
-        # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root.
+        # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root; the smaller one below even odds.
         square, half = units - z**2 * tails / 4, units * self.target + z**2 * lean / 6
         # At even odds both roots are the target, up to rounding.
         root = np.sqrt(max(half**2 - square * (units * self.target**2 - z**2 / 9), 0.0))
-        needed = (half + root) / square
+        needed = (half + np.copysign(root, z)) / square
         variance = (1 / 9 + needed * lean / 3 + needed**2 * tails / 4) / units
         return float(needed), float(np.sqrt(variance))
 
 
-def _solved(trial: OutputTrial) -> tuple[Float[np.ndarray, " solved"], SolvedUnits]:
-    """Return the output of the units of a search, which solves all of them, not a number where one has none."""
-    values = np.append(trial.values, np.full(trial.failed, np.nan))
-    return values, SolvedUnits.all_of(values.size)
-
-
-def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...]) -> tuple[Side, ...]:
+def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...], limits: Limits) -> tuple[Side, ...]:
     """Return the sides of what spreads, each with its local model."""
-    return tuple(
-        Side(
-            sign=level.sign,
-            limit=level.limit,
-            value=level.value,
-            standard_error=level.standard_error,
-            scale=side_scale(trial, level.limit),
-            stack=_root_sum_square(trial, level.sign, level.limit, reached(level, trial.values)),
-        )
-        for level in levels
+    return tuple(_spread_side(trial, level, limits) for level in levels)
+
+
+def _spread_side(trial: OutputTrial, level: Level, limits: Limits) -> Side:
+    value, groups = reached(level, trial.values), trial.groups
+    excess, weights, derivative = value - level.sign * level.limit, *_weights(trial, level.sign, value)
+    gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
+    if trial.law:
+        gradient[:groups] = trial.units.space.by_scale(trial.law.excess_by_zone(limits, excess))
+        batches[:, :groups] = gradient[:groups]
+    return Side(
+        sign=level.sign,
+        limit=level.limit,
+        value=level.value,
+        standard_error=level.standard_error,
+        scale=side_scale(trial, level.limit),
+        stack=root_sum_square_stack(side_name(trial, level.sign), trial.design, excess, gradient, groups),
+        batches=batches,
+        law=trial.law,
     )
 
 
-def _root_sum_square(trial: OutputTrial, sign: int, limit: float, value: float) -> Stack:
-    """Return the local model of mean + spread·σ, which is the turned value; theory page, equation (24)."""
+def _weights(
+    trial: OutputTrial, sign: int, value: float
+) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
+    """Return derivatives of units, and by what each counts in that of mean + spread·σ, the turned value.
+
+    Theory page, equation (24).
+    """
     turned, (known, derivative) = sign * trial.values, trial.derived()
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
     standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
-    gradient = sign * (1.0 + spread * standard) @ derivative / known.size
-    return root_sum_square_stack(side_name(trial, sign), trial.design, value - sign * limit, gradient, trial.groups)
+    return sign * (1.0 + spread * standard), derivative
+
+
+def _batches(
+    weights: Float[np.ndarray, " known"], derivative: Float[np.ndarray, "known variable"]
+) -> Float[np.ndarray, "batch variable"]:
+    """Return the same derivative by batches of units."""
+    parts = min(_BATCHES, weights.size)
+    split = (np.array_split(each, parts) for each in (weights, derivative))
+    return np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])

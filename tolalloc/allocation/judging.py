@@ -22,7 +22,7 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation, Model
+from tolalloc.models import Evaluation, Model, Response
 
 AS_GOOD_AS = 4
 """Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""
@@ -32,6 +32,8 @@ _WHATEVER = 0.6
 """Share of the solved units that are solved whatever is predicted of them, to protect from a wrong prediction [-]."""
 _MOST_DRAWN = 8
 """Drawn units for each solved one, at most; more would hardly place the limit better [-]."""
+_AT_ONCE = 2**17
+"""Units that are solved at once, so that the deviations of millions are never all kept [-]."""
 _EVEN_ODDS = 0.5
 
 
@@ -88,7 +90,7 @@ class Judge:
         giving up adds no error, and counts as not confirmed.
         """
         with one_blas_thread():  # the same units are near for any number of threads
-            screen = Screen.of(design)
+            screen = None if self.model.is_fast or len(design.laws) == len(design.checks) else Screen.of(design)
         final, seeds, found = (
             self._drawn(design, screen, attempt),
             self.seeds.child(f"attempt {attempt.number}"),
@@ -149,18 +151,48 @@ class Judge:
         """Return fresh units with all outputs that are limited, the leading one first."""
         space, response = design.space, self.model.at(design.settings).reading(tuple(design.outputs))
         experiment = Experiment(response, space.errors, space.zones(design.design), seeds)
-        rows, near, first = list[Float[np.ndarray, "unit column"]](), list[Bool[np.ndarray, " unit"]](), 0
+        rows, near, found, first = list[Float[np.ndarray, "unit column"]](), list[Bool[np.ndarray, " unit"]](), [], 0
         for uniform in seeds.uniform_chunks(drawn.units, len(space.errors.columns)):
             x = experiment.deviations(space.errors.standard_values(uniform))
             is_near = screen(x) if screen else np.ones(len(x), bool)
+            # Those solved whatever is predicted come first.
             kept = is_near | (first + np.arange(len(x)) < drawn.whatever)
             rows.append(x[kept])
             near.append(is_near[kept])
             first += len(x)
-        # Those solved whatever was predicted come first.
-        whatever = np.arange(sum(map(len, rows))) < drawn.whatever
-        units = SolvedUnits(drawn=drawn, near=np.concatenate(near), whatever=whatever)
-        return _Solved(evaluation=response(np.concatenate(rows)), units=units)
+            if sum(map(len, rows)) >= _AT_ONCE:
+                found.append(_answered(design, response, np.concatenate(rows)))
+                rows.clear()
+        found += [_answered(design, response, np.concatenate(rows))] if rows else []
+        evaluation, off_the_law = _together(found)
+        whatever = np.arange(evaluation.status.size) < drawn.whatever
+        return _Solved(
+            evaluation=evaluation,
+            units=SolvedUnits(drawn=drawn, near=np.concatenate(near), whatever=whatever),
+            leaving={name: int(np.count_nonzero(own[whatever])) for name, own in off_the_law.items()},
+        )
+
+
+_OffTheLaw = dict[str, Bool[np.ndarray, " unit"]]
+"""Output with a law → which units do not keep to it."""
+
+
+def _answered(
+    design: VerifiedDesign, response: Response, x: Float[np.ndarray, "unit column"]
+) -> tuple[Evaluation, _OffTheLaw]:
+    """Return what the model says of units, and which of them leave the laws of linear outputs."""
+    evaluation, laws = response(x), design.laws
+    values = dict(zip(design.outputs, _known(evaluation).T, strict=True))
+    return evaluation, {output: law.function.leaves(x, values[output]) for output, law in laws.items()}
+
+
+def _together(parts: list[tuple[Evaluation, _OffTheLaw]]) -> tuple[Evaluation, _OffTheLaw]:
+    """Return several parts of the units as one."""
+    evaluation = Evaluation(
+        values=np.concatenate([own.values for own, _ in parts]),
+        status=np.concatenate([own.status for own, _ in parts]),
+    )
+    return evaluation, {name: np.concatenate([own[name] for _, own in parts]) for name in parts[0][1]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +201,7 @@ class _Solved:
 
     evaluation: Evaluation
     units: SolvedUnits
+    leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
 
     @property
     def plain(self) -> Evaluation:
@@ -212,17 +245,22 @@ def _joined(solved: list[_Solved]) -> _Solved:
             near=np.concatenate([own.units.near for own in solved]),
             whatever=np.concatenate([own.units.whatever for own in solved]),
         ),
+        leaving={output: sum(own.leaving[output] for own in solved) for output in solved[0].leaving},
     )
+
+
+def _known(evaluation: Evaluation) -> Float[np.ndarray, "solved output"]:
+    """Return the outputs, not a number where a unit has none."""
+    return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
 
 
 def _judged(
     design: VerifiedDesign, solved: _Solved, confidence: float, redraw: Callable[[], Float[np.ndarray, "unit column"]]
 ) -> VerifiedDesign:
     """Return a design with what other units say of it; its derivatives stay those of its search."""
-    evaluation, units = solved.evaluation, solved.units
-    found = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
-    values = dict(zip(design.outputs, found.T, strict=True))
-    confirming = Confirming(units=units, outputs=values)
+    units = solved.units
+    values = dict(zip(design.outputs, _known(solved.evaluation).T, strict=True))
+    confirming = Confirming(units=units, outputs=values, leaving=solved.leaving)
     checks = _checks(design, confirming, confidence)
     kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
     return replace(
@@ -241,7 +279,7 @@ def _checks(design: VerifiedDesign, confirming: Confirming, confidence: float) -
     """Return how a design stands against its requirements; what needs no units stands as it was."""
     found = []
     for check in design.checks:
-        levels = _levels(check, confirming, confidence)
+        levels = _levels(design, check, confirming, confidence)
         values = check.requirement.read(confirming.outputs)
         good = values[np.isfinite(values)]
         sides = zip(check.sides, levels, strict=True) if levels else ()
@@ -250,13 +288,12 @@ def _checks(design: VerifiedDesign, confirming: Confirming, confidence: float) -
     return tuple(found)
 
 
-def _levels(check: Check, confirming: Confirming, confidence: float) -> tuple[Level, ...]:
+def _levels(design: VerifiedDesign, check: Check, confirming: Confirming, confidence: float) -> tuple[Level, ...]:
     """Return what units say of a guarantee, nothing where units are not what shows it."""
-    requirement = check.requirement
-    if not isinstance(requirement.guarantee, Sampled):
+    guarantee = check.requirement.guarantee
+    if not isinstance(guarantee, Sampled):
         return ()
-    values = requirement.read(confirming.outputs)
-    return requirement.guarantee.levels(values, confirming.units, requirement.limits, confidence)
+    return guarantee.levels(confirming.sample(check, design.laws.get(check.requirement.output)), confidence)
 
 
 def _moved(side: Side, level: Level, design: VerifiedDesign, value: float) -> Side:
@@ -271,5 +308,5 @@ def _is_hopeless(design: VerifiedDesign) -> bool:
     confirming = design.confirming
     if confirming is None:
         return False
-    levels = [level for check in design.checks for level in _levels(check, confirming, _EVEN_ODDS)]
+    levels = [level for check in design.checks for level in _levels(design, check, confirming, _EVEN_ODDS)]
     return any(np.isfinite(level.value) and level.excess > level.standard_error for level in levels)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.program.problem import Stack
+from tolalloc.capability.linear_function import LinearLaw
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +23,9 @@ class Side:
     # output]
     scale: float
     stack: Stack  # Convex model around the design; its load less its budget is the predicted `excess`
+    # Derivative of the excess by every variable, by batches of units that tell its error; none where it has no error
+    batches: Float[np.ndarray, "batch variable"] | None = None
+    law: LinearLaw | None = None  # Law of the output, where it is linear: the model's derivatives are its own
 
     @property
     def excess(self) -> float:

@@ -7,6 +7,9 @@ import numpy as np
 from tolalloc.allocation.programs import SETTLED
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 
+_LEAST_RISE = 1e-6
+"""What all zones together take of a limit is at least so much of the limit, where it is what a step divides by [-]."""
+
 
 def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
     """Return designs with all zones scaled alike, the first the tolerance table as it is.
@@ -34,5 +37,5 @@ def _factor(tried: VerifiedDesign) -> float:
     for side in tried.sides:
         rise = side.load_of_zones(tried.design)
         budget = -float(side.predicted(tried.design)) - side.standard_error
-        factors.append(1 + budget / max(rise, 0.1 * side.scale))
+        factors.append(1 + budget / max(rise, _LEAST_RISE * side.scale))
     return float(np.clip(min(factors), 0.4, 2.5))

@@ -7,6 +7,7 @@ from functools import cached_property
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import SearchEffort
+from tolalloc.allocation.lower_bound import LowerBound, lower_bound
 from tolalloc.allocation.program import process_choice
 from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.trust_region import aimed, kept_stacks, step_to_optimum
@@ -60,10 +61,15 @@ class ZoneAllocation:
             inside=cheapest_by_models(chosen.space, chosen, every, margin=1.0),
         )
 
+    @cached_property
+    def lower_bound(self) -> LowerBound:
+        """What no design costs less than, by what is known around the chosen one."""
+        return lower_bound(self.chosen)
+
     @property
     def bound(self) -> float:
-        """Lower bound on the cost of every design that the models let keep the limits, without the solver's word."""
-        return self.optimum.bound + self.locked_cost
+        """The same as a number [cost units]."""
+        return self.lower_bound.cost
 
     @property
     def gap(self) -> float:

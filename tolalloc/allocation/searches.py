@@ -80,7 +80,8 @@ class DrawingQuestion:
     def search_confidence(self) -> float:
         """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
         shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
-        return confidence_of_fewer(shown, units, AS_GOOD_AS * self.effort.confirmation_units)
+        good_as = 1 if self.model.is_fast else AS_GOOD_AS
+        return confidence_of_fewer(shown, units, good_as * self.effort.confirmation_units)
 
     def seeds(self, name: str) -> SeedTree:
         """Return the node of the seed tree of a stage."""

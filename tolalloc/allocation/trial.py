@@ -10,8 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.limited_sample import LimitedSample
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
+from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.differences import derived
 from tolalloc.drawings.seeds import SeedTree
@@ -34,6 +38,7 @@ class FreshUnits:
     outputs: tuple[str, ...]  # Names of the outputs, the leading one first
     # Units, the first ones, over which derivatives that the model does not know exactly are averaged [-]
     slope_units: int
+    derivative_units: int  # Units, the first ones, whose exact derivatives are asked for [-]
     seeds: SeedTree  # Node of the seed tree, for the worst units
 
     @cached_property
@@ -43,9 +48,14 @@ class FreshUnits:
 
     @cached_property
     def exact(self) -> dict[str, SettingDerivatives]:
-        """Outputs whose derivatives the model knows exactly."""
-        model = self._at(self.design)
-        return {output: model.derivatives(output, self.x) for output in self.outputs if output in model.exact}
+        """Outputs whose derivatives the model knows exactly, of the first units."""
+        model, first = self._at(self.design), self.x[: self.derivative_units]
+        return {output: model.derivatives(output, first) for output in self.outputs if output in model.exact}
+
+    @cached_property
+    def _rest(self) -> Evaluation:
+        """The same outputs of the other units."""
+        return self._at(self.design).reading(tuple(self.exact))(self.x[self.derivative_units :])
 
     @cached_property
     def _others(self) -> tuple[str, ...]:
@@ -60,7 +70,14 @@ class FreshUnits:
     def evaluation(self, output: str) -> Evaluation:
         """Return one output of every unit."""
         if output in self.exact:
-            return self.exact[output].evaluation
+            first = self.exact[output].evaluation
+            if self.derivative_units >= len(self.standard):
+                return first
+            own = self._rest.values[:, [[*self.exact].index(output)]]
+            return Evaluation(
+                values=np.concatenate([first.values[:, :1], own]),
+                status=np.concatenate([first.status, self._rest.status]),
+            )
         at = self._others.index(output)
         return Evaluation(values=self.others.values[:, [at]], status=self.others.status)
 
@@ -68,15 +85,22 @@ class FreshUnits:
     def samples(self) -> tuple[MonteCarlo, ...]:
         """The units with every output that is solved on its own, the leading one first."""
         first = MonteCarlo(x=self.x, evaluation=self.evaluation(self.outputs[0]))
-        rest = [MonteCarlo(x=self.x, evaluation=self.exact[name].evaluation) for name in [*self.exact][1:]]
+        rest = [MonteCarlo(x=self.x, evaluation=self.evaluation(name)) for name in [*self.exact][1:]]
         others = [MonteCarlo(x=self.x, evaluation=self.others)] if self._others else []
         return (first, *rest, *others)
 
     def values(self, output: str) -> Float[np.ndarray, " unit"]:
         """Return one output of every unit, NaN where it has none [unit of the output]."""
-        evaluation = self.exact[output].evaluation if output in self.exact else self.others
-        at = 0 if output in self.exact else self._others.index(output)
-        return np.where(evaluation.good, evaluation.values[:, at], np.nan)
+        evaluation = self.evaluation(output)
+        return np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+
+    @cached_property
+    def laws(self) -> dict[str, LinearLaw]:
+        """Law of every output that is linear in the deviations, as far as these units tell."""
+        errors, zones = self.space.errors, self.space.zones(self.design)
+        planes = {output: LinearFunction.through(self.x, self.values(output)) for output in self.outputs}
+        found = {output: LinearLaw.of(plane, errors, zones) for output, plane in planes.items() if plane}
+        return {output: law for output, law in found.items() if law}
 
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
         """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m]."""
@@ -103,15 +127,13 @@ class FreshUnits:
         return values[known], slopes[known]
 
     def of_first(self, output: str) -> tuple[Float[np.ndarray, " first"], Float[np.ndarray, "first variable"]]:
-        """Return an output of the first units and its derivative by every variable, NaN where a unit has none.
-
-        These are all units where the model knows the derivatives exactly.
-        """
+        """Return an output of the first units and its derivative by every variable, NaN where a unit has none."""
         if output not in self.exact:
             values, slopes = self._others_of_first
             at = self._others.index(output)
             return values[:, at], slopes[:, at]
-        return self.values(output), self._slopes(self.exact[output])
+        slopes = self._slopes(self.exact[output])
+        return self.values(output)[: len(slopes)], slopes
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output].
@@ -223,6 +245,21 @@ class OutputTrial:
     def failed(self) -> int:
         """Number of units without a usable answer [-]."""
         return len(self.units.standard) - self.values.size
+
+    def sample(self, limits: Limits) -> LimitedSample:
+        """Return what the units say of limits; a search solves all of them."""
+        values = np.append(self.values, np.full(self.failed, np.nan))
+        return LimitedSample(
+            values=values,
+            units=SolvedUnits.all_of(values.size),
+            limits=limits,
+            law=self.law,
+        )
+
+    @property
+    def law(self) -> LinearLaw | None:
+        """The law of the output, where it is linear."""
+        return self.units.laws.get(self.output)
 
     def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return the output of some units and its derivative by every variable [unit of the output]."""

@@ -35,13 +35,13 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     -----
     The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
     each limit. Where the models of the last design also explain other ones near by, their mean deviation from them
-    corrects them, each with the weight of its units, so the noise averages out.
+    corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
     """
     similar = [item for item in tried if _is_similar(item, last)]
     stacks = []
     for at, side in enumerate(last.sides):
         found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        deviation = float(np.average(found, weights=[item.achieved.units for item in similar]))
+        deviation = 0.0 if side.law else float(np.average(found, weights=[item.achieved.units for item in similar]))
         stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
     return tuple(stacks)
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.limited_sample import LimitedSample
 from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check, Requirement
 from tolalloc.allocation.trial import FreshUnits
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
@@ -20,6 +22,8 @@ from tolalloc.models import Model
 
 SLOPE_UNITS = 1024
 """Units that differences of an output without derivatives are averaged over [-]."""
+DERIVATIVE_UNITS = 6144
+"""Units of a fast model whose derivatives are averaged: they cost as much as many values, and err less [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +32,18 @@ class Confirming:
 
     units: SolvedUnits  # Which of the drawn units they are
     outputs: dict[str, Float[np.ndarray, " solved"]]  # Outputs of all requirements, NaN where a unit has none
+    leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
+
+    def sample(self, check: Check, law: LinearLaw | None) -> LimitedSample:
+        """Return what the units say of a requirement whose output has a law, or has none."""
+        requirement = check.requirement
+        return LimitedSample(
+            values=requirement.read(self.outputs),
+            units=self.units,
+            limits=requirement.limits,
+            law=law,
+            leaving=self.leaving.get(requirement.output, 0),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +89,13 @@ class VerifiedDesign:
     def sides(self) -> tuple[Side, ...]:
         """All limited sides of all requirements."""
         return tuple(side for check in self.checks for side in check.sides)
+
+    @property
+    def laws(self) -> dict[str, LinearLaw]:
+        """Law of every limited output that is linear, at the zones of the design."""
+        zones = self.space.zones(self.design)
+        found = {check.requirement.output: check.sides[0].law for check in self.checks}
+        return {output: replace(law, zones=zones) for output, law in found.items() if law}
 
     @property
     def blocking(self) -> Check:
@@ -149,6 +172,7 @@ class Verifier:
             standard=errors.standard_values(np.concatenate([*seeds.uniform_chunks(self.units, len(errors.columns))])),
             outputs=outputs,
             slope_units=self.slope_units,
+            derivative_units=min(self.units, DERIVATIVE_UNITS) if self.model.is_fast else self.units,
             seeds=seeds,
         )
         for sample in fresh.samples:
@@ -181,10 +205,11 @@ def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"]
     leading = fresh.outputs[0]
     if leading not in fresh.exact:
         return None
-    values = fresh.samples[0].values
-    standard = (values - values.mean()) / values.std()
+    exact, values = fresh.exact[leading].evaluation, fresh.samples[0].values
+    known = exact.values[exact.good, 0]
+    standard = (known - known.mean()) / known.std()
     spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
-    return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / values.size)
+    return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / known.size)
 
 
 def answer(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:

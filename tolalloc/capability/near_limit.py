@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.monte_carlo import CONFIDENCE, Yield, allowed_rejections, proportion
 
@@ -148,6 +148,14 @@ def _crossing(is_beyond: Callable[[float], bool]) -> float:
     return high
 
 
+def largest_first(values: Float[np.ndarray, " value"], count: int) -> Int[np.ndarray, " largest"]:
+    """Return where so many of the largest values stand, the largest first; without sorting all of many."""
+    if count >= values.size:
+        return np.argsort(-values, kind="stable")
+    found = np.sort(np.argpartition(-values, count)[:count])
+    return np.asarray(found[np.argsort(-values[found], kind="stable")])
+
+
 @dataclass(frozen=True, kw_only=True)
 class SolvedUnits:
     """Which of the solved units were predicted to be near a limit, and which were solved whatever was predicted."""
@@ -192,10 +200,29 @@ class SolvedUnits:
         allowed = self.drawn.allowed(target, confidence)
         if allowed < 0:
             return np.inf
-        furthest = np.argsort(-excess, kind="stable")
+        furthest = largest_first(excess, int(allowed) + 2)  # each of them weighs one or more
         weights = self.weights if confidence > _EVEN_ODDS else self.stand_for
         left_out = int(np.searchsorted(np.cumsum(weights[furthest]), allowed, side="right"))
-        return float(excess[furthest[min(left_out, excess.size - 1)]])
+        return float(excess[furthest[min(left_out, furthest.size - 1)]])
+
+    def least_excess(self, excess: Float[np.ndarray, " solved"], target: float, confidence: float) -> float:
+        """Return how far the share that a yield leaves lies beyond a limit at least [unit of the excess].
+
+        With one-sided confidence; the parameters are those of `kept_excess`, whose other end it is. Far units may only
+        add to what lies beyond, so the near ones alone bound it; plain units where too few are near.
+
+        Returns
+        -------
+        float
+            Minus infinity where so few units say nothing.
+        """
+        from scipy.stats import binom
+
+        for units, own in ((self.drawn.units, self.near), (self.drawn.whatever, self.whatever)):
+            passed = int(binom.ppf(confidence, units, 1.0 - target))
+            if np.count_nonzero(own) > passed:
+                return float(excess[own][largest_first(excess[own], passed + 1)[-1]])
+        return -np.inf
 
     def yield_of(self, is_beyond: Bool[np.ndarray, " solved"]) -> Yield:
         """Return the yield if these units lie beyond the limits."""

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 GLOSSARY = {
     "capability, Cp": "Zone over six standard deviations of what the process makes; 1 leaves 0.27 % outside.",
     "Cpk": "Distance of the mean from the nearer limit over three standard deviations.",
-    "certificate": "Lower bound on the cost of every drawing that the models allow, shown without trust in a solver.",
+    "certificate": "Lower bound on the cost of drawings that keep the limits: of all drawings where every limited "
+    "value is linear in the deviations, of drawings near by otherwise; errors of units counted, no solver trusted.",
     "confidence": "Share of repeated studies in which such a statement is true.",
     "first-order index": "Share of the variance that one error makes alone (Sobol's S1).",
     "fresh units": "Random units that no search has used, on which the drawing is judged.",

@@ -102,7 +102,7 @@ def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
 
 def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...]:
     """Return the units of searches, confirmation, fronts, what-ifs and shares, all with the limited outputs."""
-    effort, model, errors = prepared.study.effort.allocation, prepared.model, prepared.errors
+    effort, model, errors = prepared.allocation_effort, prepared.model, prepared.errors
     settings = len(prepared.space.settings)
     searches = 2 if question.fixed_first and settings else 1
     outputs = tuple(dict.fromkeys(own.output for own in prepared.requirements))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tolalloc.allocation.cost.process_costs_file import currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
 from tolalloc.allocation.requirement import JointRequirement, Requirement
 from tolalloc.chunks import Mapper
@@ -113,6 +114,12 @@ class Prepared:
         else:
             processes = load_process_costs(costs, self.errors.sources) if costs else {}
         return DesignSpace(errors=self.errors, settings=self.model.settings, processes=processes)
+
+    @property
+    def allocation_effort(self) -> AllocationEffort:
+        """How much an allocation may compute, more units for a model that answers for whole arrays."""
+        effort = self.study.effort.allocation
+        return effort.of_fast_model if self.model.is_fast else effort
 
     @cached_property
     def currency(self) -> str:

@@ -180,7 +180,7 @@ class Allocation(Question):
             model=prepared.model.observed(record.observe),
             space=prepared.space,
             requirements=prepared.requirements_with_joint,
-            effort=study.effort.allocation,
+            effort=prepared.allocation_effort,
             seed=study.seed,
             largest_failed_share=study.largest_failed_share,
             grades=self.grades,

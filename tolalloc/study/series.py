@@ -23,7 +23,7 @@ from tolalloc.study.study import Study
 
 _NUMBERS = {
     "cost [cost units]": "cost [cost units]",
-    "bound by the local models [cost units]": "bound [cost units]",
+    "lower bound [cost units]": "bound [cost units]",
     "yield [-]": "yield [-]",
 }
 """Number in a summary → column of the table."""

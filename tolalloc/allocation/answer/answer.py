@@ -135,8 +135,16 @@ class AllocationAnswer(Answer):
 
     @property
     def bound(self) -> float | None:
-        """Least cost of a drawing by the convex models around the verified ones; none if one undercuts it."""
+        """Lower bound on the cost of drawings that keep the limits; none if a verified one undercuts it [cost units].
+
+        For drawings near the verified ones, unless `bound_is_certified`; `LowerBound` says with which confidence.
+        """
         return self.candidates.bound
+
+    @property
+    def bound_is_certified(self) -> bool:
+        """Whether the bound holds for every allowed drawing with free zones rather than near the verified ones."""
+        return self.candidates.unrestricted.lower_bound.certified
 
     @cached_property
     def drawn_sources(self) -> tuple[Source, ...]:
@@ -232,7 +240,8 @@ class AllocationAnswer(Answer):
             "cost of tolerances alone [cost units]": self.fixed.chosen.cost if self.fixed else None,
             f"cost of {self.free_label} [cost units]": free.chosen.cost,
             "cost on grades [cost units]": self.graded.chosen.cost if self.graded else None,
-            "bound by the local models [cost units]": self.bound if self.met else None,
+            "lower bound [cost units]": self.bound if self.met else None,
+            "lower bound holds for every drawing": self.bound_is_certified if self.met else None,
             "gap of the convex program [-]": free.optimum.gap,
             "blocking requirement": None if self.met else chosen.blocking.requirement.output,
             "beyond its limit by [unit of the output]": None if self.met else -chosen.blocking.slack,

@@ -19,34 +19,33 @@ if TYPE_CHECKING:
 
 
 def certificate_table(answer: AllocationAnswer) -> pd.DataFrame:
-    """Return cost, bound by the models and gap of every search, at the limits and one standard error inside them."""
+    """Return cost, lower bound and the cheapest design of the local model of every search."""
     rows: list[dict[str, object]] = [
         {
             "search": label,
             "verified cost [cost units]": found.chosen.cost,
-            "cheapest of the models, at the limits [cost units]": found.optimum.cost + found.locked_cost,
-            "bound by the models, at the limits [cost units]": found.bound,
-            "gap of the program, at the limits [-]": found.optimum.gap,
-            "cheapest of the models, inside [cost units]": found.inside.cost + found.locked_cost,
-            "bound by the models, inside [cost units]": found.inside.bound + found.locked_cost,
-            "gap of the program, inside [-]": found.inside.gap,
-            "verified cost above the bound at the limits [%]": found.gap * 100,
-            "of that for the margin [%]": (found.inside.cost - found.optimum.cost) / found.bound * 100,
+            "lower bound, 95 % [cost units]": found.bound,
+            "verified cost above the lower bound [%]": found.gap * 100,
+            "lower bound holds for": "every drawing" if found.lower_bound.certified else "drawings near by",
+            "cheapest by the local model, at the limits [cost units]": found.optimum.cost + found.locked_cost,
+            "cheapest by the local model, inside [cost units]": found.inside.cost + found.locked_cost,
+            "gap of the convex program [-]": found.optimum.gap,
             "designs verified [-]": len(found.tried),
         }
         for label, found in searches(answer).items()
     ]
     graded = answer.graded
     if graded:
-        locked = graded.space.locked_cost
         rows.append(
             {
                 "search": GRADES,
                 "verified cost [cost units]": graded.chosen.cost,
-                "cheapest of the models, at the limits [cost units]": graded.solution.cost + locked,
-                "bound by the models, at the limits [cost units]": graded.bound,
-                "gap of the program, at the limits [-]": graded.solution.gap,
-                "verified cost above the bound at the limits [%]": (graded.chosen.cost / graded.bound - 1) * 100,
+                "lower bound, 95 % [cost units]": graded.bound,
+                "verified cost above the lower bound [%]": (graded.chosen.cost / graded.bound - 1) * 100,
+                "lower bound holds for": "choices near by",
+                "cheapest by the local model, at the limits [cost units]": graded.solution.cost
+                + graded.space.locked_cost,
+                "gap of the convex program [-]": graded.solution.gap,
                 "designs verified [-]": len(graded.tried),
             }
         )
@@ -83,7 +82,7 @@ def front_tables(answer: AllocationAnswer, fronts: Fronts) -> tuple[tuple[str, p
         {
             f"{short(answer.leading)} limit [{unit}]": fronts.exact.limits,
             "cost [cost units]": fronts.exact.cost,
-            "bound by the models [cost units]": fronts.exact.bound,
+            "proven for the local model [cost units]": fronts.exact.bound,
         }
     )
     found = pd.DataFrame({kept: searched.quantile, f"on the kernel [{unit}]": searched.on_kernel})

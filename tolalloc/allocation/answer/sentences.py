@@ -20,6 +20,7 @@ _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
 _WRITTEN = 0.005
 """Difference of two amounts below which they are written alike, in their units."""
+_EVEN_ODDS = 0.5
 _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
@@ -35,10 +36,10 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     found += [*other_amounts(answer), _cost(answer)]  # the first three stand in the headline of a report
     if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of the units keep the limits of all requirements at once.")
-    if answer.met and not answer.header.quick:
+    if answer.met and answer.error < _EVEN_ODDS:
         found.append(
-            "No search has seen these units; over all designs that were tried on such units, the probability that a "
-            f"design is called met that misses a limit is at most {answer.error:.0%}."
+            "The search has not seen these units. "
+            f"The chance that this method accepts any drawing that violates a limit is at most {answer.error:.0%}."
         )
     return (
         *found,
@@ -143,28 +144,30 @@ def _certificate(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
     if answer.met and answer.bound is None:
         return (
-            "A verified drawing costs less than the local models around the others hold for possible, so they bound "
-            "nothing here.",
+            "One verified drawing costs less than the lower bound by the local model around another one, so no lower "
+            "bound is given.",
         )
     return (*_free(answer), *_graded(answer))
 
 
 def _free(answer: AllocationAnswer) -> tuple[str, ...]:
-    """Return how far the models let free zones be from optimal; nothing where they miss a limit."""
+    """Return how far free zones can be from optimal; nothing where they miss a limit."""
     found = answer.candidates.unrestricted
     if not found.chosen.met:
         return ()
-    of_margin = (found.inside.cost - found.optimum.cost) / found.bound
-    margin = (
-        f", {100 * of_margin:.1f} points of that for the margin of one standard error that the search keeps"
-        if of_margin >= _SAME_COST
-        else ""
-    )
-    design = "the verified design with free zones" if answer.graded else "the verified design"
-    chosen = f"zones, processes and {answer.model.settings_word}" if answer.space.settings else "zones and processes"
+    bound, cost = found.lower_bound, found.chosen.cost
+    below = f"{max(1 - bound.cost / cost, 0.0):.1%} below {cost:.2f}"
+    zones = "free zones" if answer.graded else "zones"
+    if bound.certified:
+        return (
+            f"No drawing with {zones} inside their ranges that keeps the limits costs less than {bound.cost:.2f} "
+            f"({below}), with {bound.confidence:.0%} confidence: every limited value is linear in the deviations, as "
+            "far as all units tell.",
+        )
     return (
-        f"By the local models around {design}, no {chosen} that keep the limits cost less than {found.bound:.2f}, as "
-        f"far as these models hold; it costs {max(found.gap, 0.0):.1%} more ({found.chosen.cost:.2f}){margin}.",
+        f"Lower bound by the local model around the {'free zones' if answer.graded else 'drawing'}: {bound.cost:.2f} "
+        f"({below}), with {bound.confidence:.0%} confidence against the errors of the units. The model is not "
+        "certified for drawings that differ much from this one.",
     )
 
 
@@ -179,8 +182,8 @@ def _graded(answer: AllocationAnswer) -> tuple[str, ...]:
     if not graded.chosen.met:
         return (f"{cost}, and a limit is missed.",)
     return (
-        f"{cost}; by the local models around it no choice of grades, processes and rounded amounts near by that keeps "
-        f"the limits costs less than {graded.bound:.2f}.",
+        f"{cost}. Lower bound by the local model for grades, processes and rounded amounts near by: "
+        f"{graded.bound:.2f}.",
     )
 
 
@@ -199,10 +202,7 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
         return (f"Nothing cheaper was found with the {freed} free: as it is, the zones cost {alone.cost:.2f}.",)
     doubt = ""
     if max(answer.fixed.gap, answer.free.gap) > saving:
-        doubt = (
-            f" (the search for tolerances alone ended {max(answer.fixed.gap, 0.0):.1%} above the bound of its models, "
-            "so up to that much of it may be the search)"
-        )
+        doubt = "; this is less than what the lower bounds leave open, so it may be due to the search"
     return (
         f"The {freed} saves {alone.cost - joint.cost:.2f} cost units ({saving:.1%}) against tolerances alone "
         f"({alone.cost:.2f}){doubt}.",
@@ -264,10 +264,9 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what a reader must know before acting on the answer."""
     chosen, found = answer.chosen, []
     if answer.header.quick:
-        found += [
-            QUICK_RUN,
-            "A quick run calls a design just at its limits met at even odds.",
-        ]
+        found.append(QUICK_RUN)
+    if answer.error >= _EVEN_ODDS:
+        found.append("A quick run accepts a design that lies exactly on a limit half of the time.")
     if not answer.met:
         found.append(
             "No design was verified to meet all limits. This is the least violating one; what blocks is "
