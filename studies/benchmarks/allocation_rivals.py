@@ -20,6 +20,7 @@ from pymoo.core.termination import NoTermination
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import group_options, with_shared_zones
 from tolalloc.allocation.guarantee import Sampled
+from tolalloc.allocation.limited_sample import LimitedSample
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
@@ -63,7 +64,8 @@ class Compared:
             if not isinstance(own.guarantee, Sampled):
                 raise TypeError(f"{own.output}: units do not show {own.guarantee.words}")
             of_output = values[:, outputs.index(own.output)]
-            for level in own.guarantee.levels(of_output, units, own.limits, _EVEN_ODDS):
+            sample = LimitedSample(values=of_output, units=units, limits=own.limits)
+            for level in own.guarantee.levels(sample, _EVEN_ODDS):
                 excess = max(excess, level.excess / abs(level.limit))
         return float(excess)
 

@@ -84,6 +84,7 @@ def bind(
         torque=carried,
         columns=errors.columns,
         fixed=dict(sorted(fixed.items())),  # in one order in every process, as kept units ask for
+        offsets={name: errors.fixed[name] for name in reducer.modification.deviations if errors.fixed.get(name)},
     )
     if unit:
         unit.errors(model.columns, reducer.modification.deviations)
@@ -138,12 +139,17 @@ _LARGEST_MISMATCH = 0.01
 
 def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
-    radius = reducer.cycloid_stage.pin_radius
-    meant = {"pin.diameter": ("twice its pin radius", 2 * radius), "housing.groove.radius": ("its pin radius", radius)}
+    radius, own = reducer.cycloid_stage.pin_radius, reducer.modification
+    meant = {
+        "pin.diameter": ("twice its pin radius", 2 * radius),
+        "housing.groove.radius": ("its pin radius", radius),
+        "modification.equidistant": ("its equidistant amount", own.equidistant),
+        "modification.shift": ("its shift amount", own.shift),
+    }
     sentences = []
     for source in errors.sources:
         what, size = meant.get(source.name, ("", 0.0))
-        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * size:
+        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * abs(size):
             sentences.append(
                 f"The table and the reducer differ: nominal of {source.name} is {source.nominal / MILLIMETRE:g} mm in "
                 f"{errors.table or 'the table'}, and {what} is {size / MILLIMETRE:g} mm in reducer {reducer.name}; the "

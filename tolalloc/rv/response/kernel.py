@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -45,7 +45,10 @@ class KernelResponse:
     model: EquivalentModel  # The equivalent model
     torque: float  # Torque on the carrier, negative resists the rotation [N·m]
     columns: tuple[str, ...]  # Columns that vary, in the order of X
-    fixed: Mapping[str, float]  # Value of every other column of the model [m]
+    # Value of every other column of the model, and what a column that varies varies around: the amounts of the
+    # modification, which a row of a tolerance table lets deviate [m]
+    fixed: Mapping[str, float]
+    offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m]
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.chunks.map_chunks`
 
@@ -123,10 +126,15 @@ class KernelResponse:
         return extremes, replace(found, by_error=found.by_error[:, asked])
 
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
-        """Return the varied columns and the fixed ones together, in the order of the model [m]."""
+        """Return the varied columns and the fixed ones together, in the order of the model [m].
+
+        A column that is both deviates from its fixed value.
+        """
         where = {name: at for at, name in enumerate(self.model.columns)}
         errors = np.zeros((x.shape[0], len(where)))
         for name, value in self.fixed.items():
             errors[:, where[name]] = value
-        errors[:, [where[name] for name in self.columns]] = x
+        errors[:, [where[name] for name in self.columns]] += x
+        for name, offset in self.offsets.items():
+            errors[:, where[name]] += offset
         return errors
