@@ -70,6 +70,13 @@ class ReducerModel(Model):
         return self.kernel.model.reducer
 
     @property
+    def reducer_in_force(self) -> Reducer:
+        """The same with the modification that leaves the clearances in force."""
+        if self.clearances is None:
+            return self.reducer
+        return replace(self.reducer, modification=self.modification(np.array(self.clearances)))
+
+    @property
     def name(self) -> str:
         """The reducer's."""
         return self.reducer.name
@@ -235,8 +242,8 @@ class ReducerModel(Model):
 
     @cached_property
     def _exact_loop(self) -> HysteresisLoop:
-        """Torque against twist of the unit whose parts are exact and whose teeth are modified as they stand."""
-        return exact_loop(self.reducer)
+        """Torque against twist of the unit whose parts are exact and whose teeth have the modification in force."""
+        return exact_loop(self.reducer_in_force)
 
     @property
     def drawn_amounts(self) -> DrawnAmounts:
@@ -393,5 +400,5 @@ class ReducerModel(Model):
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
-        _, far = against_catalogue(self.reducer, self._exact_loop)
+        _, far = against_catalogue(self.reducer, self.at(values)._exact_loop)
         return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)

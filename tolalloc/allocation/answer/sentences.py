@@ -50,7 +50,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         *_prices(answer),
         *_good_unit(answer),
         *_settled(answer),
-        *answer.model.remarks,
+        *answer.model.at(chosen.settings).remarks,
     )
 
 

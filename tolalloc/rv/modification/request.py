@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.report.answer import Header
 from tolalloc.rv.cycloid.clearance import LARGE
+from tolalloc.rv.equivalent.perfect import exact_loop
 from tolalloc.rv.modification.answer import ModificationAnswer
 from tolalloc.rv.modification.problem import ModificationProblem, reference
 from tolalloc.rv.modification.residual_gap import residual_gap
@@ -93,7 +94,8 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
             f"constraints; the nearest miss them by {best.violation / MICROMETRE:.3g} µm; "
             "allowed is less radial clearance."
         )
-    contact = contact_answer(replace(reducer, modification=best.modification), torque)
+    modified = replace(reducer, modification=best.modification)
+    contact = contact_answer(modified, torque)
     return ModificationAnswer(
         header=Header(
             name=request.method,
@@ -104,7 +106,24 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
         problem=problem,
         best=best,
         contact=contact,
-        cautions=_cautions(request, reducer),
+        cautions=(
+            *_cautions(request, reducer),
+            *_beyond_catalogue(modified, contact.assessment.clearance.backlash),
+        ),
+    )
+
+
+def _beyond_catalogue(modified: Reducer, backlash: float) -> tuple[str, ...]:
+    """Return whether exact parts with the amounts have more play than the catalogue allows, backlash in [rad]."""
+    if modified.catalogue is None:
+        return ()
+    lost, allowed = float(exact_loop(modified).lost_motion[-1]), modified.catalogue.lost_motion
+    if max(lost, backlash) <= allowed:
+        return ()
+    return (
+        f"Exact parts with these amounts have {backlash / ARCMINUTE:.2g}′ of backlash and {lost / ARCMINUTE:.2g}′ of "
+        f"lost motion; the catalogue of {modified.name} allows {allowed / ARCMINUTE:.2g}′ of lost motion. Ask for less "
+        "radial clearance or rotation before setting a drawing.",
     )
 
 
