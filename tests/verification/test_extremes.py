@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.random_reducers import random_case
 from tests.random_units import random_units
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.solvers.records import AngleSearch
@@ -73,3 +74,23 @@ def test_extremes_have_the_same_bits_alone_and_among_others(name, generator):
         apart = model.extremes(units[rows], -1.0)
         for values in ("largest", "smallest", "carrier_angle", "remaining", "solves", "status"):
             np.testing.assert_array_equal(getattr(apart, values), getattr(together, values)[rows])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_extremes_of_one_unit_are_exact_at_their_angles_and_say_what_finer_ones_add(seed):
+    """Two units of a random reducer: 201 angles around either extreme, solved with tables of their own."""
+    case = random_case(seed)
+    model = EquivalentModel(case.reducer, orders=case.orders)
+    for unit in case.units:
+        errors = np.array([[unit[name] for name in model.columns]])
+        found = model.exact_extremes(errors, case.torque)
+        if found.status[0]:
+            continue
+        at = model.equilibria(errors, case.torque, found.carrier_angle[0]).transmission_error[0]
+        assert (found.largest[0], found.smallest[0]) == tuple(at)
+        around = np.linspace(-2, 2, 201) * model.search.node_step * 0.5**model.search.levels
+        angles = found.carrier_angle[0][:, np.newaxis] + around * model.search.nodes_per_coarse
+        curves = [model.equilibria(errors, case.torque, own).transmission_error for own in angles]
+        added = curves[0].max() - found.largest[0] + found.smallest[0] - curves[1].min()
+        assert 0 <= added <= found.remaining[0] + 1e-12

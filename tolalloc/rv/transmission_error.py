@@ -304,7 +304,7 @@ def transmission_error(
     """
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
-    equilibria, extremes = model.equilibria(errors, torque), model.extremes(errors, torque)
+    equilibria, extremes = model.equilibria(errors, torque), model.exact_extremes(errors, torque)
     worst = Status(max(extremes.status[0], equilibria.status.max()))
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")

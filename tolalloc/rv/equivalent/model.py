@@ -162,6 +162,24 @@ class EquivalentModel:
         """Return the refined extremes of every sample over one output turn."""
         return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
 
+    def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Extremes:
+        """Return the extremes of one unit, solved again at their angles with tables of just these angles.
+
+        The search interpolates its tables; what that changed of either extreme is added to what finer angles may add.
+        """
+        found = self.extremes(errors, torque)
+        exact = self.equilibria(errors, torque, found.carrier_angle[0])
+        largest, smallest = exact.transmission_error[:, 0], exact.transmission_error[:, 1]
+        changed = np.abs(largest - found.largest) + np.abs(smallest - found.smallest)
+        return replace(
+            found,
+            largest=largest,
+            smallest=smallest,
+            remaining=found.remaining + changed,
+            status=np.maximum(found.status, exact.status.max(axis=1)),
+            residual=np.maximum(found.residual, exact.residual.max(axis=1)),
+        )
+
     def extremes_and_curve(
         self, errors: Float[np.ndarray, "sample column"], torque: float
     ) -> tuple[Extremes, Float[np.ndarray, "sample angle"]]:
