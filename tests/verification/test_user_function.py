@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import math
 import subprocess
 import sys
@@ -147,3 +148,214 @@ def test_a_function_that_holds_itself_ends():
         return recursive(n - 1) if n else 0
 
     assert identity(recursive)
+
+
+def changes_its_arguments(a, b):
+    a /= 2
+    b /= 2
+    return a + b
+
+
+def returns_its_input(a, b):
+    return a
+
+
+def keeps_a_view(a, b):
+    whole = np.stack(np.broadcast_arrays(a, b))
+    kept = whole[:1]
+    whole += 1.0
+    return kept[0] - 1.0
+
+
+def clears_after_use(a, b):
+    found = a - b
+    if np.ndim(a):
+        a[:] = 0.0
+        b.fill(np.nan)
+    return found
+
+
+def sorts_in_place(a, b):
+    found = np.hypot(a, b)
+    if np.ndim(a):
+        a.sort()
+    return found
+
+
+def swaps_its_arguments(a, b):
+    if np.ndim(a):
+        kept = a.copy()
+        a[:], b[:] = b, kept
+        return b - a
+    return a - b
+
+
+@pytest.mark.parametrize(
+    ("function", "meant"),
+    [
+        (changes_its_arguments, lambda a, b: (a + b) / 2),
+        (returns_its_input, lambda a, b: a),
+        (keeps_a_view, lambda a, b: a),
+        (clears_after_use, lambda a, b: a - b),
+        (sorts_in_place, np.hypot),
+        (swaps_its_arguments, lambda a, b: a - b),
+    ],
+    ids=lambda own: getattr(own, "__name__", ""),
+)
+def test_a_function_may_change_what_it_is_given(generator, function, meant):
+    given = generator.normal(size=(20, 2))
+    kept = given.copy()
+    for _ in range(2):
+        assert returned(function, 1, given)[:, 0] == pytest.approx(meant(*kept.T), rel=1e-12)
+    np.testing.assert_array_equal(given, kept)
+
+
+def masked(a):
+    return np.ma.masked_less(a, 0.0) * 2
+
+
+def masked_alone(a):
+    return np.ma.masked if np.ndim(a) == 0 and a < 0 else np.ma.masked_array(2 * a, np.asarray(a) < 0)
+
+
+def first_of_roots(a):
+    return 2 * np.roots([1.0, 0.0, -float(a)]).max() ** 2
+
+
+@pytest.mark.parametrize("function", [masked, masked_alone, first_of_roots], ids=lambda own: own.__name__)
+def test_a_masked_value_is_no_answer_and_a_complex_one_without_imaginary_part_is_one(function):
+    given = np.array([[4.0], [1.0], [9.0], [0.25]])
+    assert returned(function, 1, given)[:, 0] == pytest.approx(2 * given[:, 0])
+    if function is not first_of_roots:
+        given[2] = -9.0
+        assert returned(function, 1, given)[:, 0] == pytest.approx([8.0, 2.0, np.nan, 0.5], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda a: np.emath.sqrt(a),
+        lambda a: a**0.5 if np.ndim(a) == 0 else np.emath.sqrt(a),
+        lambda a: complex(a) ** 0.5,
+        lambda a: [(a + 0j) ** 0.5],
+        lambda a: np.array((a + 0j) ** 0.5, dtype=object),
+    ],
+    ids=["emath", "Python and NumPy", "Python", "listed", "objects"],
+)
+def test_an_imaginary_part_is_no_answer_whoever_computed_it(function):
+    given = np.array([[4.0], [-1.0], [9.0]])
+    assert returned(function, 1, given)[:, 0] == pytest.approx([2.0, np.nan, 3.0], nan_ok=True)
+
+
+def counting():
+    calls = []
+
+    def drifts(a):
+        calls.append(1)
+        return a + 1e-3 * len(calls)
+
+    return drifts
+
+
+def remembering():
+    last = [0.0]
+
+    def lags(a):
+        before, last[0] = last[0], float(np.max(a))
+        return a + before
+
+    return lags
+
+
+def noisy():
+    generator = np.random.default_rng(1)
+    return lambda a: a + 1e-3 * generator.normal(size=np.shape(a))
+
+
+def wearing():
+    coefficients = np.array([1.0, 2.0])
+
+    def wears(a):
+        coefficients[1] *= 1.01
+        return coefficients[0] + coefficients[1] * a
+
+    return wears
+
+
+def alternating():
+    turn = [1.0]
+
+    def turns(a):
+        turn[0] = -turn[0]
+        return turn[0] * float(a)
+
+    return turns
+
+
+@pytest.mark.parametrize("made", [counting, remembering, noisy, wearing, alternating], ids=lambda own: own.__name__)
+def test_a_function_that_answers_differently_the_second_time_is_refused(made):
+    given = np.linspace(1.0, 2.0, 12)[:, np.newaxis]
+    with pytest.raises(InputError, match=r"model m: the function answers differently when it is asked the same again"):
+        returned(made(), 1, given)
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda a: np.float32(a), "float32"),
+        (lambda a: np.asarray(a).astype(np.float16), "float16"),
+        (lambda a: np.complex64(a), "complex64"),
+        (lambda a: str(a), "str"),
+        (lambda a: np.datetime64("2026-01-01"), "datetime64"),
+    ],
+    ids=["float32", "float16", "complex64", "text", "time"],
+)
+def test_what_is_no_number_of_64_bits_is_refused_by_name(function, said):
+    with pytest.raises(InputError, match=f"the function returned {said}"):
+        returned(function, 1, np.array([[1.0], [2.0]]))
+
+
+def test_whole_numbers_and_truth_values_are_numbers():
+    given = np.array([[1.2], [2.7], [0.1]])
+    assert returned(lambda a: np.asarray(a).astype(int), 1, given)[:, 0].tolist() == [1.0, 2.0, 0.0]
+    assert returned(lambda a: np.asarray(a) > 1.0, 1, given)[:, 0].tolist() == [1.0, 1.0, 0.0]
+
+
+LARGE = "import numpy as np\nT = np.ones(9000)\n{}\ndef f(x):\n    return T.sum() * x\n"
+INSIDE = "def g(x):\n    return {}\ndef f(x):\n    return [g(y) for y in (x,)][0]\n"
+
+
+def with_helper(folder, text: str):
+    """Return the function of a helper module that is read anew."""
+    (folder / "helper_of_test.py").write_text(text, encoding="utf-8")
+    sys.modules.pop("helper_of_test", None)
+    importlib.invalidate_caches()
+    return importlib.import_module("helper_of_test")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("def f(x):\n    return 2 * x\n", "def f(x):\n    return 3 * x\n"),
+        ("K = 2.0\ndef f(x):\n    return K * x\n", "K = 3.0\ndef f(x):\n    return K * x\n"),
+        (LARGE.format(""), LARGE.format("T[4500] = 2")),
+        (
+            "class C:\n    k = 2\ndef f(x):\n    return C.k * x\n",
+            "class C:\n    k = 3\ndef f(x):\n    return C.k * x\n",
+        ),
+        (INSIDE.format("x"), INSIDE.format("2 * x")),
+    ],
+    ids=["code", "number", "large array", "class", "inside a comprehension"],
+)
+def test_what_a_helper_module_holds_tells_a_function(tmp_path, monkeypatch, before, after):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    found = []
+    for text in (before, after, before):
+        module = with_helper(tmp_path, text)
+        called, named = (lambda x, f=module.f: f(x)), module
+        through = eval("lambda x: named.f(x)", {"named": named})
+        found.append((repr(identity(called)), repr(identity(through))))
+    for way in (0, 1):
+        assert found[0][way] != found[1][way]
+        assert found[0][way] == found[2][way]

@@ -10,7 +10,7 @@ import typer
 from tolalloc.cli.console import AsJson, announce_compilation, note, tell
 from tolalloc.cli.progress import shown_progress
 from tolalloc.cli.run import Fresh, Quick, Scheduler, solvers
-from tolalloc.cli.study_script import load_study
+from tolalloc.cli.study_script import load_script
 from tolalloc.exceptions import StoppedError
 
 
@@ -29,8 +29,8 @@ def series(
     from tolalloc.study.finished_run import common_currency
     from tolalloc.study.series import SeriesAnswer, run_series
 
-    studies = [load_study(script) for script in scripts]
-    asked = [study.with_effort("quick") if quick else study for study in studies]
+    read = [load_script(script) for script in scripts]
+    asked = [(own.study.with_effort("quick") if quick else own.study, own.in_force) for own in read]
     announce_compilation()
     members = []
     try:

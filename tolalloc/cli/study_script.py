@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from tolalloc.exceptions import InputError, TolallocError
@@ -13,8 +18,66 @@ if TYPE_CHECKING:
     from tolalloc.study.study import Study
 
 
+@dataclass(frozen=True, kw_only=True)
+class StudyScript:
+    """A study with the modules that stand beside its script, which no other study shall see."""
+
+    study: Study
+    folder: Path
+    modules: dict[str, ModuleType]  # Those that were read from the folder
+
+    @contextmanager
+    def in_force(self) -> Iterator[None]:
+        """Let imports find the modules of this study and none of another one."""
+        with _modules_beside(self.folder, self.modules):
+            yield
+
+
+@contextmanager
+def _modules_beside(folder: Path, modules: dict[str, ModuleType]) -> Iterator[None]:
+    """Let imports look into a folder first; what they read from it is kept in the modules, and gone afterwards."""
+    hidden = {
+        name: module for name, module in list(sys.modules.items()) if name in modules or _belongs_to(name, folder)
+    }
+    for name in hidden:
+        del sys.modules[name]
+    sys.modules.update(modules)
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        modules.update({name: module for name, module in list(sys.modules.items()) if _belongs_to(name, folder)})
+        for name in modules:
+            sys.modules.pop(name, None)
+        sys.modules.update(hidden)
+
+
+def _belongs_to(name: str, folder: Path) -> bool:
+    """Return whether the folder has the module of this name, wherever the one in memory was read."""
+    from tolalloc.user_function import is_users_module
+
+    top = folder / name.partition(".")[0]
+    return name != "__main__" and (top.with_suffix(".py").is_file() or top.is_dir()) and is_users_module(name)
+
+
 def load_study(path: Path) -> Study:
-    """Return the study that a script defines, without running its main part.
+    """Return the study that a script defines, and leave its modules in force for the rest of the process.
+
+    Raises
+    ------
+    InputError
+        The script is missing, broken, or defines no study.
+    """
+    script = load_script(path)
+    sys.path.insert(0, str(script.folder))
+    sys.modules.update(script.modules)
+    return script.study
+
+
+def load_script(path: Path) -> StudyScript:
+    """Return the study that a script defines, without running its main part, and the modules that it reads.
 
     The script becomes a module of its own name, so that worker processes find its functions.
 
@@ -34,11 +97,9 @@ def load_study(path: Path) -> Study:
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: is no Python script; a study is a file that ends in .py.")
     module = importlib.util.module_from_spec(spec)
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
-    sys.modules[name] = module
+    modules = {name: module}
     try:
-        with relative_to(folder):
+        with relative_to(folder), _modules_beside(folder, modules):
             spec.loader.exec_module(module)
     except TolallocError as error:
         raise InputError(f"{path}: {error}") from None
@@ -49,7 +110,7 @@ def load_study(path: Path) -> Study:
     study = getattr(module, "study", None)
     if not isinstance(study, Study):
         raise InputError(f"{path}: study is {type(study).__name__}; a script must define study = Study(...).")
-    return study
+    return StudyScript(study=study, folder=folder, modules=modules)
 
 
 def _broken(path: Path, error: Exception) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+import numpy as np
+
 BINS = 60
 """Bins of a histogram [-]."""
 _SHOWN = 0.005
@@ -79,8 +81,9 @@ class Figure:
     @property
     def bins(self) -> tuple[float, float]:
         """Start and width of the bins that all histograms of the figure share [unit of x]."""
-        values = [float(value) for item in self.series if item.kind == "histogram" for value in item.x]
-        low, high = min(values, default=0.0), max(values, default=1.0)
+        values = [np.asarray(item.x, float) for item in self.series if item.kind == "histogram" and len(item.x)]
+        low = min((float(own.min()) for own in values), default=0.0)
+        high = max((float(own.max()) for own in values), default=1.0)
         return low, (high - low) / BINS or 1.0
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,10 @@ _NUMBERS = {
     "yield [-]": "yield [-]",
 }
 """Number in a summary → column of the table."""
+
+
+InForce = Callable[[], AbstractContextManager[None]]
+"""Lets imports find the modules of one study, and none of another one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,11 +115,18 @@ class SeriesAnswer(Answer):
 
 
 def run_series(
-    studies: Iterable[Study], folder: Path, progress: Progress, *, fresh: bool = False, solved_by: Mapper = map
+    studies: Iterable[tuple[Study, InForce]],
+    folder: Path,
+    progress: Progress,
+    *,
+    fresh: bool = False,
+    solved_by: Mapper = map,
 ) -> Iterator[Member]:
     """Yield what becomes of every study, each in a folder of its own name; one that is finished there is read.
 
-    A study that cannot be run does not stop the others. All share the solved units beside their folders.
+    A study is run while its own modules are in force. Where its folder holds an answer to an earlier state of the
+    study, or it is to begin afresh, the new answer has the next numbered folder. A study that cannot be run does not
+    stop the others. All share the solved units beside their folders.
 
     Raises
     ------
@@ -123,19 +134,30 @@ def run_series(
         Two studies of one name.
     """
     known = tuple(studies)
-    names = [study.name for study in known]
+    names = [study.name for study, _ in known]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"series: {names.count(name)} studies are named {name!r}; each needs a name of its own.")
-    for study in known:
-        own = folder / study.name
-        finished = None if fresh else _finished(study, own)
+    for study, in_force in known:
+        *earlier, own = _folders(folder / study.name)
         try:
-            if finished is None:
-                run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
-            yield Member(name=study.name, folder=own, found=finished or read_run(own))
+            with in_force():
+                current = () if fresh else (found for own in reversed(earlier) if (found := _finished(study, own)))
+                finished = next(iter(current), None)
+                if finished is None:
+                    run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
+            found = finished or read_run(own)
+            yield Member(name=study.name, folder=found.folder, found=found)
         except TolallocError as error:
             yield Member(name=study.name, folder=own, fault=str(error))
+
+
+def _folders(first: Path) -> list[Path]:
+    """Return the folders that a study has, and last the next one that is new or empty."""
+    found = [first]
+    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
+        found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
+    return found
 
 
 def _finished(study: Study, folder: Path) -> FinishedRun | None:
