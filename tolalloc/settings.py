@@ -81,11 +81,14 @@ class DrawnAmounts:
         Change of every amount (row) with every setting (column) [unit of the amount per unit of the setting].
     steps
         Step of every amount on a drawing [unit of the amount].
+    convention
+        What their signs mean, a sentence without its full stop; empty where a name says all.
     """
 
     names: tuple[str, ...]
     by_setting: Float[np.ndarray, "amount setting"]
     steps: tuple[float, ...]
+    convention: str = ""
 
 
 def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, float]) -> None:

@@ -27,6 +27,7 @@ from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
 from tolalloc.drawings.callouts import callout
+from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 
 UM = 1e-6
@@ -280,8 +281,10 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
         assert own.grade == after.grade
         assert own.group == before.group
         assert (own.minimum, own.maximum) == pytest.approx((before.minimum, before.maximum))
-    paid_once = sum(made.change for made in results.drawn.made_by(results.chosen.design).values())
-    assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost - paid_once, rel=1e-9)
+    assert sum(own.cost for own in read) == pytest.approx(results.chosen.cost, rel=1e-9)
+    assert stated_settings(folder / "allocation.csv") == dict(
+        zip(results.space.shared.names, results.chosen.settings.tolist(), strict=True)
+    )
     if results.graded:
         np.testing.assert_allclose([own.zone for own in read], [own.zone for own in results.drawn_sources], rtol=1e-12)
         assert {own.grade for own in read if own.zone} == set(results.graded.labels)
@@ -291,6 +294,7 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
 def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
     write_drawing(priced, tmp_path)
     read = load_tolerance_table(tmp_path / "allocation.csv")
+    assert sum(own.cost for own in read) == pytest.approx(priced.chosen.cost, rel=1e-9)
     again = load_process_costs("rv20e", read)
     made = priced.drawn.made_by(priced.chosen.design)
     assert set(again) == set(made)
@@ -301,7 +305,7 @@ def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
             continue
         chosen = made[before.name]
         assert after.process == chosen.name
-        assert after.cost == pytest.approx(drawn.cost - chosen.change, rel=1e-9)
+        assert after.cost == pytest.approx(drawn.cost, rel=1e-9)  # leaving the old process is a part of it
         assert {own.name for own in again[before.name]} == {own.name for own in priced.space.processes[before.name]}
         for own in again[before.name]:
             was = next(process for process in priced.space.processes[before.name] if process.name == own.name)

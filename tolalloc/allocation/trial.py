@@ -102,6 +102,20 @@ class FreshUnits:
         found = {output: LinearLaw.of(plane, errors, zones) for output, plane in planes.items() if plane}
         return {output: law for output, law in found.items() if law}
 
+    def sensitivity(self, output: str) -> Float[np.ndarray, " source"]:
+        """Return the change of an output with a deviation of each source; one of `exact` [unit of the output per m].
+
+        Of a source of one column the mean over the units, with its sign; of any other the root mean square length of
+        the gradient, as its direction is random. An angle counts as the length that its zone limits.
+        """
+        found, errors = self.exact[output], self.space.errors
+        by_column, slopes = found.by_column[found.evaluation.good], []
+        for source, own in zip(errors.active, errors.columns_of_source, strict=False):
+            part = by_column[:, own] / source.lever
+            alone = part.shape[1] == 1
+            slopes.append(float(part.mean()) if alone else float(np.sqrt((part**2).sum(axis=1).mean())))
+        return np.array(slopes)
+
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
         """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m]."""
         return self._by_zone(self.exact[output])

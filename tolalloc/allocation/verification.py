@@ -66,6 +66,8 @@ class VerifiedDesign:
     # Change of the leading output's value with the zone of each active source; none where the model does not know its
     # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
+    # Change of the leading output with a deviation of each active source, `FreshUnits.sensitivity`; none as above
+    by_deviation: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
     confirming: Confirming | None = None  # What judged it last, none if that were the units of its search
     confirmed: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
@@ -196,6 +198,7 @@ class Verifier:
             joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
             outputs=values,
             by_zone=_by_zone(fresh, checks[0].sides[0].value),
+            by_deviation=fresh.sensitivity(fresh.outputs[0]) if fresh.outputs[0] in fresh.exact else None,
             confidence=self.confidence,
         )
 

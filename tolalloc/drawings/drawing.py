@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,13 @@ from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.table_file import read_table_file, require_columns, split_header, stated_currency
+from tolalloc.drawings.table_file import (
+    read_table_file,
+    require_columns,
+    split_header,
+    stated_currency,
+    stated_settings,
+)
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
 from tolalloc.exceptions import InputError
 from tolalloc.file_content import is_file
@@ -42,6 +48,9 @@ class Drawing:
         What a reader of its table must know, such as which rows were hidden.
     currency
         What its costs are in, such as EUR, which reports then say; empty where they are cost units.
+    settings
+        Settings of the model that belong to it, such as the clearances of a tooth modification: a study of the drawing
+        takes them instead of its model's own [units of their names].
     """
 
     name: str
@@ -49,6 +58,7 @@ class Drawing:
     costs: Costs = ""
     notes: tuple[str, ...] = ()
     currency: str = ""
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of_rows(
@@ -128,7 +138,8 @@ class Drawing:
         path = found_from_here(table)
         notes, currency = _read_beside(path)
         changed = self.with_sources(load_tolerance_table(path), str(table))
-        return replace(changed, notes=notes, currency=currency or self.currency)
+        settings = stated_settings(path) if path.suffix else {}
+        return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
         """Return the drawing with some of its sources changed, with the same correlations and process costs."""
@@ -201,13 +212,15 @@ def load_drawing(
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
-    notes, currency = _read_beside(found_from_here(beside(folder, table)), sheet)
+    path = found_from_here(beside(folder, table))
+    notes, currency = _read_beside(path, sheet)
     return Drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation, table=str(table)),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=notes,
         currency=currency,
+        settings=stated_settings(path) if path.suffix else {},
     )
 
 

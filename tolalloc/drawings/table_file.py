@@ -157,6 +157,39 @@ def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[Number
     ]
 
 
+_SETTING = re.compile(r"#\s*setting:\s*(.+?)\s*=\s*(\S+?)\s*[;,\t]*")
+
+
+def setting_line(name: str, value: float) -> str:
+    """Return the comment by which a table states a setting that belongs to the drawing, as `stated_settings` reads."""
+    return f"# setting: {name} = {value!r}"
+
+
+def stated_settings(path: Path) -> dict[str, float]:
+    """Return the settings that comments of a CSV file state, units in their names; a workbook states none.
+
+    Raises
+    ------
+    InputError
+        A setting that is stated twice, or whose value is no number.
+    """
+    found: dict[str, float] = {}
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        return found
+    for number, line in enumerate(read_text(path, "a table in CSV").splitlines(), start=1):
+        match = _SETTING.fullmatch(line.strip().strip('"'))
+        if match is None:
+            continue
+        place, (name, text) = f"{path}, row {number}", match.groups()
+        if name in found:
+            raise InputError(f"{place}: setting {name!r} is stated twice; each has one value.")
+        try:
+            found[name] = plain_number(text)
+        except ValueError:
+            raise InputError.at(place, f"setting {name}", text, "a number with a decimal point") from None
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class TextTable:
     """Cells of a CSV file as text, numbers with a decimal point."""

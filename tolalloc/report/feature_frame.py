@@ -123,7 +123,7 @@ def svg_of(frame: FeatureFrame) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {label} {style}>{"".join(parts)}</svg>'
 
 
-def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path) -> None:
+def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path, notes: Sequence[str] = ()) -> None:
     """Write named frames below each other into a DXF file in millimetres, one block each, to be put on a drawing.
 
     Parameters
@@ -132,6 +132,8 @@ def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path) -> None
         Name of the dimension and its frame.
     path
         File, replaced if it is there.
+    notes
+        What must be said beside the frames, a line each below them, such as the tooth modification.
     """
     from ezdxf import units
     from ezdxf.enums import TextEntityAlignment
@@ -158,4 +160,7 @@ def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path) -> None
         at = -1.6 * tall * number
         space.add_blockref(block.name, (60.0, at))
         space.add_text(name, height=tall / 2, dxfattribs={"style": "FRAME"}).set_placement((0.0, at + tall / 4))
+    for below, note in enumerate(notes, start=len(frames)):
+        at = -1.6 * tall * below
+        space.add_text(note, height=tall / 2, dxfattribs={"style": "FRAME"}).set_placement((0.0, at + tall / 4))
     drawing.saveas(path)

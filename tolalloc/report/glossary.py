@@ -19,7 +19,9 @@ GLOSSARY = {
     "order": "Number of waves per turn of the output.",
     "peak-to-peak": "Largest minus smallest transmission error over one turn of the output.",
     "quantile": "Value that a stated share of the units keeps.",
-    "Sens": "Change of the output per micrometre.",
+    "kept value per zone": "Change of what is compared with the limit per micrometre of the zone.",
+    "Sens": "Change of the output per micrometre of deviation: with its sign for a single dimension, root mean square "
+    "for a position or a wave, whose direction is random.",
     "surrogate": "Fast stand-in for the model, used only with its error stated.",
     "total index": "Share of the variance in which an error has a part, alone or with others (Sobol's ST).",
     "transmission error": "Angle by which the output is ahead of or behind the ideal ratio.",

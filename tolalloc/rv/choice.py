@@ -198,7 +198,9 @@ class ReducerChoice:
         clearances = {name: value for name, value in settings.items() if name != TORQUE}
         own, stage = self.reducer.modification, self.reducer.cycloid_stage
         present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
-        known = clearance_settings(present, (self.flank_clearance, self.radial_clearance))
+        # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
+        anywhere = (-_FARTHEST, _FARTHEST)
+        known = clearance_settings(present, (self.flank_clearance or anywhere, self.radial_clearance or anywhere))
         require_settings(place, known, clearances)
         if not clearances:
             return replace(self, torque=torque)

@@ -22,7 +22,7 @@ from tolalloc.rv.cycloid.clearance import linear_model_warnings
 from tolalloc.rv.equivalent.answers import OUTCOMES, Equilibria
 from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.reducer.design import Modification, Reducer
+from tolalloc.rv.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
 from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
 from tolalloc.rv.reducer.unit_file import BuiltUnit
 from tolalloc.rv.response.kernel import KernelResponse
@@ -249,7 +249,12 @@ class ReducerModel(Model):
     def drawn_amounts(self) -> DrawnAmounts:
         """Equidistant and shift amount of the modification, in steps of half a micrometre."""
         names = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
-        return DrawnAmounts(names=names, by_setting=self._modification_by_clearance, steps=(0.5, 0.5))
+        return DrawnAmounts(
+            names=names,
+            by_setting=self._modification_by_clearance,
+            steps=(0.5, 0.5),
+            convention=MODIFICATION_CONVENTION,
+        )
 
     def illustrated(self, units: Units) -> tuple[Section, ...]:
         """Return curves and orders of units, and how exact teeth carry the rated torque."""

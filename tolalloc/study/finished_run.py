@@ -111,7 +111,7 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
-    text = _text(path, "a table in CSV")
+    text = "".join(line for line in StringIO(_text(path, "a table in CSV")) if not line.startswith("#"))
     try:
         found = pd.read_csv(StringIO(text)).rename(columns=_with_cost_units)
     except ValueError as error:

@@ -56,7 +56,14 @@ class Prepared:
         """The model at the sources of the drawing."""
         if self.study.model is None:
             raise InputError(f"{self.place}: model is missing; give ta.reducer(...) or ta.model(...).")
-        return self.study.model.bound(self.errors, self.place).mapped(self.mapper)
+        settings = self.study.drawing.settings if self.study.drawing else {}
+        source = self.study.model
+        if settings:
+            try:
+                source = source.set_to(settings)
+            except (InputError, UnknownNameError) as error:
+                raise type(error)(f"{self.place}: the drawing {self.errors.table} states settings: {error}") from None
+        return source.bound(self.errors, self.place).mapped(self.mapper)
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:

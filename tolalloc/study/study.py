@@ -212,6 +212,9 @@ class Study(NamedFields):
             raise InputError(f"study {self.name}: it has no {'drawing' if self.model else 'model'} that could change.")
         model = self.model.set_to(settings) if settings else self.model
         other = self.drawing.with_table(drawing) if isinstance(drawing, str | Path) else drawing
+        # What is asked for counts before what the drawing states.
+        asked = {name: value for name, value in (settings or {}).items() if name in other.settings}
+        other = replace(other, settings={**other.settings, **asked})
         return replace(self, model=model, drawing=other, name=name or self.name)
 
     def ask(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 from openpyxl import load_workbook
 from openpyxl.styles import Border, Font, PatternFill, Side
 from openpyxl.utils import get_column_letter
@@ -20,6 +21,8 @@ from openpyxl.worksheet.worksheet import Worksheet
 
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
+from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
+from tolalloc.allocation.local_model import Side as LimitedSide
 from tolalloc.drawings.callouts import callout
 from tolalloc.report.currency import in_currency
 from tolalloc.report.excel import Formula, keep_values
@@ -88,9 +91,22 @@ def _drawing(answer: AllocationAnswer) -> pd.DataFrame:
         }
     )
     for side in chosen.sides:
-        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case
+        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + _relief(
+            side
+        )
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
     return table
+
+
+def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
+    """Return by how much a larger zone relieves a limit, 0 or below, which no model of a search rewards.
+
+    Per scale and to first order [unit of the output]; a smaller zone then costs as much.
+    """
+    groups = side.stack.worst_case.size
+    if side.batches is None:
+        return np.zeros(groups)
+    return np.asarray(np.minimum(side.batches[:, :groups].mean(axis=0), 0.0))
 
 
 def _steps(frame: FeatureFrame) -> int:
@@ -110,6 +126,7 @@ def _requirements(answer: AllocationAnswer) -> pd.DataFrame:
             f"+SQRT(SUMPRODUCT((drawing!${spreads}${first}:${spreads}${last}*{scales})^2))"
         )
         rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.budget
+        rest -= float(_relief(side) @ chosen.scales)
         upper, row = side.sign > 0, _FIRST + at
         predicted = float(side.limit + side.sign * side.predicted(chosen.design))
         kept = "yes" if side.sign * predicted <= side.sign * side.limit else "no"
@@ -142,7 +159,15 @@ def style_calculator(answer: AllocationAnswer, path: Path) -> None:
     sheets = {name: in_currency(own, answer.header.currency) for name, own in calculator_sheets(answer).items()}
     drawing, requirements = workbook["drawing"], workbook["requirements"]
     groups = len(answer.drawn.groups)
-    guard = DataValidation(type="decimal", operator="between", formula1=f"E{_FIRST}", formula2=f"F{_FIRST}")
+    guard = DataValidation(
+        type="decimal",
+        operator="between",
+        formula1=f"$E{_FIRST}",
+        formula2=f"$F{_FIRST}",
+        allow_blank=False,
+        showErrorMessage=True,
+        errorStyle="stop",
+    )
     guard.errorTitle, guard.error = "zone", "The zone must lie between the smallest and the largest one of its row."
     drawing.add_data_validation(guard)
     for row, name in zip(range(_FIRST, _FIRST + groups), answer.drawn.groups, strict=True):
@@ -161,7 +186,8 @@ def style_calculator(answer: AllocationAnswer, path: Path) -> None:
         }
         for name, frame in sheets.items()
     }
-    values["drawing"] |= _below(drawing, sheets["requirements"], groups)
+    notes = (*drawn_amounts(answer), *amounts_convention(answer))
+    values["drawing"] |= _below(drawing, sheets["requirements"], groups, notes)
     drawing.freeze_panes = "C2"
     drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
     for sheet in (drawing, requirements):
@@ -178,7 +204,7 @@ def _written_as(frame: FeatureFrame) -> str:
     return f'"{sign}"0.0000' if sign else "0.0000"
 
 
-def _below(drawing: Worksheet, watched: pd.DataFrame, groups: int) -> dict[str, float | str]:
+def _below(drawing: Worksheet, watched: pd.DataFrame, groups: int, notes: tuple[str, ...]) -> dict[str, float | str]:
     """Write cost, limits and notes below the drawing, and return what the formulas there give."""
     start, values = _FIRST + groups + 1, dict[str, float | str]()
     for column, header in enumerate(("what", "limit", "predicted", "kept"), start=1):
@@ -196,6 +222,6 @@ def _below(drawing: Worksheet, watched: pd.DataFrame, groups: int) -> dict[str, 
                 cell = drawing.cell(row, column, f"=requirements!{place}{there}")
                 cell.number_format, cell.fill = "0.00", _RESULT
                 values[cell.coordinate] = value
-    for row, text in enumerate(_NOTES, start=drawing.max_row + 2):
+    for row, text in enumerate((*notes, *_NOTES), start=drawing.max_row + 2):
         drawing.cell(row, 1, text).font = Font(italic=True)
     return values

@@ -10,7 +10,7 @@ from tolalloc.allocation.answer import figures, optimality_tables, tables, what_
 from tolalloc.allocation.answer.before_after import units_figure, zones_figure
 from tolalloc.allocation.answer.dimensions import effects_figure
 from tolalloc.allocation.answer.drawing import full_drawing_table
-from tolalloc.allocation.answer.sentences import other_amounts
+from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.report.document import Section
 from tolalloc.report.wording import quantity, short, unit_of, with_unit
@@ -64,7 +64,7 @@ def _drawing(answer: AllocationAnswer) -> Section:
     return Section(
         heading="What to write on the drawing",
         paragraphs=(
-            *other_amounts(answer),
+            " ".join((*drawn_amounts(answer), *amounts_convention(answer))),
             "One line per dimension. What to write is rounded down to 0.1 µm, so that it allows nothing wider than the "
             "zone that was verified. The part in the variance (total index) is that of all members of a dimension "
             "together, alone or with others, so the parts of all may add up to more than 100 %.",

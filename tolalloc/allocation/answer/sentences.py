@@ -33,7 +33,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units:,} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
-    found += [*other_amounts(answer), _cost(answer)]  # the first three stand in the headline of a report
+    found += [*drawn_amounts(answer), _cost(answer)]  # the first three stand in the headline of a report
     if len(answer.requirements) > 1:
         found.append(f"{chosen.joint.estimate:.2%} of the units keep the limits of all requirements at once.")
     if answer.met and answer.error < _EVEN_ODDS:
@@ -54,22 +54,30 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     )
 
 
-def other_amounts(answer: AllocationAnswer) -> tuple[str, ...]:
-    """Return what must be made with the zones: amounts of the settings, where they are not those of today."""
+def drawn_amounts(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return what must be made with the zones: the amounts of the settings, and what they were."""
     drawn = answer.model.drawn_amounts
     if not answer.space.settings:
         return ()
     today, chosen = (drawn.by_setting @ design.settings for design in (answer.free.baseline, answer.chosen))
-    if np.allclose(today, chosen, rtol=1e-6, atol=_WRITTEN):
-        return ()
-    amounts = (
-        f"{short(name)} {with_unit(f'{new:.2f}', name)} instead of {was:.2f}"
+    same = np.allclose(today, chosen, rtol=1e-6, atol=_WRITTEN)
+    amounts = " and ".join(
+        f"{short(name)} {with_unit(_signed(new), name)}{'' if same else f' (was {_signed(was)})'}"
         for name, was, new in zip(drawn.names, today, chosen, strict=True)
     )
-    return (
-        f"These zones hold only with another {answer.model.settings_word}: {' and '.join(amounts)}. It belongs on the "
-        "drawing with them.",
-    )
+    word = answer.model.settings_word
+    return (f"The drawing holds with {'these' if word.endswith('s') else 'this'} {word} only: {amounts}.",)
+
+
+def amounts_convention(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return what the signs of these amounts mean, if that must be said."""
+    convention = answer.model.drawn_amounts.convention
+    return (f"Signs: {convention}.",) if convention and answer.space.settings else ()
+
+
+def _signed(amount: float) -> str:
+    """Return an amount with a true minus sign."""
+    return f"{amount:.2f}".replace("-", "−")
 
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:

@@ -79,6 +79,13 @@ SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
 (li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
 
 
+MODIFICATION_CONVENTION = (
+    "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
+    "equidistant amount and a negative shift remove material"
+)
+"""What the signs of the two amounts mean on a drawing."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Modification:
     """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34)."""

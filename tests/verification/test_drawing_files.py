@@ -1,0 +1,175 @@
+"""What leaves the program of an own function with a setting: zones, setting, costs and weights of the answer."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ezdxf import readfile
+from openpyxl import load_workbook
+
+import tolalloc as ta
+from tolalloc.allocation.effort import QUICK_ALLOCATION
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.study.effort import Effort
+from tolalloc.study.prepared import Prepared
+
+GAP, SPRING = "gap [mm]", "spring [mm]"
+ZONE = {"unit": "mm", "min": 0.005, "max": 0.3, "distribution": "normal", "Cp": 1.0}
+SMALL = replace(QUICK_ALLOCATION, verification_units=8192, confirmation_units=65_536, error=0.05)
+ROWS = [
+    {"id": "a", "nominal": 10.0, "plus": 0.1, "minus": -0.1, "cost": 1.0, **ZONE},
+    {"id": "b", "nominal": 4.0, "plus": 0.1, "minus": -0.1, "cost": 3.0, **ZONE},
+    {"id": "c", "nominal": 4.0, "plus": 0.05, "minus": -0.05, "cost": 0.5, **ZONE, "locked": "yes"},
+    {"id": "d", "nominal": 1.0, "plus": 0.02, "minus": -0.02, "cost": 2.0, **ZONE},
+]
+COSTS = {
+    "a": [("today", 0.0, 0.1, 0.02, 0.2), ("ground", 0.25, 0.04, 0.005, 0.1)],
+    "b": [("today", 0.0, 0.3, 0.02, 0.2), ("ground", 0.5, 0.1, 0.005, 0.1)],
+}
+
+
+def gap(a, b, c, d, spring):
+    return a - b + 2 * c + d**2 + spring
+
+
+def study(**changed) -> ta.Study:
+    own = {"limits": {GAP: ta.Limit(lower=14.9, upper=15.15, show=ta.AtYield(0.9973))}, "name": "drawn", "seed": 1}
+    setting = ta.Setting(name=SPRING, value=0.1, lower=-0.5, upper=0.5, step=0.01)
+    return ta.Study(
+        ta.model(gap, inputs=("a", "b", "c", "d"), outputs=(GAP,), settings=(setting,)),
+        changed.pop("drawing", None) or ta.Drawing.of_rows(ROWS, costs=COSTS),
+        questions=[ta.Allocation(front=False, what_if=False)],
+        effort=Effort(allocation=SMALL, is_quick=True),
+        **{**own, **changed},
+    )
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return study().allocate()
+
+
+@pytest.fixture(scope="module")
+def folder(answer, tmp_path_factory):
+    found = tmp_path_factory.mktemp("drawn")
+    answer.add_files(found)
+    return found
+
+
+def test_the_rows_add_up_to_the_cost_of_the_drawing(answer, folder):
+    assert answer.met
+    assert any("ground" in own.process for own in answer.drawn_sources)
+    rows = list(csv.DictReader((folder / "allocation.csv").read_text(encoding="utf-8").splitlines()))
+    stated = [float(row["cost [cost units]"]) for row in rows if row["cost [cost units]"]]
+    assert sum(stated) == pytest.approx(answer.cost, rel=1e-6)
+    assert answer.dimensions_table["cost [cost units]"].sum() == pytest.approx(answer.cost)
+    assert answer.drawing_table["cost [cost units]"].sum() == pytest.approx(answer.cost)
+    book = load_workbook(folder / "drawing.xlsx", data_only=True)
+    heads = [cell.value for cell in book["tolerances"][1]]
+    column = heads.index("cost [cost units]")
+    listed = [row[column] for row in book["tolerances"].iter_rows(min_row=2, values_only=True)]
+    assert sum(listed) == pytest.approx(answer.cost, rel=1e-6)
+
+
+def test_the_table_brings_its_setting_back(answer, folder):
+    drawing = ta.drawing(folder / "allocation.csv", costs=COSTS)
+    (value,) = answer.chosen.settings
+    assert drawing.settings == {SPRING: value}
+    again = Prepared(study=study(drawing=drawing))
+    assert again.model.settings[0].value == value
+    units = again.space.units(again.space.uniform(1.0), SeedTree(5), 200_000)
+    kept = again.requirements[0].limits.kept_by(again.model.reading((GAP,))(units).values[:, 0])
+    error = np.sqrt(0.0027 / kept.size)
+    assert kept.mean() == pytest.approx(answer.chosen.achieved.estimate, abs=4 * error)
+    changed = study(drawing=drawing).changed(drawing, settings={SPRING: 0.2})
+    assert Prepared(study=changed).model.settings[0].value == 0.2
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("# setting: spring [mm] = 0,1", "a number with a decimal point"),
+        ("# setting: spring [mm] = 0.1\n# setting: spring [mm] = 0.2", "stated twice"),
+        ("# setting: sprung [mm] = 0.1", "spring [mm]"),
+        ("# setting: spring [mm] = 9", "the bounds of this setting"),
+        ("# setting: spring [mm] = nan", "the bounds of this setting"),
+    ],
+)
+def test_a_setting_of_a_table_that_is_not_allowed_is_one_sentence(folder, tmp_path, line, said):
+    rows = (folder / "allocation.csv").read_text(encoding="utf-8").split("# setting")[0]
+    (tmp_path / "zones.csv").write_text(f"{rows}{line}\n", encoding="utf-8")
+    with pytest.raises((InputError, UnknownNameError)) as caught:
+        _ = Prepared(study=study(drawing=ta.drawing(tmp_path / "zones.csv"))).model
+    assert said in str(caught.value)
+
+
+def test_sensitivities_have_their_sign_and_the_other_slope_its_own_name(answer):
+    table = answer.drawing_table.set_index("source")
+    sens = table["Sens [mm/µm]"]
+    assert sens.to_dict() == pytest.approx({"a": 1e-3, "b": -1e-3, "c": 2e-3, "d": 2e-3}, rel=1e-2)
+    assert (table["kept value per zone [mm/µm]"].abs() < 0.5 * sens.abs()).all()
+
+
+def test_the_workbook_refuses_a_zone_outside_its_row(folder):
+    sheet = load_workbook(folder / "drawing.xlsx")["drawing"]
+    (guard,) = sheet.data_validations.dataValidation
+    assert (guard.showErrorMessage, guard.errorStyle, guard.operator) == (True, "stop", "between")
+    assert guard.allow_blank is False
+    assert (guard.formula1, guard.formula2) == ("$E2", "$F2")
+
+
+def test_setting_and_sum_stand_in_workbook_and_frames(answer, folder):
+    (value,) = answer.chosen.settings
+    rows = list(load_workbook(folder / "drawing.xlsx")["settings"].iter_rows(values_only=True))
+    assert rows[0] == ("what", "value [unit]", "before [unit]", "unit")
+    assert rows[1] == ("spring", pytest.approx(value), pytest.approx(0.1), "mm")
+    printed = [str(row[0].value) for row in load_workbook(folder / "drawing.xlsx")["drawing"].iter_rows()]
+    said = f"The drawing holds with these settings only: spring {value:.2f} mm".replace("-", "−")
+    assert any(text.startswith(said) for text in printed)
+    texts = [own.dxf.text for own in readfile(folder / "frames.dxf").modelspace().query("TEXT")]
+    assert any(text.startswith(said) for text in texts)
+
+
+def recalculated(path, tmp_path):
+    """Return a workbook as LibreOffice calculates it."""
+    if shutil.which("soffice") is None:
+        pytest.skip("no LibreOffice to recalculate a workbook with")
+    profile = f"-env:UserInstallation=file://{tmp_path / 'profile'}"
+    command = [
+        "soffice",
+        profile,
+        "--headless",
+        "--convert-to",
+        "xlsx:Calc MS Excel 2007 XML",
+        "--outdir",
+        str(tmp_path),
+    ]
+    subprocess.run([*command, str(path)], check=True, capture_output=True, timeout=120)
+    return load_workbook(tmp_path / path.name, data_only=True)
+
+
+@pytest.mark.slow
+def test_a_changed_zone_moves_cost_and_limits_as_the_model_does(answer, folder, tmp_path):
+    """Every zone 3 % wider in LibreOffice: the cost is exact, the kept value within a twentieth of the room."""
+    book = load_workbook(folder / "drawing.xlsx")
+    groups, space = len(answer.drawn.groups), answer.drawn
+    for row in range(2, 2 + groups):
+        book["drawing"].cell(row, 2).value *= 1.03
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    book.save(moved / "drawing.xlsx")
+    sheet = recalculated(moved / "drawing.xlsx", tmp_path)["requirements"]
+    rows = {row[0]: row for row in sheet.iter_rows(min_row=2, values_only=True)}
+    design = answer.chosen.design.copy()
+    design[:groups] *= 1.03
+    assert rows["cost [cost units]"][3] == pytest.approx(float(space.cost(design)), rel=1e-6)
+    for side in answer.chosen.sides:
+        predicted = side.limit + side.sign * float(side.predicted(design))
+        assert rows[side.stack.name][3] == pytest.approx(predicted, abs=2e-5)
+        assert rows[side.stack.name][4] == ("yes" if side.sign * (predicted - side.limit) <= 0 else "no")
