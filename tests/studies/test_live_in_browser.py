@@ -125,7 +125,7 @@ def test_the_curve_follows_the_torque_and_the_picture_a_swept_error(driver, redu
 
 def test_a_thousand_moves_and_fifty_steps_back_leave_no_error_and_no_rubbish(driver, study):
     shown(driver, study)
-    fields = "return [...document.querySelectorAll('.row input[type=number]')].map((own) => own.value)"
+    fields = "return [...document.querySelectorAll('.row input[inputmode=decimal]')].map((own) => own.value)"
     size = "return [document.querySelectorAll('*').length, performance.memory.usedJSHeapSize / 1e6]"
     driver.execute_async_script(MOVE, 950, 3)
     before, (elements, _) = driver.execute_script(fields), driver.execute_script(size)
@@ -199,7 +199,7 @@ def test_a_saved_design_is_confirmed_by_the_command(driver, study, script):
     from selenium.webdriver.common.keys import Keys
 
     shown(driver, study)
-    field = driver.find_element("css selector", "#zones input[type=number]")
+    field = driver.find_element("css selector", "#zones input[inputmode=decimal]")
     field.send_keys(Keys.CONTROL + "a" + Keys.NULL, "21.5", Keys.TAB)
     until(lambda: "to the drawing" in by_id(driver, "cost-change").text)
     counted(driver, 1024)

@@ -187,6 +187,13 @@ def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
         assert workbook.value("drawing", f"G{row}") == "yes"
 
 
+def relief(results, side, design):
+    """Return what zones that relieve a limit add when they shrink, which the model of the search leaves out."""
+    groups = len(results.drawn.groups)
+    slopes = np.minimum(side.batches[:, :groups].mean(axis=0), 0.0)
+    return float(slopes @ (design - results.chosen.design)[:groups])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.93, 1.1])
 def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
@@ -200,7 +207,9 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
         assert workbook.value("requirements", cost_cell(results)) == pytest.approx(cost)
         for row, side in enumerate(results.chosen.sides, start=2):
             told = workbook.value("requirements", f"D{row}")
-            assert told == pytest.approx(side.limit + side.sign * side.predicted(design))
+            assert told == pytest.approx(
+                side.limit + side.sign * (side.predicted(design) + relief(results, side, design))
+            )
         held = feature.processes[process]
         inside = held.minimum * (1 - 1e-6) <= design[position] <= held.maximum * (1 + 1e-6)
         assert workbook.value("drawing", f"G{2 + position}") == ("yes" if inside else "no")
@@ -210,7 +219,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
 def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     results, folder = drawn
     sheets = load_workbook(folder / "drawing.xlsx")
-    assert sheets.sheetnames == ["drawing", "requirements", "tolerances"]
+    assert sheets.sheetnames == ["drawing", "requirements", "modification", "tolerances"]
     formulas = [
         cell.value
         for name in ("drawing", "requirements")

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
-from tolalloc.allocation.repricing import named_zones, repriced
+from tolalloc.allocation.repricing import named_zones, outside_range, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
 from tolalloc.drawings.error_model import ErrorModel
@@ -151,7 +151,8 @@ class DifferenceAnswer(Answer):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        found, units = [], self.values.shape[1]
+        units = self.values.shape[1]
+        found = [sentence for own in self.after if (sentence := outside_range(own))]
         if any(units * min(share, 1 - share) < _BEYOND for _, share in self.limited):
             found.append(
                 f"Of {units} units fewer than {_BEYOND} lie beyond a quantile: its interval is too narrow. Take more."

@@ -14,6 +14,9 @@ from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.units import MICROMETRE
 
+_ROUNDING = 1e-6
+"""Share of a zone up to which it is a rounded bound [-]."""
+
 
 def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, float]:
     """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
@@ -39,6 +42,19 @@ def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, flo
             raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
         found |= dict.fromkeys(own, zone * MICROMETRE)
     return found
+
+
+def outside_range(source: Source) -> str:
+    """Return a sentence on a zone that lies outside what its row allows, empty for any other.
+
+    The zone of a locked row may be anything.
+    """
+    low, zone, high = (size / MICROMETRE for size in (source.minimum, source.zone, source.maximum))
+    if source.locked or low * (1 - _ROUNDING) <= zone <= high * (1 + _ROUNDING):
+        return ""
+    name = source.own_id or source.name
+    meant = f" Write {name}={zone:g}mm if millimetres are meant." if low <= 1000 * zone <= high else ""
+    return f"{name}: its zone of {zone:.4g} µm lies outside the {low:.4g} to {high:.4g} µm that its row allows.{meant}"
 
 
 def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:

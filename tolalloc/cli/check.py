@@ -51,6 +51,7 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
 
 def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
+    from tolalloc.drawings.plausibility import doubts
     from tolalloc.report.currency import in_currency
     from tolalloc.report.wording import COST_UNITS
 
@@ -91,7 +92,11 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     lines += study.drawing.notes if study.drawing else ()
     summary |= {"neglected": [*neglected, *model.left_out]}
     summary |= {"examined": list(examined.sentences), "but": examined.but}
-    verdict = f"Study {study.name} is in order{f', but {examined.but}' if examined.but else ''}."
+    doubted = len(doubts(errors.sources, errors.table))
+    said = f"{doubted} of its rows {'is' if doubted == 1 else 'are'} doubted above" if doubted else ""
+    but = "; ".join(own for own in (said, examined.but) if own)
+    verdict = f"Study {study.name} is in order{f', but {but}' if but else ''}."
+    summary |= {"doubted rows": doubted}
     return summary, [*lines, *examined.sentences], verdict
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 import typer
@@ -17,7 +18,10 @@ def whatif(
     script: Script,
     zones: Annotated[
         list[str],
-        typer.Argument(help="Zones as SOURCE=µm, such as pin.diameter=3 'disc*.pitch=10'.", metavar="zone..."),
+        typer.Argument(
+            help="Zones as SOURCE=µm, or with their unit: pin.diameter=3 'disc*.pitch=10' housing=0.02mm.",
+            metavar="zone...",
+        ),
     ],
     units: Annotated[int, typer.Option(help="Random units of either drawing.")] = 1024,
     out: ReportFolder = None,
@@ -40,10 +44,11 @@ def whatif(
 
 
 def _zone(text: str) -> tuple[str, float]:
-    """Return pattern and zone [µm] of one argument."""
-    pattern, separator, number = text.partition("=")
-    try:
-        return pattern.strip(), float(number)
-    except ValueError:
-        allowed = "SOURCE=µm, such as pin.diameter=3"
-        raise InputError.at("whatif", "zone", text if separator else f"{text} without =", allowed) from None
+    """Return pattern and zone [µm] of one argument, whose number may have a decimal comma and a unit."""
+    pattern, separator, stated = text.partition("=")
+    match = re.fullmatch(r"\s*(\d+(?:[.,]\d*)?|[.,]\d+)(e-?\d+)?\s*(µm|μm|um|mm)?\s*", stated)
+    if match is None:
+        allowed = "SOURCE=µm, such as pin.diameter=3, or with its unit as in housing=0.02mm"
+        raise InputError.at("whatif", "zone", text if separator else f"{text} without =", allowed)
+    number, power, unit = match.groups()
+    return pattern.strip(), float(number.replace(",", ".") + (power or "")) * (1000.0 if unit == "mm" else 1.0)

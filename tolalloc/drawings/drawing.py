@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
+from tolalloc.drawings.plausibility import doubts
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
     read_table_file,
@@ -107,7 +108,8 @@ class Drawing:
         if currency and currency_in(currency) != currency:
             raise InputError.at(place, "currency", currency, "three letters such as EUR, or €, $, £ or ¥")
         errors = ErrorModel(sources, correlation=correlations, table=place)
-        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency)
+        notes = doubts(sources, place)
+        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency, notes=notes)
 
     def __repr__(self) -> str:
         return f"<drawing {self.name}: {len(self.sources)} sources>"
@@ -137,7 +139,8 @@ class Drawing:
         """
         path = found_from_here(table)
         notes, currency = _read_beside(path)
-        changed = self.with_sources(load_tolerance_table(path), str(table))
+        sources = load_tolerance_table(path)
+        notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
         settings = stated_settings(path) if path.suffix else {}
         return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
 
@@ -218,7 +221,7 @@ def load_drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation, table=str(table)),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
-        notes=notes,
+        notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
         settings=stated_settings(path) if path.suffix else {},
     )

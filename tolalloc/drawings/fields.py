@@ -28,6 +28,13 @@ SMALLEST_ZONE = 1e-6
 SMALLEST_COST = 1e-9
 """Smallest cost that is believed unless there is none [cost units]."""
 
+_LIMITS = 0.05
+"""Share of the nominal size within which the middle of plus and minus is that size, and they are its limits [-]."""
+
+_FARTHEST = 20.0
+"""Distance of the middle of a zone from the nominal size, over the zone, up to which it is believed: the loosest fits
+of ISO 286 reach about 10 [-]."""
+
 _DECIMALS = 12
 """Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""
 
@@ -277,10 +284,12 @@ class ToleranceRow(Record):
         zone, factor = self.zone, UNITS[self.unit]
         if not 0 <= zone * factor <= LARGEST_ZONE:
             raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
+        self._require_deviations()
         if self.plus == self.minus and not self.locked and (self.min > 0 or self.cost > 0):
+            sign = f"; if ± {self.plus:g} is meant, minus is −{self.plus:g}" if self.plus > 0 else ""
             raise ValueError(
                 "the zone is 0 but the row is not locked; allowed is 0 with locked = yes, which neglects the source, "
-                f"or a zone above 0 up to {LARGEST_ZONE:g} µm"
+                f"or a zone above 0 up to {LARGEST_ZONE:g} µm{sign}"
             )
         if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
             raise ValueError(f"minus and shift must be 0 for feature {self.feature.value}, whose zone is plus")
@@ -311,6 +320,24 @@ class ToleranceRow(Record):
         if needs_spectrum and self.each > 1:
             raise ValueError("each must be 1 for a feature with a spectrum; single teeth are sources of feature size")
         return self
+
+    def _require_deviations(self) -> None:
+        """Raise if plus and minus are limits of size, or far from any deviation of a zone of this width."""
+        if self.feature is not Feature.SIZE:
+            return
+        nominal, middle = self.nominal * 1e3 / UNITS[self.unit], (self.plus + self.minus) / 2
+        near = abs(middle - nominal) <= max(self.zone, _LIMITS * abs(nominal))
+        if nominal and near and abs(middle) > self.zone:
+            plus, minus = round(self.plus - nominal, _DECIMALS), round(self.minus - nominal, _DECIMALS)
+            raise ValueError(
+                f"plus {self.plus:g} and minus {self.minus:g} are limits of a size of {self.nominal:g} mm; allowed are "
+                f"deviations from it, here plus {plus:g} and minus {minus:g} {self.unit}"
+            )
+        if self.zone > 0 and abs(middle) > _FARTHEST * self.zone:
+            raise ValueError(
+                f"plus {self.plus:g} and minus {self.minus:g} lie {middle:g} {self.unit} from the nominal size, "
+                f"{abs(middle) / self.zone:.0f} times their zone; allowed are deviations, up to {_FARTHEST:g} times it"
+            )
 
     @model_validator(mode="after")
     def _distribution_makes_sense(self) -> ToleranceRow:

@@ -190,6 +190,8 @@ class Source:
             reading += f", taken at {self.teeth} teeth"
         if self.over:
             reading += f" over a length of {self.over / MILLIMETRE:g} mm"
+        if abs(self.middle) > _ROUNDING * self.zone:
+            reading += f", its middle {self.middle / MICROMETRE:+.3g} µm from the nominal size".replace("-", "−")
         if self.each > 1:
             reading += f", each of {self.each} on its own"
         is_normal = self.distribution is Distribution.NORMAL and not self.sorted

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.repricing import cheapest, repriced
+from tolalloc.allocation.repricing import cheapest, outside_range, repriced
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -156,6 +156,7 @@ class Session:
         model, known = self.model(design), self.prepared.model.settings
         chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
         beyond = [f"{own.sentence}." for own in chosen if own.strays]
+        beyond += [sentence for own in self.sources(design) if (sentence := outside_range(own))]
         return [*beyond, *model.examined(self.deviations(design, slice(0, FIRST))).sentences]
 
     @property

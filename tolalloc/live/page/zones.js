@@ -16,6 +16,15 @@ export { make };
 const STEPS = 400; // of a slider
 const rounded = (value) => Number(value.toPrecision(4));
 
+// What somebody typed: decimal comma or point, a true minus, a unit behind it; nothing where it may mean two numbers.
+export function typed(text, unit = MICRO) {
+  const found = /^\s*([-−+]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(µm|μm|um|mm)?\s*$/.exec(text);
+  if (!found) return NaN;
+  const [, sign, digits, stated] = found, size = Number(digits.replace(",", "."));
+  const factor = unit === MICRO && stated === "mm" ? 1000 : 1;
+  return (sign === "-" || sign === "−" ? -1 : 1) * size * factor;
+}
+
 export class Zones {
   // changed(design, settled) is called while a hand moves and once it rests; effect(source) asks for a sweep.
   constructor(study, element, settings, { changed, effect, point }) {
@@ -57,7 +66,7 @@ export class Zones {
       this.show();
       this.changed(this.design, settled);
     };
-    const field = make("input", { type: "number", step: "any", "aria-label": `zone of ${name} in ${MICRO}`, onchange: (e) => set(Number(e.target.value), true) });
+    const field = make("input", { inputmode: "decimal", "aria-label": `zone of ${name} in ${MICRO}`, onchange: (e) => set(typed(e.target.value), true) });
     const slider = make("input", {
       type: "range", min: 0, max: STEPS, step: 1, "aria-label": `zone of ${name}, from ${lower.toPrecision(3)} to ${upper.toPrecision(3)} ${MICRO}`,
       oninput: (e) => set(rounded(at(Number(e.target.value))), false), onchange: (e) => set(rounded(at(Number(e.target.value))), true),
@@ -72,8 +81,8 @@ export class Zones {
       make("span", { class: "slide" }, slider, make("button", { title: "effect of this source over its zone", "aria-label": `effect of ${first.name}`, onclick: () => this.effect(first.name) }, "effect")), share);
     if (many) {
       const fields = members.map((own) => {
-        const input = make("input", { type: "number", step: "any", "aria-label": `zone of ${own.name} in ${MICRO}`, onchange: (e) => {
-          const zone = Number(e.target.value);
+        const input = make("input", { inputmode: "decimal", "aria-label": `zone of ${own.name} in ${MICRO}`, onchange: (e) => {
+          const zone = typed(e.target.value);
           if (zone > 0 && Number.isFinite(zone)) this.put(own.name, zone);
           this.show();
           this.changed(this.design, true);
@@ -118,7 +127,7 @@ export class Zones {
       this.show();
       this.changed(this.design, settled);
     };
-    const field = make("input", { type: "number", step: "any", disabled: fixed, "aria-label": own.name, onchange: (e) => set(Number(e.target.value), true) });
+    const field = make("input", { inputmode: "decimal", disabled: fixed, "aria-label": own.name, onchange: (e) => set(typed(e.target.value, ""), true) });
     const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: own.step || 1, disabled: fixed, "aria-label": `${own.name}, from ${own.lower} to ${own.upper}`,
       oninput: (e) => set(rounded(Number(e.target.value)), false), onchange: (e) => set(rounded(Number(e.target.value)), true) });
     const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : own.word);
