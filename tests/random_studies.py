@@ -101,8 +101,8 @@ def random_study(number: int) -> ta.Study:
 
     Notes
     -----
-    The stiffness is a printed one, so no unit is jammed; the limits lie around what the table keeps, and half of the
-    studies ask for grades.
+    The stiffness is a printed one, so no preload is limited; the limits lie around what the table keeps, and half of
+    the studies ask for grades.
     """
     generator = np.random.default_rng([20260, number])
     reducer = random_reducer(generator)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -60,7 +60,9 @@ class Examination:
     """What a check of a study says of a model and of some random units."""
 
     sentences: tuple[str, ...] = ()
-    but: str = ""  # What speaks against the study though it is in order, as the end of a sentence; empty if nothing
+    but: str = ""  # What speaks against the drawing, as the end of a sentence; empty if nothing
+    fault: str = ""  # Why units of the drawing cannot be built, a sentence for a first page; empty if they can
+    figures: Mapping[str, float] = field(default_factory=dict)  # What was counted, units in the names
 
 
 @runtime_checkable

@@ -115,7 +115,7 @@ def test_a_page_is_sound_and_begins_with_answer_and_drawing(written):
     assert text.index("Allocation drawing" if "Allocation drawing" in text else "⌀0.0047") < text.index("<nav>")
     assert text.count("The answer in full") == 4
     assert "display: table-header-group" in text
-    assert "<dt>yield</dt>" in text and "<dt>jammed</dt>" not in text
+    assert "<dt>yield</dt>" in text and "<dt>preloaded</dt>" not in text
 
 
 def test_a_number_is_rounded_and_says_its_exact_value():

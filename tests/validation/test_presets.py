@@ -117,12 +117,12 @@ def test_preload_is_what_presses_at_the_torque_of_backlash():
 
 
 @pytest.mark.slow
-def test_te_says_that_the_unit_of_table_4_is_jammed():
+def test_te_says_that_the_unit_of_table_4_is_preloaded():
     answer = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--json").stdout)
-    assert answer["warnings"][0].startswith("This unit is jammed: without torque its pins press with up to")
+    assert answer["warnings"][0].startswith("This unit is preloaded: without torque its pins press with up to")
     assert answer["pin_force_without_torque_n"] > 1000
     exact = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "exact", "--json").stdout)
-    assert not any("jammed" in warning for warning in exact["warnings"])
+    assert not any("preloaded" in warning for warning in exact["warnings"])
     friction = exact["friction"]
     assert 80 < friction["efficiency_at_rated_torque_percent"] < 92
     assert friction["no_load_torque_nm"] < 1 < 10 < answer["friction"]["no_load_torque_nm"]

@@ -33,13 +33,13 @@ from tolalloc.allocation.robustness import Robustness, robustness
 from tolalloc.allocation.search import ZoneAllocation, allocate, require_groups
 from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.trust_region import kept_stacks
-from tolalloc.allocation.verification import Verifier, answer
+from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.models import Model
+from tolalloc.models import Examination, Model
 from tolalloc.progress import RunRecord
 from tolalloc.report.answer import Header
 from tolalloc.sensitivity.effort import SobolEffort
@@ -47,6 +47,8 @@ from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
+_EXAMINED = 1000
+"""Random units of the drawing that tell whether it can be built [-]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -260,6 +262,11 @@ class DrawingQuestion:
         found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
         return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
 
+    def examined(self, design: VerifiedDesign) -> Examination:
+        """Return what the model says of random units of a design."""
+        units = design.space.units(design.design, self.seeds("examination"), _EXAMINED)
+        return self.model.at(design.settings).examined(units)
+
 
 def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
     """Return values of a range, denser towards its lower end, where zones are cheap."""
@@ -325,6 +332,8 @@ def allocate_drawing(
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
             shares, of_dimensions = question.shares(chosen.space, chosen.design)
+        with record.stage("units of the drawing"):
+            examination = question.examined(chosen)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationAnswer(
         header=replace(header, statuses=statuses, stages=record.stages),
@@ -342,4 +351,5 @@ def allocate_drawing(
         prices=question.prices(free),
         loss=question.quality_loss,
         error=question.effort.error,
+        examination=examination,
     )

@@ -95,7 +95,8 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     doubted = len(doubts(errors.sources, errors.table))
     said = f"{doubted} of its rows {'is' if doubted == 1 else 'are'} doubted above" if doubted else ""
     but = "; ".join(own for own in (said, examined.but) if own)
-    verdict = f"Study {study.name} is in order{f', but {but}' if but else ''}."
+    state = "can be run" if examined.fault else "is in order"
+    verdict = f"Study {study.name} {state}{f', but {but}' if but else ''}."
     summary |= {"doubted rows": doubted}
     return summary, [*lines, *examined.sentences], verdict
 

@@ -152,7 +152,7 @@ class Session:
                 self._known.pop(next(iter(self._known)))
 
     def examined(self, design: LiveDesign) -> list[str]:
-        """Return what a check says of the settings and the first random units, such as how many of them are jammed."""
+        """Return what a check says of the settings and the first random units, such as how many are preloaded."""
         model, known = self.model(design), self.prepared.model.settings
         chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
         beyond = [f"{own.sentence}." for own in chosen if own.strays]

@@ -12,12 +12,13 @@ GLOSSARY = {
     "confidence": "Share of repeated studies in which such a statement is true.",
     "first-order index": "Share of the variance that one error makes alone (Sobol's S1).",
     "fresh units": "Random units that no search has used, on which the drawing is judged.",
-    "jammed": "A unit whose pins press harder without torque than the rated torque makes them: so it does not turn.",
     "lift": "How much larger the deviations are among the units beyond a limit than among all units.",
     "lost motion": "How far the output turns while the torque goes from +3 % to −3 % of the rated torque.",
     "NSGA-II": "A genetic search for designs that are each the cheapest for some limit.",
     "order": "Number of waves per turn of the output.",
     "peak-to-peak": "Largest minus smallest transmission error over one turn of the output.",
+    "preloaded": "Said of a reducer whose pins press harder without torque than the rated torque presses them: it "
+    "turns, but warm, worn early and without lost motion.",
     "quantile": "Value that a stated share of the units keeps.",
     "kept value per zone": "Change of what is compared with the limit per micrometre of the zone.",
     "Sens": "Change of the output per micrometre of deviation: with its sign for a single dimension, root mean square "

@@ -27,7 +27,7 @@ from tolalloc.report.page import as_json, scripts, style
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
-_SENTENCES = 3
+_SENTENCES = 4
 """Sentences of each answer on a first page that shows more than one answer [-]."""
 _MOVING = "moving"
 _LISTED = 6

@@ -1,7 +1,8 @@
-"""What a check of a study says of a reducer: its clearances, how many random units are jammed, and what frees them."""
+"""What a check of a study says of a reducer: clearances, how many random units are preloaded, and what frees them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.guarantee import USUAL_YIELD
 from tolalloc.models import Examination
-from tolalloc.rv import PRELOAD
+from tolalloc.rv import PRELOAD, RADIAL_CLEARANCE
 from tolalloc.rv.equivalent.preload import preload
 from tolalloc.units import ARCMINUTE, MICROMETRE
 
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def examined(model: ReducerModel, x: Float[np.ndarray, "sample column"]) -> Examination:
-    """Return sizes that differ, clearances, how many random units are jammed, and what is said of the catalogue.
+    """Return sizes that differ, clearances, how many random units are preloaded, and what is said of the catalogue.
 
     Parameters
     ----------
     model
-        The reducer.
+        The reducer at the modification in force.
     x
         Deviations of the random units [m, angles rad].
     """
@@ -32,27 +33,56 @@ def examined(model: ReducerModel, x: Float[np.ndarray, "sample column"]) -> Exam
     solved = found.status == 0
     if not solved.any():
         none = f"None of {len(x)} random units has an equilibrium without torque."
-        return Examination(
-            (*model.mismatches, none, *model.remarks), f"none of its units has an equilibrium: {_advice(model)}"
-        )
-    jammed, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
+        but = f"none of its units has an equilibrium: {_advice(model)}"
+        return Examination((*model.mismatches, none, *model.remarks), but, f"Cannot be built as drawn: {none}")
+    left = model.reading((RADIAL_CLEARANCE,))(x)
+    radial_left = left.values[left.good, 0]
+    preloaded, median = found.pin_force[solved] > rated, np.median(found.pin_force[solved])
     unsolved = "" if solved.all() else f" ({(~solved).sum()} have no equilibrium)"
+    cautions = model.cautions(np.array(model.present_clearances))
     sentences = (
         *model.mismatches,
         f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
         f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
-        f"Of {len(x)} random units {jammed.mean():.1%} are jammed{unsolved}: without torque their pins press with "
-        f"more than the {rated:.0f} N of the rated torque; half of all press with {median:.2g} N or more.",
+        f"Of {len(x)} random units {preloaded.mean():.1%} are preloaded{unsolved}: without torque their pins press "
+        f"with more than the {rated:.0f} N of the rated torque; half of all press with {median:.2g} N or more.",
+        f"The radial clearance of a unit is {_true_minus(float(radial_left.min()))} µm at least.",
         *model.remarks,
-        *model.cautions(np.array(model.present_clearances)),
+        *cautions,
     )
-    # Where the model has no limit of its own for them, its stiffnesses are too large for the share to mean anything.
-    matters = PRELOAD in model.own_limits and jammed.mean() > 1 - USUAL_YIELD
-    return Examination(sentences, f"{jammed.mean():.1%} of its units are jammed: {_advice(model)}" if matters else "")
+    figures = {
+        "share preloaded [-]": float(preloaded.mean()),
+        "pin force of the rated torque [N]": rated,
+        "share without radial clearance [-]": float((radial_left < 0).mean()),
+        "least radial clearance [µm]": float(radial_left.min()),
+    }
+    reasons = _reasons(model, figures)
+    if not reasons:
+        return Examination(sentences, figures=figures)
+    trust = " ".join(own for own in cautions if "not trust" in own)
+    fault = f"Cannot be built as drawn: of {len(x)} random reducers {' and '.join(reasons)}. {trust}".strip()
+    return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, figures)
+
+
+def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
+    """Return what keeps more units from being built than usually may miss a limit."""
+    found, allowed = [], 1 - USUAL_YIELD
+    if (share := figures["share preloaded [-]"]) > allowed:
+        by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
+        force = figures["pin force of the rated torque [N]"]
+        found.append(f"{share:.1%} are preloaded beyond the {force:.0f} N a pin of the rated torque{by}")
+    if (share := figures["share without radial clearance [-]"]) > allowed:
+        least = _true_minus(figures["least radial clearance [µm]"])
+        found.append(f"{share:.1%} have no radial clearance, {least} µm at worst")
+    return found
+
+
+def _true_minus(number: float) -> str:
+    return f"{number:.2g}".replace("-", "−")
 
 
 def _advice(model: ReducerModel) -> str:
-    """Return what frees jammed units, as the end of a sentence."""
+    """Return what frees preloaded units, as the end of a sentence."""
     flank, _ = model.present_clearances
     freely = (
         "flank_clearance of ta.reducer(...) lets the allocation open it, at present from "

@@ -42,9 +42,9 @@ def friction_sentence(loop: FrictionLoop) -> str:
     found = friction_summary(loop)
     return (
         f"Friction leaves an efficiency of {found['efficiency_at_rated_torque_percent']:.1f} % at rated torque, seals "
-        f"and churning not counted, and takes {found['no_load_torque_nm']:.2g} N·m at the output without load; with it "
-        f"the lost motion is {found['lost_motion_arcmin']:.2f}′, the hysteresis loss "
-        f"{found['hysteresis_loss_arcmin']:.2g}′."
+        f"and churning not counted, and takes {found['no_load_torque_nm']:.2g} N·m at the output without load, mean "
+        f"over a turn of all contacts; with it the lost motion is {found['lost_motion_arcmin']:.2f}′, the hysteresis "
+        f"loss {found['hysteresis_loss_arcmin']:.2g}′."
     )
 
 

@@ -380,9 +380,9 @@ class ReducerModel(Model):
 
     @cached_property
     def own_limits(self) -> Mapping[str, float]:
-        """No pin may press harder without torque than the rated torque makes it: such a unit is jammed.
+        """No pin may press harder without torque than the rated torque makes it: such a unit is preloaded.
 
-        Only where bearings are stated by their dimensions: printed stiffnesses, many times too large, jam nearly all.
+        Only where bearings are stated by their dimensions: with printed stiffnesses, far too large, nearly all are.
         """
         return {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
 
@@ -398,7 +398,7 @@ class ReducerModel(Model):
         return (sentence,) if sentence else ()
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:
-        """Return nominal clearances, how many random units are jammed, and what is said of the catalogue."""
+        """Return nominal clearances, how many random units are preloaded, and what is said of the catalogue."""
         from tolalloc.rv.examination import examined
 
         return examined(self, x)

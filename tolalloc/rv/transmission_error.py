@@ -96,18 +96,19 @@ class TransmissionErrorAnswer(Answer):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        return (*self.jammed, *self.cautions, *against_catalogue(self.equilibria.reducer, self.loop)[1])
+        return (*self.preloaded, *self.cautions, *against_catalogue(self.equilibria.reducer, self.loop)[1])
 
     @cached_property
-    def jammed(self) -> tuple[str, ...]:
+    def preloaded(self) -> tuple[str, ...]:
         """Say that the unit presses itself without torque, if it does so by more than the rated torque would."""
         found, rated = self.preload, rated_pin_force(self.equilibria.reducer)
         if not found.pin_force[0] > rated:
             return ()
+        taken, ratio = float(found.friction_torque[0]), abs(self.equilibria.reducer.ratio)
         return (
-            f"This unit is jammed: without torque its pins press with up to {found.pin_force[0]:.0f} N, where the "
-            f"rated torque makes {rated:.0f} N in a perfect reducer; turning it takes about "
-            f"{found.friction_torque[0]:.2g} N·m at the output.",
+            f"This unit is preloaded: without torque its pins press with up to {found.pin_force[0]:.0f} N, where the "
+            f"rated torque makes {rated:.0f} N in a perfect reducer. It turns, but warm and worn early: the friction "
+            f"of its pins alone takes up to {taken:.2g} N·m at the output, {taken / ratio:.2g} N·m at the motor.",
         )
 
     @cached_property
@@ -211,7 +212,10 @@ class TransmissionErrorAnswer(Answer):
             *waves,
             *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in found["outputs"]),
             ("largest pin force without torque [N]", _short(found["pin_force_without_torque_n"])),
-            ("no-load friction torque of the pins [N·m]", _short(found["no_load_friction_torque_nm"])),
+            (
+                "friction of the pins without load, largest over the turn, at the output [N·m]",
+                _short(found["no_load_friction_torque_nm"]),
+            ),
             *loops,
             *(
                 (f"{name}, every bearing under its own load [{unit}]", _short(own[field]))

@@ -57,7 +57,7 @@ tolalloc open study.py
 tolalloc run study.py --quick
 ```
 
-`check` says what the study reads, and how many random units are jammed. `open` shows what each zone does, live.
+`check` says what the study reads, and how many random units are preloaded. `open` shows what each zone does, live.
 `run` writes `runs/{name}/report.html`: what drives the error, and the cheapest zones. Leave `--quick` out before you
 set a drawing.
 

@@ -71,7 +71,7 @@ class Study(NamedFields):
         The tolerance table, ``ta.drawing(...)``.
     limits
         Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
-        None lifts a limit that the model has of its own: no unit of a reducer may be jammed, `PRELOAD`.
+        None lifts a limit that the model has of its own: no unit of a reducer may be preloaded, `PRELOAD`.
     joint
         Share of units that must keep all limits at once, ``AtYield(target=…)``; a limit that says nothing else of its
         own need only be kept by them.

@@ -26,7 +26,7 @@ from tolalloc.allocation.trade import SettingTrade
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
-from tolalloc.models import Model
+from tolalloc.models import Examination, Model
 from tolalloc.report.answer import Answer
 from tolalloc.report.document import Section
 from tolalloc.report.wording import short, unit_of
@@ -70,6 +70,8 @@ class AllocationAnswer(Answer):
         What the leading output costs a user, if the question states it.
     error
         Probability up to which the answer may call a design met that misses a limit [-].
+    examination
+        What the model says of random units of the drawing, such as that they cannot be built.
     """
 
     kind: ClassVar[str] = "allocation"
@@ -92,6 +94,7 @@ class AllocationAnswer(Answer):
     prices: YieldLadder | None
     loss: QualityLoss | None
     error: float
+    examination: Examination
 
     @property
     def free_label(self) -> str:
@@ -177,6 +180,8 @@ class AllocationAnswer(Answer):
         """What the answer is about."""
         if not self.met:
             return f"No drawing shown to keep its limits, {self.header.model}: {self.header.name}"
+        if self.examination.fault:
+            return f"A drawing that keeps its limits but cannot be built, {self.header.model}: {self.header.name}"
         if self.keeps_table:
             return f"Keep the drawing of {self.header.model}: {self.header.name}"
         return f"The cheapest verified drawing of {self.header.model}: {self.header.name}"
@@ -245,6 +250,8 @@ class AllocationAnswer(Answer):
             "gap of the convex program [-]": free.optimum.gap,
             "blocking requirement": None if self.met else chosen.blocking.requirement.output,
             "beyond its limit by [unit of the output]": None if self.met else -chosen.blocking.slack,
+            "cannot be built because": self.examination.fault or None,
+            **self.examination.figures,
             **self.model.amounts(chosen.settings),
             "requirements": _records(self.requirements_table),
             "drawing": _records(self.drawing_table),

@@ -30,6 +30,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen = answer.chosen
     achieved = chosen.achieved
     found = [
+        *([answer.examination.fault] if answer.examination.fault else ()),
         f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units:,} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]

@@ -20,7 +20,7 @@ export function verdict(judged) {
   const [, low, high] = judged.yield;
   const free = Object.entries(judged.broken).map(([output, share]) => {
     const units = share ? `${percent(share)} of the units are` : "No unit is";
-    return output.startsWith("largest pin force without torque") ? ` ${units} jammed${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
+    return output.startsWith("largest pin force without torque") ? ` ${units} preloaded${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
   }).join("");
   if (low >= judged.target) return `The limits are kept: the yield is at least the ${percent(judged.target)} asked for.${free}`;
   if (high < judged.target) return `The limits are not kept: the yield is below the ${percent(judged.target)} asked for.${free}`;

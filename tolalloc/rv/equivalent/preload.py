@@ -12,7 +12,7 @@ from tolalloc.rv.equivalent.hysteresis import BACKLASH, TURN_ANGLES
 from tolalloc.rv.equivalent.model import EquivalentModel
 from tolalloc.rv.equivalent.outputs import forces
 
-PRELOAD_ASSUMPTION = "no-load friction torque of the pins: discs sliding on pins alone"
+PRELOAD_ASSUMPTION = "friction torque of the pins without load: discs sliding on pins alone, largest over the turn"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,9 +26,9 @@ def prepared(reducer: str, **changes: object) -> Prepared:
 
 def test_no_pin_may_press_harder_without_torque_than_the_rated_torque_makes_it():
     asked = prepared("rv20e")
-    peak, jammed = asked.requirements
-    assert (peak.output, jammed.output) == (ta.PEAK_TO_PEAK, ta.PRELOAD)
-    assert jammed.limits.upper == rated_pin_force(asked.model.reducer)
+    peak, preloaded = asked.requirements
+    assert (peak.output, preloaded.output) == (ta.PEAK_TO_PEAK, ta.PRELOAD)
+    assert preloaded.limits.upper == rated_pin_force(asked.model.reducer)
     # Printed stiffnesses are fifty times a catalogue's; what presses with them means nothing.
     assert [own.output for own in prepared("rv20e_liu2020").requirements] == [ta.PEAK_TO_PEAK]
 
@@ -45,7 +45,7 @@ def test_a_study_may_say_otherwise():
         _ = prepared("rv20e", limits={ta.PRELOAD: None}).requirements
 
 
-def test_a_check_counts_the_jammed_among_random_units(tmp_path):
+def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
     script = study_script(tmp_path, reducer={"name": "rv20e"})
     result = tolalloc("check", script)
     assert result.returncode == 0, result.stderr
@@ -68,26 +68,30 @@ def test_a_check_for_a_program_says_the_same(tmp_path):
     script = study_script(tmp_path, reducer={"name": "rv20e"})
     said = json.loads(tolalloc("check", script, "--json").stdout)
     assert list(said["limits"]) == [ta.PEAK_TO_PEAK, ta.PRELOAD]
-    assert any("are jammed" in sentence for sentence in said["examined"])
-    assert "are jammed: a tooth modification that leaves more than the present 1.04 µm" in said["but"]
+    assert any("are preloaded" in sentence for sentence in said["examined"])
+    assert "a pin of the rated torque: a tooth modification that leaves more than the present 1.04 µm" in said["but"]
 
 
-def test_the_last_sentence_of_a_check_says_that_units_are_jammed_and_what_frees_them(tmp_path):
+def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_frees_them(tmp_path):
     *_, said, last = tolalloc("check", study_script(tmp_path, reducer={"name": "rv20e"})).stdout.splitlines()
     assert said.startswith("A study is a Python program")
-    assert re.search(r"is in order, but \d+\.\d% of its units are jammed: a tooth modification that leaves more", last)
+    said = (
+        r"can be run, but of its units \d+\.\d% are preloaded beyond the \d+ N a pin of the rated torque.*: a tooth mod"
+    )
+    assert re.search(said, last)
+    assert "in order" not in last
     assert "`tolalloc modify` proposes one, and flank_clearance" in last
 
 
-def test_jammed_units_matter_in_no_verdict_where_the_model_has_no_limit_for_them_or_few_are_jammed():
+def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     def verdict(reducer: ReducerChoice, scale: float) -> str:
         asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_baseline"), limits=LIMITS))
         errors, uniform = asked.errors, np.random.default_rng(5).uniform(size=(200, len(asked.errors.columns)))
         return asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones)).but
 
-    assert "jammed" in verdict(ta.reducer("rv20e"), 1.0)
+    assert "preloaded" in verdict(ta.reducer("rv20e"), 1.0)
     assert verdict(ta.reducer("rv20e"), 1e-3) == ""
-    assert verdict(ta.reducer("rv20e_liu2020"), 1.0) == ""
+    assert "by stiffnesses that no dimensions support" in verdict(ta.reducer("rv20e_liu2020"), 1.0)
     opened = verdict(ta.reducer("rv20e", flank_clearance=(1.0, 12.0)), 1.0)
     assert opened.endswith("lets the allocation open it, at present from 1 to 12 µm")
 
