@@ -69,7 +69,7 @@ def test_a_check_for_a_program_says_the_same(tmp_path):
     said = json.loads(tolalloc("check", script, "--json").stdout)
     assert list(said["limits"]) == [ta.PEAK_TO_PEAK, ta.PRELOAD]
     assert any("are preloaded" in sentence for sentence in said["examined"])
-    assert "a pin of the rated torque: a tooth modification that leaves more than the present 1.04 µm" in said["but"]
+    assert "N of the rated torque): a tooth modification that leaves more than the present 1.04 µm" in said["but"]
 
 
 def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_frees_them(tmp_path):

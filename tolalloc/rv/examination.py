@@ -60,7 +60,7 @@ def examined(model: ReducerModel, x: Float[np.ndarray, "sample column"]) -> Exam
     if not reasons:
         return Examination(sentences, figures=figures)
     trust = " ".join(own for own in cautions if "not trust" in own)
-    fault = f"Cannot be built as drawn: of {len(x)} random reducers {' and '.join(reasons)}. {trust}".strip()
+    fault = f"Cannot be built as drawn: of {len(x):,} random reducers {' and '.join(reasons)}. {trust}".strip()
     return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, figures)
 
 
@@ -70,10 +70,10 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
     if (share := figures["share preloaded [-]"]) > allowed:
         by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
         force = figures["pin force of the rated torque [N]"]
-        found.append(f"{share:.1%} are preloaded beyond the {force:.0f} N a pin of the rated torque{by}")
+        found.append(f"{share:.1%} are preloaded (a pin presses by more than the {force:.0f} N of the rated torque{by})")
     if (share := figures["share without radial clearance [-]"]) > allowed:
         least = _true_minus(figures["least radial clearance [µm]"])
-        found.append(f"{share:.1%} have no radial clearance, {least} µm at worst")
+        found.append(f"{share:.1%} have no radial clearance ({least} µm at worst)")
     return found
 
 
