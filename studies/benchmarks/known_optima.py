@@ -43,6 +43,7 @@ class Case:
     limits: tuple[tuple[float | None, float], ...]  # Lower and upper limit of each output [mm]
     function: Callable[..., object]
     beyond: tuple[Callable[[Vector], float], ...]  # Share beyond the limits of each output at scales of all zones [-]
+    loads: Vector | None = None  # Slopes of two linear outputs over the room that their limits leave [1/mm]
 
     def cost(self, scales: Vector) -> float:
         """Return the cost of zones at some scales."""
@@ -141,7 +142,8 @@ def case(number: int, seed: int) -> Case:
         return tuple(sum(c * x for c, x in zip(own, sizes, strict=True)) for own in both)
 
     beyond = tuple(linear_beyond(own, None, room) for own, room in zip(both, rooms, strict=True))
-    return Case(kind, nominal, costs, (target, target), limits, functions, beyond)
+    loads = both / np.array(rooms)[:, np.newaxis]
+    return Case(kind, nominal, costs, (target, target), limits, functions, beyond, loads)
 
 
 def kept(own: Case, scales: Vector) -> float:
@@ -152,7 +154,7 @@ def kept(own: Case, scales: Vector) -> float:
 def at_limits(own: Case, scales: Vector) -> Vector:
     """Return scales in the same ratios that are just allowed."""
     even = scales / np.exp(np.log(scales).mean())
-    factor = brentq(lambda log: np.log(max(kept(own, even * np.exp(log)), 1e-300)), -2.5, 2.0, xtol=1e-10)
+    factor = brentq(lambda log: np.log(max(kept(own, even * np.exp(log)), 1e-300)), -6.0, 3.0, xtol=1e-10)
     return np.asarray(even * np.exp(factor))
 
 
@@ -177,11 +179,7 @@ def optimum(own: Case) -> Vector:
 
 def _optimum_of_two(own: Case) -> Vector:
     """Return the cheapest zones of two linear limits: for prices of both s³ ∝ cost/Σ price·load², one of them free."""
-    loads = []
-    for beyond in own.beyond:
-        shares = [beyond(np.where(np.arange(own.costs.size) == at, 1.0, 1e-9)) for at in range(own.costs.size)]
-        loads.append(1 / np.array([norm.isf(share) for share in shares]))  # deviation over the room, of one source
-    squares = np.square(loads)
+    squares = np.square(own.loads)
 
     def scales(angle: float) -> Vector:
         price = np.array([np.cos(angle), np.sin(angle)])

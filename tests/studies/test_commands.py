@@ -94,10 +94,11 @@ def test_te_for_a_person_names_units():
     assert "N·m/arcmin" in result.stdout
 
 
-def test_check_is_in_order():
+def test_check_says_what_is_read_and_that_the_drawing_cannot_be_built():
     result = tolalloc("check", STUDY)
     assert result.returncode == 0
-    assert "is in order" in result.stdout
+    assert "is in order" not in result.stdout
+    assert "can be run, but of its units 100.0% are preloaded" in result.stdout
     assert "σ =" in result.stdout
     assert "Neglected: not in the tolerance table and taken as exact: " in result.stdout
     # Rows that say the same stand in one line, others do not; the zones of the shipped table cost what they add up to.

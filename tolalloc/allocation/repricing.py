@@ -45,12 +45,9 @@ def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, flo
 
 
 def outside_range(source: Source) -> str:
-    """Return a sentence on a zone that lies outside what its row allows, empty for any other.
-
-    The zone of a locked row may be anything.
-    """
+    """Return a sentence on a zone that lies outside what its row allows, empty for any other."""
     low, zone, high = (size / MICROMETRE for size in (source.minimum, source.zone, source.maximum))
-    if source.locked or low * (1 - _ROUNDING) <= zone <= high * (1 + _ROUNDING):
+    if high == 0 or low * (1 - _ROUNDING) <= zone <= high * (1 + _ROUNDING):
         return ""
     name = source.own_id or source.name
     meant = f" Write {name}={zone:g}mm if millimetres are meant." if low <= 1000 * zone <= high else ""

@@ -70,7 +70,7 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
     if (share := figures["share preloaded [-]"]) > allowed:
         by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
         force = figures["pin force of the rated torque [N]"]
-        found.append(f"{share:.1%} are preloaded (a pin presses by more than the {force:.0f} N of the rated torque{by})")
+        found.append(f"{share:.1%} are preloaded (a pin presses with more than the {force:.0f} N of rated torque{by})")
     if (share := figures["share without radial clearance [-]"]) > allowed:
         least = _true_minus(figures["least radial clearance [µm]"])
         found.append(f"{share:.1%} have no radial clearance ({least} µm at worst)")
