@@ -77,9 +77,7 @@ def test_a_check_for_a_program_says_the_same(tmp_path):
 def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_frees_them(tmp_path):
     *_, said, last = tolalloc("check", study_script(tmp_path, reducer={"name": "rv20e"})).stdout.splitlines()
     assert said.startswith("A study is a Python program")
-    said = (
-        r"can be run, but of its units \d+\.\d% are preloaded \(.* than the \d+ N of rated torque\).*: a tooth mod"
-    )
+    said = r"can be run, but of its units \d+\.\d% are preloaded \(.* than the \d+ N of rated torque\).*: a tooth mod"
     assert re.search(said, last)
     assert "in order" not in last
     assert "`tolalloc modify` proposes one, and flank_clearance" in last

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from math import exp, floor, sqrt
 
@@ -297,6 +299,35 @@ def test_the_table_reads_back_with_the_zones_of_the_drawing(drawn):
     if results.graded:
         np.testing.assert_allclose([own.zone for own in read], [own.zone for own in results.drawn_sources], rtol=1e-12)
         assert {own.grade for own in read if own.zone} == set(results.graded.labels)
+
+
+@pytest.mark.slow
+def test_the_files_read_back_have_the_verified_yield_and_cost(drawn, tmp_path):
+    """6,144 other units at zones and modification of ``allocation.csv``; the workbook as LibreOffice calculates it."""
+    results, folder = drawn
+    sources, stated = load_tolerance_table(folder / "allocation.csv"), stated_settings(folder / "allocation.csv")
+    errors = replace(results.space.errors, sources=sources)
+    model = results.model.at(np.array([stated[name] for name in results.space.shared.names]))
+    x = errors.deviations(
+        errors.standard_values(np.random.default_rng(3).random((6144, len(errors.columns)))), errors.zones
+    )
+    requirement = results.requirements[0]
+    found = model.reading((requirement.output,))(x)
+    kept = requirement.limits.kept_by(np.where(found.good, found.values[:, 0], np.nan)).mean()
+    error = np.sqrt((1 - results.chosen.achieved.low) / 6144)
+    assert kept == pytest.approx(results.chosen.achieved.estimate, abs=4 * error)
+    if shutil.which("soffice") is None:
+        pytest.skip("no LibreOffice to recalculate the workbook with")
+    profile = f"-env:UserInstallation=file://{tmp_path / 'profile'}"
+    convert = ["--headless", "--convert-to", "xlsx:Calc MS Excel 2007 XML", "--outdir", str(tmp_path)]
+    command = ["soffice", profile, *convert, str(folder / "drawing.xlsx")]
+    subprocess.run(command, check=True, capture_output=True, timeout=180)
+    book = load_workbook(tmp_path / "drawing.xlsx", data_only=True)
+    assert book["requirements"][cost_cell(results)].value == pytest.approx(results.chosen.cost)
+    amounts = {row[0]: row[1] for row in book["modification"].iter_rows(min_row=2, values_only=True)}
+    drawn_amounts = results.model.drawn_amounts
+    values = drawn_amounts.by_setting @ results.chosen.settings
+    assert [amounts[name.split(" [")[0]] for name in drawn_amounts.names] == pytest.approx(values.tolist())
 
 
 @pytest.mark.slow

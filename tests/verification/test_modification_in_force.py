@@ -1,0 +1,68 @@
+"""What is said of exact parts follows the modification in force; one that exceeds the catalogue is said."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tolalloc as ta
+from tolalloc.rv.equivalent.perfect import exact_loop
+from tolalloc.rv.model import ReducerModel
+from tolalloc.rv.modification.request import ModificationRequest, choose
+from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.study.prepared import Prepared
+from tolalloc.units import ARCMINUTE, MICROMETRE
+
+
+@pytest.fixture(scope="module")
+def model() -> ReducerModel:
+    reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
+    study = ta.Study(reducer, ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)})
+    return Prepared(study=study).model
+
+
+def lost_motion(sentences: tuple[str, ...]) -> float:
+    (found,) = (re.search(r"lost motion (\S+)′ where it allows", own) for own in sentences if "lost motion" in own)
+    assert found is not None
+    return float(found[1])
+
+
+@pytest.mark.parametrize("clearances", [(1.04, 8.0), (3.5, 6.6), (4.0, 9.0), (6.0, 12.0), (8.0, 20.0)])
+def test_remarks_speak_of_the_modification_in_force(model, clearances):
+    there = model.at(np.array(clearances))
+    modified = replace(model.reducer, modification=there.modification(np.array(clearances)))
+    expected = float(exact_loop(modified).lost_motion[-1]) / ARCMINUTE
+    assert lost_motion(there.remarks) == float(f"{expected:.2g}")
+    assert there.kernel.fixed["modification.equidistant"] == modified.modification.equidistant
+
+
+def test_a_modification_beyond_the_catalogue_is_a_caution_of_its_settings_alone(model):
+    inside, beyond = (model.cautions(np.array(own)) for own in ((1.04, 8.0), (8.0, 20.0)))
+    assert not any("lost motion" in own for own in inside)
+    assert any("lost motion of 1.8′ is above the catalogue's 1′" in own for own in beyond)
+
+
+def test_a_check_of_a_design_speaks_of_its_clearances(model):
+    x = np.zeros((4, len(model.columns)))
+    for clearances in ((2.0, 9.0), (5.0, 15.0)):
+        said = " ".join(model.at(np.array(clearances)).examined(x).sentences)
+        assert f"Nominal clearance {clearances[0]:g} µm on the flank and {clearances[1]:g} µm at tip and root" in said
+        assert f"The radial clearance of a unit is {clearances[1]:g} µm at least" in said
+
+
+@pytest.mark.parametrize(("radial", "warned"), [(15.0, True), (10.0, True), (5.0, True), (3.0, True), (1.5, False)])
+def test_a_proposed_modification_beyond_the_catalogue_is_said(radial, warned):
+    """Amounts that li2018 chooses for an RV-20E leave 0.34′ of backlash a micrometre of radial clearance."""
+    answer = choose(
+        ModificationRequest(method="li2018", radial_clearance=radial * MICROMETRE), load_reducer("rv20e"), -167.0
+    )
+    said = [own for own in answer.warnings if "the catalogue of RV-20E allows 1′ of lost motion" in own]
+    assert bool(said) == warned
+
+
+def test_a_reducer_without_a_catalogue_has_nothing_to_exceed():
+    answer = choose(ModificationRequest(method="li2018"), load_reducer("rv20e_liu2020"), -167.0)
+    assert not any("the catalogue of" in own for own in answer.warnings)
