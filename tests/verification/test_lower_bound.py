@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.stats import beta, norm
 
 import tolalloc as ta
 from tolalloc.allocation.guarantee import AtCpk, AtYield
 from tolalloc.allocation.limited_sample import LimitedSample
 from tolalloc.capability.indices import Limits
+from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 
 GAP = "gap [mm]"
@@ -57,7 +58,7 @@ def test_the_optimum_of_the_chain_is_what_is_worked_out_by_hand():
 
 @pytest.mark.parametrize("effort", ["quick", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_bound_of_a_linear_function_lies_below_its_optimum_and_the_answer_at_it(effort):
-    for seed in (1, 2) if effort == "quick" else range(1, 9):
+    for seed in (1,) if effort == "quick" else range(1, 9):
         found = allocated(chain, CHAIN, ta.Limit(lower=13.8, upper=14.2, show=ta.AtYield(0.9973)), seed, effort)
         assert found.met
         assert found.bound_is_certified
@@ -109,6 +110,7 @@ def test_a_one_sided_distribution_or_two_sided_uniform_limit_is_not_certified():
     assert not allocated(lambda a, b: a + b, rows, two, distribution="uniform").bound_is_certified
 
 
+@pytest.mark.slow
 def test_a_bent_function_is_bounded_by_its_local_model():
     """y = a + b + 2a²: the true optimum by 400,000 random numbers whose quantile has a standard error of 0.3 %."""
     rows, limit = {"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 3.0)}, 0.1
@@ -163,3 +165,40 @@ def test_units_near_a_limit_bound_it_from_below_as_plain_ones_do():
         )
         above += units.least_excess(drawn[solved], 0.99, 0.95) > norm.ppf(0.99)
     assert 0 < above / 300 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
+
+
+def test_units_that_leave_the_law_move_the_level_outwards():
+    """50 of 10,000 units leave it: up to 0.63 % may (95 %), so 2 % beyond the limit are shown as 1.37 % of the law."""
+    rows = {"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 3.0)}
+    errors = drawing(rows).errors
+    function = LinearFunction(offset=0.0, slopes=np.array([1e3, 1e3]), rounding=1e-9)
+    law = LinearLaw.of(function, errors, errors.zones)
+    deviation = np.hypot(0.2, 0.2) / 6
+    for leaving in (0, 50):
+        sample = LimitedSample(
+            values=np.zeros(10_000),
+            units=SolvedUnits.all_of(10_000),
+            limits=Limits(upper=0.1),
+            law=law,
+            leaving=leaving,
+        )
+        most = beta.ppf(0.95, leaving + 1, 10_000 - leaving)
+        (shown,), (least,) = AtYield(0.98).levels(sample, 0.95), AtYield(0.98).least_levels(sample, 0.95)
+        assert shown.value == pytest.approx(deviation * norm.isf(0.02 - most), rel=1e-6)
+        assert least.value == pytest.approx(deviation * norm.isf(0.02 + most), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_function_that_is_linear_but_for_a_rare_jump_is_judged_by_its_units():
+    """y = a + b, and 0.3 more where a lies beyond 2.9 σ, 0.19 % of all units: the drawing must leave room for them."""
+    rows = {"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 1.0)}
+
+    def jumps(a, b):
+        return a + b + 0.3 * (a > 0.02)
+
+    found = allocated(jumps, rows, ta.Limit(upper=0.1, show=ta.AtYield(0.9973)), seed=3)
+    assert not found.bound_is_certified
+    zones = {own.name: own.zone * 1e3 / 6 for own in found.drawn_sources}
+    a, b = np.random.default_rng(4).standard_normal((2, 2_000_000)) * np.array([[zones["a"]], [zones["b"]]])
+    kept = np.mean(jumps(a, b) <= 0.1)
+    assert not found.met or kept > 0.9973 - 3 * np.sqrt(0.0027 / a.size)

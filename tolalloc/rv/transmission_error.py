@@ -161,7 +161,7 @@ class TransmissionErrorAnswer(Answer):
                 for name, (unit, value) in OUTPUTS.items()
             ],
             "pin_force_without_torque_n": float(self.preload.pin_force[0]),
-            "no_load_friction_torque_nm": float(self.preload.friction_torque[0]),
+            "largest_friction_torque_of_pins_without_load_nm": float(self.preload.friction_torque[0]),
             "lost_motion_arcmin": _pair(self.loop.lost_motion, ARCMINUTE),
             "backlash_arcmin": _pair(self.loop.backlash, ARCMINUTE),
             "torsional_stiffness_nm_per_arcmin": _pair(self.loop.torsional_stiffness, 1 / ARCMINUTE),
@@ -213,8 +213,8 @@ class TransmissionErrorAnswer(Answer):
             *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in found["outputs"]),
             ("largest pin force without torque [N]", _short(found["pin_force_without_torque_n"])),
             (
-                "friction of the pins without load, largest over the turn, at the output [N·m]",
-                _short(found["no_load_friction_torque_nm"]),
+                "largest friction torque of the pins without load, at the output [N·m]",
+                _short(found["largest_friction_torque_of_pins_without_load_nm"]),
             ),
             *loops,
             *(
