@@ -87,6 +87,9 @@ def test_the_table_brings_its_setting_back(answer, folder):
     kept = again.requirements[0].limits.kept_by(again.model.reading((GAP,))(units).values[:, 0])
     error = np.sqrt(0.0027 / kept.size)
     assert kept.mean() == pytest.approx(answer.chosen.achieved.estimate, abs=4 * error)
+    plain = folder / "plain.csv"
+    plain.write_text("".join((folder / "allocation.csv").read_text("utf-8").partition("# setting")[:1]), "utf-8")
+    assert drawing.with_table(plain).settings == drawing.settings  # other zones, the same modification
     changed = study(drawing=drawing).changed(drawing, settings={SPRING: 0.2})
     assert Prepared(study=changed).model.settings[0].value == 0.2
 

@@ -132,6 +132,8 @@ class Drawing:
     def with_table(self, table: str | Path) -> Drawing:
         """Return the drawing at the zones of another tolerance table, with the same correlations and process costs.
 
+        Its settings stay as well, but those that the table states.
+
         Raises
         ------
         InputError, UnknownNameError
@@ -141,7 +143,7 @@ class Drawing:
         notes, currency = _read_beside(path)
         sources = load_tolerance_table(path)
         notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
-        settings = stated_settings(path) if path.suffix else {}
+        settings = {**self.settings, **(stated_settings(path) if path.suffix else {})}
         return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
