@@ -109,6 +109,18 @@ def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
     return np.asarray(np.minimum(side.batches[:, :groups].mean(axis=0), 0.0))
 
 
+def _without_weight(answer: AllocationAnswer) -> tuple[str, ...]:
+    """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
+    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in answer.chosen.sides], axis=0)
+    names = [group for group, weight in zip(answer.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
+    if not names:
+        return ()
+    return (
+        f"A smaller zone of {', '.join(names)} relieves no limit here, and may move one the other way by more than these "
+        "sheets say: ask tolalloc whatif.",
+    )
+
+
 def _steps(frame: FeatureFrame) -> int:
     """Return how many steps of a tenth of a micrometre a micrometre of the zone is written as; ± has half of them."""
     return 5 if frame.characteristic == "size" else 10
@@ -186,7 +198,7 @@ def style_calculator(answer: AllocationAnswer, path: Path) -> None:
         }
         for name, frame in sheets.items()
     }
-    notes = (*drawn_amounts(answer), *amounts_convention(answer))
+    notes = (*drawn_amounts(answer), *amounts_convention(answer), *_without_weight(answer))
     values["drawing"] |= _below(drawing, sheets["requirements"], groups, notes)
     drawing.freeze_panes = "C2"
     drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
