@@ -116,8 +116,8 @@ def _without_weight(answer: AllocationAnswer) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"A smaller zone of {', '.join(names)} relieves no limit here, and may move one the other way by more than these "
-        "sheets say: ask tolalloc whatif.",
+        f"A smaller zone of {', '.join(names)} relieves no limit here, and may move one the other way by more than "
+        "these sheets say: ask tolalloc whatif.",
     )
 
 
