@@ -173,7 +173,7 @@ class Judge:
         )
 
 
-_OffTheLaw = dict[str, Bool[np.ndarray, " unit"]]
+_OffTheLaw = dict[str, Bool[np.ndarray, "..."]]
 """Output with a law → which units do not keep to it."""
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float, Int
 
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Distribution, Marginal
@@ -204,13 +204,13 @@ class LinearLaw:
             added[part.source] += self._read(own * others, at) / step
         return density, added
 
-    def _read(self, spectrum: Float[np.ndarray, " point"], at: float) -> float:
+    def _read(self, spectrum: Complex[np.ndarray, " point"], at: float) -> float:
         """Return the value of a transformed density at a place of the grid."""
         values = np.fft.fftshift(np.fft.ifft(spectrum).real)
         return float(np.interp(at, np.arange(_POINTS), values))
 
     @cached_property
-    def _source_of_column(self) -> Float[np.ndarray, " column"]:
+    def _source_of_column(self) -> Int[np.ndarray, " column"]:
         counts = [len(source.columns) for source in self.errors.active]
         return np.repeat(np.arange(len(counts)), counts)
 
@@ -288,7 +288,7 @@ class LinearLaw:
         return np.asarray(np.exp(-0.5 * (self._grid[1] * self._normal_deviation) ** 2))
 
     @cached_property
-    def _spectra(self) -> Float[np.ndarray, "part point"]:
+    def _spectra(self) -> Complex[np.ndarray, "part point"]:
         return np.array([np.fft.fft(part.masses(self._grid[0], _POINTS)) for part in self._parts])
 
     @cached_property
