@@ -137,7 +137,7 @@ def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path
     words = command("check", script)
     found = subprocess.run(words, capture_output=True, text=True, cwd=elsewhere, check=False, env=environment)
     assert found.returncode == 0, found.stderr
-    assert "is in order" in found.stdout and "at most 55" in found.stdout
+    assert "Study study can be run, but" in found.stdout and "at most 55" in found.stdout
     table.unlink()
     refused(tolalloc("check", script), str(table), "no such file")
 

@@ -282,8 +282,10 @@ def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
 def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_first_page(results):
     drawn = results.model.drawn_amounts
     sentence = said(results, "The drawing holds with this modification only: equidistant Δr_rp ")
-    for design, word in ((results.chosen, "µm instead"), (results.free.baseline, "instead of")):
-        for amount in drawn.by_setting @ design.settings:
-            assert f"{amount:.2f}" in sentence
-            assert word in sentence
-    assert sentence in section(results, "What to write").paragraphs
+    for amount, was in zip(
+        drawn.by_setting @ results.chosen.settings, drawn.by_setting @ results.free.baseline.settings, strict=True
+    ):
+        assert f"{amount:.2f} µm (was {was:.2f})".replace("-", "−") in sentence
+    (first, *_) = section(results, "What to write").paragraphs
+    assert first.startswith(sentence)
+    assert "a positive equidistant amount and a negative shift remove material" in first

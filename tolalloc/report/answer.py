@@ -216,11 +216,11 @@ class Answer(ABC):
         printer.text(str(self))
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the key sentence, the first table, one figure."""
+        """Return what a notebook shows: the first two sentences, the first table, one figure."""
         from tolalloc.report.html_table import html_table
         from tolalloc.report.writer import inline_png
 
-        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.told[:1])]
+        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.told[:2])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]
         shown += [inline_png(figure) for figure in list(self.figures.values())[:1]]
         return "\n".join(shown)
