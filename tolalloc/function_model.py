@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation, Model, Observer, SettingDerivatives, unobserved
+from tolalloc.models import Evaluation, Examination, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.settings import Setting, require_settings
 from tolalloc.units import MILLIMETRE
 from tolalloc.user_function import UserFunction, identity
@@ -156,6 +156,10 @@ class BoundFunction(Model):
         """What a reader must know: inputs that the drawing gives no nominal size."""
         bare = [name for name, offset in zip(self.source.inputs, self.offsets, strict=True) if offset == 0.0]
         return (f"no nominal size on the drawing, taken as deviations from 0: {', '.join(bare)}",) if bare else ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
+        """Return which inputs have no nominal size: a size that was forgotten moves every output."""
+        return Examination(tuple(f"{said[0].upper()}{said[1:]}." for said in self.assumptions))
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -176,4 +176,8 @@ def test_a_check_remarks_a_nominal_size_that_is_not_the_reducers():
     )
     assert other.examined(np.zeros((1, len(other.columns)))).sentences[0] == said
     assert bound({"housing.groove.radius": {"nominal": 2.05e-3}}).mismatches[0].count("groove.radius is 2.05 mm") == 1
+    for single, size in (("each_pin.diameter", "4 mm"), ("each_pin.groove", "2 mm")):
+        (said,) = bound({single: {"nominal": 2e-2}}).mismatches
+        assert f"nominal of {single} is 20 mm" in said
+        assert f"is {size} in reducer" in said
     assert bound({"pin.diameter": {"nominal": 0.0}}).mismatches == ()

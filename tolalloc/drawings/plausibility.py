@@ -32,6 +32,8 @@ _CAPABILITY = (0.4, 4.0)
 """Cp outside which a process is doubted [-]."""
 _STEEP = 0.01
 """Zone over the length that an angle is taken over, from which on the length is doubted [rad]."""
+_FLAT = 5e-6
+"""The same below which the length is doubted, 1″ [rad]; assumption."""
 
 
 def doubts(sources: Sequence[Source], table: str) -> tuple[str, ...]:
@@ -93,7 +95,7 @@ def _of_zone(source: Source) -> list[str]:
         if not _FINEST <= factor <= _COARSEST:
             than = "finer than IT01" if factor < _FINEST else "coarser than IT15"
             found.append(f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}")
-    if source.over and zone / source.over > _STEEP:
+    if source.over and not _FLAT <= zone / source.over <= _STEEP:
         found.append(
             f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
         )

@@ -143,6 +143,8 @@ def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     meant = {
         "pin.diameter": ("twice its pin radius", 2 * radius),
         "housing.groove.radius": ("its pin radius", radius),
+        "each_pin.diameter": ("twice its pin radius", 2 * radius),
+        "each_pin.groove": ("its pin radius", radius),
         "modification.equidistant": ("its equidistant amount", own.equidistant),
         "modification.shift": ("its shift amount", own.shift),
     }
