@@ -199,7 +199,15 @@ def test_what_is_typed_is_read_as_meant_or_replaced_by_the_last_good_value(drive
     from selenium.webdriver.common.keys import Keys
 
     shown(driver, study)
-    for typed, shows in (("2,5", "2.5"), ("30.5 µm", "30.5"), ("0,02 mm", "20"), ("1.000,5", "20"), ("abc", "20")):
+    for typed, shows in (
+        ("2,5", "2.5"),
+        ("30.5 µm", "30.5"),
+        ("0,02 mm", "20"),
+        ("1.000,5", "20"),
+        ("1,000", "20"),
+        ("abc", "20"),
+        ("3e1", "30"),
+    ):
         field = driver.find_element("css selector", "#zones input[inputmode=decimal]")
         field.send_keys(Keys.CONTROL + "a" + Keys.NULL, typed, Keys.TAB)
         until(lambda wanted=shows, own=field: own.get_attribute("value") == wanted)

@@ -50,13 +50,19 @@ def test_nothing_is_said_of_a_zone_at_its_bounds():
         ("pin.diameter=30µm", 30.0),
         ("pin.diameter = 30 um", 30.0),
         ("pin.diameter=1e-3mm", 1.0),
+        ("pin.diameter=1E+1", 10.0),
+        ("pin.diameter=0,125", 0.125),
+        ("pin.diameter=1.125", 1.125),
     ],
 )
 def test_a_zone_may_have_a_decimal_comma_and_a_unit(text, zone):
     assert _zone(text) == ("pin.diameter", pytest.approx(zone))
 
 
-@pytest.mark.parametrize("text", ["a", "a=", "a=x", "a=1.000,5", "a=1 000", "a=-3", "a=3cm", "a=nan", "a=inf"])
+@pytest.mark.parametrize(
+    "text",
+    ["a", "a=", "a=x", "a=1.000,5", "a=1,000", "a=12,345mm", "a=250,000", "a=1 000", "a=-3", "a=3cm", "a=nan", "a=inf"],
+)
 def test_what_is_no_zone_is_refused_with_what_is_allowed(text):
     with pytest.raises(InputError, match=r"SOURCE=µm, such as pin.diameter=3, or with its unit as in housing=0.02mm"):
         _zone(text)

@@ -44,11 +44,20 @@ def whatif(
 
 
 def _zone(text: str) -> tuple[str, float]:
-    """Return pattern and zone [µm] of one argument, whose number may have a decimal comma and a unit."""
+    """Return pattern and zone [µm] of one argument, whose number may have a decimal comma and a unit.
+
+    Refused is 1,000: it may mean one or a thousand.
+    """
     pattern, separator, stated = text.partition("=")
-    match = re.fullmatch(r"\s*(\d+(?:[.,]\d*)?|[.,]\d+)(e-?\d+)?\s*(µm|μm|um|mm)?\s*", stated)
+    match = re.fullmatch(
+        r"\s*(?![1-9]\d{0,2},\d{3}(?!\d))(\d+(?:[.,]\d*)?|[.,]\d+)(e[-+]?\d+)?\s*(µm|μm|um|mm)?\s*",
+        stated,
+        re.ASCII | re.IGNORECASE,
+    )
     if match is None:
         allowed = "SOURCE=µm, such as pin.diameter=3, or with its unit as in housing=0.02mm"
         raise InputError.at("whatif", "zone", text if separator else f"{text} without =", allowed)
     number, power, unit = match.groups()
-    return pattern.strip(), float(number.replace(",", ".") + (power or "")) * (1000.0 if unit == "mm" else 1.0)
+    return pattern.strip(), float(number.replace(",", ".") + (power or "")) * (
+        1000.0 if (unit or "").lower() == "mm" else 1.0
+    )

@@ -16,13 +16,14 @@ export { make };
 const STEPS = 400; // of a slider
 const rounded = (value) => Number(value.toPrecision(4));
 
-// What somebody typed: decimal comma or point, a true minus, a unit behind it; nothing where it may mean two numbers.
+// What somebody typed, in a unit: decimal comma or point, a true minus, a unit behind it. Nothing where it may mean two
+// numbers, as 1,000 may, or where its unit is not one of lengths and neither is the one that is asked for.
 export function typed(text, unit = MICRO) {
-  const found = /^\s*([-−+]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(µm|μm|um|mm)?\s*$/.exec(text);
+  const found = /^\s*([-−+]?)(?![1-9]\d{0,2},\d{3}(?!\d))(\d+(?:[.,]\d*)?|[.,]\d+)(e[-+]?\d+)?\s*(µm|μm|um|mm)?\s*$/i.exec(text);
   if (!found) return NaN;
-  const [, sign, digits, stated] = found, size = Number(digits.replace(",", "."));
-  const factor = unit === MICRO && stated === "mm" ? 1000 : 1;
-  return (sign === "-" || sign === "−" ? -1 : 1) * size * factor;
+  const [, sign, digits, power = "", stated] = found, lengths = { [MICRO]: 1, mm: 1000 };
+  const factor = stated ? (stated.toLowerCase() === "mm" ? lengths.mm : 1) / (lengths[unit] ?? NaN) : 1;
+  return (sign === "-" || sign === "−" ? -1 : 1) * Number(digits.replace(",", ".") + power) * factor;
 }
 
 export class Zones {
@@ -120,14 +121,14 @@ export class Zones {
   }
 
   settingRow(own) {
-    const fixed = own.lower >= own.upper;
+    const fixed = own.lower >= own.upper, unit = /\[([^\]]*)\]$/.exec(own.name)?.[1] ?? "";
     const set = (value, settled) => {
       if (!Number.isFinite(value)) return this.show();
       this.design = { ...this.design, settings: { ...this.design.settings, [own.name]: Math.max(own.lower, Math.min(own.upper, value)) } };
       this.show();
       this.changed(this.design, settled);
     };
-    const field = make("input", { inputmode: "decimal", disabled: fixed, "aria-label": own.name, onchange: (e) => set(typed(e.target.value, ""), true) });
+    const field = make("input", { inputmode: "decimal", disabled: fixed, "aria-label": own.name, onchange: (e) => set(typed(e.target.value, unit), true) });
     const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: own.step || 1, disabled: fixed, "aria-label": `${own.name}, from ${own.lower} to ${own.upper}`,
       oninput: (e) => set(rounded(Number(e.target.value)), false), onchange: (e) => set(rounded(Number(e.target.value)), true) });
     const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : own.word);
