@@ -1,0 +1,171 @@
+"""The golden cases: every command on the preset, on a reducer of three cranks and on an own function, small or shipped.
+
+A case is one folder and the commands that are typed in it, one after the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SMALL_EFFORT = """ta.Effort(
+        ranking=ta.RankingEffort(
+            units=1000, sobol=ta.SobolEffort(start=16, limit=16, resamples=50), trajectories=2, moment_units=100,
+            derivative_units=10, inverse_units=1, surrogate_units=96, level_units=100, level_runs=2, widened_units=100,
+            permutations=2),
+        allocation=ta.AllocationEffort(
+            verification_units=256, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
+            setting_steps=(2, 2), changed_costs=4, changed_stiffnesses=1, stiffness_units=128, share_blocks=8,
+            yields=(0.9, 0.95), error=0.5,
+            search=ta.SearchEffort(steps=2, front=ta.FrontEffort(population=8, generations=4, population_on_kernel=8,
+                generations_on_kernel=2, designs=10, rounds=1, points=3))),
+        is_quick=True)"""
+
+PRESET = f"""import tolalloc as ta
+
+study = ta.Study(
+    ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), unit="table4",
+        stiffness="rv20e_table6"),
+    ta.drawing("rv20e_baseline"),
+    limits={{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.95)), ta.LOST_MOTION: ta.Limit(upper=2.0,
+        show=ta.AtYield(target=0.95))}},
+    questions=[ta.Ranking(), ta.Allocation(grades=True), ta.Difference(zones={{"pin.diameter": 3, "disc1.*": 8}})],
+    name="preset",
+    effort={SMALL_EFFORT},
+    title_block={{"author": "N. N."}},
+)
+"""
+
+THREE = f"""import tolalloc as ta
+
+study = ta.Study(
+    ta.reducer("mine/reducer.toml", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0)),
+    ta.drawing("mine/zones.xlsx"),
+    limits={{ta.PEAK_TO_PEAK: ta.Limit(upper=70.0, show=ta.AtYield(target=0.9)), ta.PRELOAD: None}},
+    questions=[ta.Ranking(), ta.Allocation(front=False)],
+    name="three",
+    effort={SMALL_EFFORT},
+)
+"""
+
+OWN = f"""import tolalloc as ta
+
+
+def gap(housing, shaft, ring, press):
+    return housing - shaft - ring + 0.1 * press, housing - 0.5 * shaft**2 / 30
+
+
+SHOWN = ta.AtYield(target=0.95)
+ROW = {{"unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}}
+study = ta.Study(
+    ta.model(gap, inputs=("housing", "shaft", "ring"), outputs=("gap [mm]", "seat [mm]"),
+        settings=(ta.Setting(name="press", value=0.2, lower=0.0, upper=1.0, step=0.1),)),
+    ta.Drawing.of_rows([
+        {{"id": "housing", "nominal": 30.1, "plus": 0.02, "minus": -0.02, **ROW}},
+        {{"id": "shaft", "nominal": 25.0, "plus": 0.02, "minus": -0.02, **ROW}},
+        {{"id": "ring", "nominal": 5.0, "plus": 0.03, "minus": -0.01, "distribution": "uniform", **ROW}},
+    ], costs={{"shaft": [("turned", 0.2, 0.004, 0.02, 0.05), ("ground", 0.8, 0.002, 0.004, 0.02)]}}),
+    limits={{"gap [mm]": ta.Limit(lower=0.05, upper=0.2, show=SHOWN), "seat [mm]": ta.Limit(lower=19.6, show=SHOWN)}},
+    questions=[ta.Ranking(), ta.Allocation()],
+    name="own",
+    effort={SMALL_EFFORT},
+)
+"""
+
+
+BROKEN = "import tolalloc as ta\nstudy = ta.Study(ta.reducer('rv20e'), ta.drawing('nowhere.csv'), limits={})\n"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One folder and the commands that are typed in it.
+
+    Parameters
+    ----------
+    name
+        Name of its golden files.
+    files
+        Name → text of each file that lies there first.
+    commands
+        Words of each command; ``@`` before a word stands for the folder.
+    """
+
+    name: str
+    files: dict[str, str]
+    commands: tuple[tuple[str, ...], ...]
+
+
+NEW = ("new", "@mine", "--like", "rv40e", "--cranks", "3", "--with", "all")
+MINE = ("--reducer", "@mine/reducer.toml")
+
+SMALL = (
+    Case(
+        name="own",
+        files={"own.py": OWN, "broken.py": BROKEN},
+        commands=(
+            ("check", "@own.py"),
+            ("run", "@own.py", "--out", "@run"),
+            ("allocate", "@own.py", "--grades", "--out", "@graded"),
+            ("compare", "@run", "@graded"),
+            ("rank", "@own.py", "--json"),
+            ("whatif", "@own.py", "shaft=0.02"),
+            ("check", "@broken.py"),
+        ),
+    ),
+    Case(
+        name="reducer_questions",
+        files={},
+        commands=(
+            NEW,
+            ("check", "@mine/study.py"),
+            ("te", "--reducer", "rv20e", "--unit", "table4", "--attribute", "--out", "@te"),
+            ("te", *MINE),
+            ("contact", *MINE, "--out", "@contact"),
+            ("modify", "li2018", *MINE, "--radial", "15", "--out", "@modify"),
+            ("assemble", "@mine/chain.toml", "--measured", "@mine/angles.csv", "--out", "@assemble"),
+            ("assemble", "bx40e"),
+            ("costs", "@mine/shop.csv", "--out", "@costs"),
+            ("schema", "reducer"),
+            ("schema", "bench"),
+            ("te", "--reducer", "rv21e"),
+        ),
+    ),
+)
+"""Cases of the default tests."""
+
+LONGER = (
+    Case(
+        name="preset",
+        files={"preset.py": PRESET},
+        commands=(
+            ("check", "@preset.py"),
+            ("run", "@preset.py", "--out", "@run"),
+            ("whatif", "@preset.py", "pin.diameter=3", "disc*.pitch=10"),
+        ),
+    ),
+    Case(
+        name="three",
+        files={"three.py": THREE},
+        commands=(NEW, ("check", "@three.py"), ("run", "@three.py", "--out", "@run")),
+    ),
+    Case(
+        name="bench",
+        files={},
+        commands=(
+            NEW,
+            ("identify", "@mine/bench.toml", *MINE, "--out", "@identify"),
+            ("diagnose", "@mine/unit7.csv", *MINE, "--tolerances", "@mine/zones.xlsx", "--out", "@diagnose"),
+            ("mount", "@mine/parts.csv", *MINE, "--out", "@mount"),
+            ("simulate", "--reducer", "rv40e_xi2015", "--speed", "5250", "--ramp", "0.02", "--duration", "0.06",
+             "--step", "1e-5", "--torque", "-572", "--out", "@simulate"),
+        ),
+    ),
+)
+"""Cases of the full gate."""
+
+SHIPPED = "shipped_{}"
+"""Name of the case of a shipped study, which is run quick."""
+
+
+def shipped(study: str) -> Case:
+    """Return the case of a shipped study by its file's stem."""
+    return Case(name=SHIPPED.format(study), files={}, commands=(("run", f"studies/{study}.py", "--quick", "--out", "@run"),))
