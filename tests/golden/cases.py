@@ -106,7 +106,7 @@ SMALL = (
             ("run", "@own.py", "--out", "@run"),
             ("allocate", "@own.py", "--grades", "--out", "@graded"),
             ("compare", "@run", "@graded"),
-            ("rank", "@own.py", "--json"),
+            ("rank", "@own.py", "--json", "--out", "@rank"),
             ("whatif", "@own.py", "shaft=0.02"),
             ("check", "@broken.py"),
         ),
