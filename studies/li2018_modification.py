@@ -10,12 +10,12 @@ from published.modification_comparison import compared, comparison_document
 
 import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
-from tolalloc.report.document import Document, Section
-from tolalloc.rv.modification.problem import reference
-from tolalloc.rv.modification.request import ModificationRequest
-from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.modification.problem import reference
+from tolalloc.reducers.modification.request import ModificationRequest
+from tolalloc.reducers.modification.residual_gap import closed_form, residual_gap
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reports.document import Document, Section
 
 RADIAL_CLEARANCE = 15 * MICROMETRE
 

@@ -26,13 +26,13 @@ from tolalloc.cli.progress import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.progress import Progress
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import BuiltUnit
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}
 """Stiffness of the simulated units, inside the bounds of Table 5 and away from the start [N/m]."""

@@ -14,7 +14,7 @@ from tolalloc.allocation.program.problem import AllocationProblem, Solution
 from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import SolveError
-from tolalloc.report.document import Document, Section
+from tolalloc.reports.document import Document, Section
 
 
 def solved(problem: AllocationProblem) -> Solution:

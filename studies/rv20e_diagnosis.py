@@ -17,12 +17,12 @@ from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
 from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.diagnosis.sources import dominant, reductions
 from tolalloc.bench.measurement.files import MeasuredCurve
-from tolalloc.chunks import one_thread
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.model import ReducerModel
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.chunks import one_thread
 
 UNITS, QUICK = 200, 2
 READINGS = 1440

@@ -9,12 +9,12 @@ import numpy as np
 
 import tolalloc as ta
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.report.document import Document, Section
-from tolalloc.report.picture.moving import MovingPicture
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.scene.scene import Scene, scene_of
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.picture.moving import MovingPicture
 
 PICTURES = 30
 

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 
 import tolalloc as ta
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.equivalent.attribution import attribute
-from tolalloc.rv.equivalent.hysteresis import DRAWN, LOST_MOTION, both_directions, hysteresis_loop
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.transmission_error import transmission_error
-from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
+from tolalloc.reducers.equivalent.attribution import attribute
+from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, both_directions, hysteresis_loop
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.transmission_error import transmission_error
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
 
 TORQUE = -1.0
 

@@ -10,14 +10,14 @@ import pandas as pd
 
 import tolalloc as ta
 from tolalloc.exceptions import SolveError
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
-from tolalloc.rv.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND, RPM
+from tolalloc.reading.units import ARCSECOND, RPM
+from tolalloc.reducers.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
+from tolalloc.reducers.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
 
 TORQUE = -167.0
 LOADS = (0.0, 1.0, 100.0)

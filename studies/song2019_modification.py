@@ -13,17 +13,17 @@ from published.modification_comparison import algorithms_table, compared, compar
 
 import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
-from tolalloc.report.document import Document, Section
-from tolalloc.rv.cycloid.assessment import assess
-from tolalloc.rv.cycloid.mesh import flank_angle
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.problem import reference
-from tolalloc.rv.modification.request import ModificationRequest
-from tolalloc.rv.modification.rotated_profile import METRICS, rotated_profile_fit
-from tolalloc.rv.reducer.design import CycloidStage, Modification, Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.teeth.figures import clearance_figure
-from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.assessment import assess
+from tolalloc.reducers.cycloid.mesh import flank_angle
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.modification.problem import reference
+from tolalloc.reducers.modification.request import ModificationRequest
+from tolalloc.reducers.modification.rotated_profile import METRICS, rotated_profile_fit
+from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.teeth.figures import clearance_figure
+from tolalloc.reports.document import Document, Section
 
 STAGE = CycloidStage(
     pin_count=40,

@@ -12,16 +12,16 @@ import pandas as pd
 from scipy.optimize import brentq
 
 import tolalloc as ta
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.cycloid.clearance import formula_gap
-from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.rv.cycloid.mesh import normals
-from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.teeth.answer import contact_answer
-from tolalloc.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import formula_gap
+from tolalloc.reducers.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
+from tolalloc.reducers.cycloid.mesh import normals
+from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.teeth.answer import contact_answer
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
 
 TORQUE = 572.0
 SHARE = 0.55

@@ -13,17 +13,17 @@ import pandas as pd
 import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
 from tolalloc.exceptions import InputError
-from tolalloc.report.document import Document, Section
-from tolalloc.rv.multibody.prototype import with_rigid_bearings
-from tolalloc.rv.multibody.system import engine
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer import SimulationAnswer
-from tolalloc.rv.simulation.figures import error_figure, run_figures
-from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation, with_ideal_gears
-from tolalloc.rv.simulation.run import simulate
-from tolalloc.rv.simulation.sentences import range_text
-from tolalloc.units import ARCSECOND, RPM
+from tolalloc.reading.units import ARCSECOND, RPM
+from tolalloc.reducers.multibody.prototype import with_rigid_bearings
+from tolalloc.reducers.multibody.system import engine
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.simulation.answer import SimulationAnswer
+from tolalloc.reducers.simulation.figures import error_figure, run_figures
+from tolalloc.reducers.simulation.request import SimulationRequest, prepare_simulation, with_ideal_gears
+from tolalloc.reducers.simulation.run import simulate
+from tolalloc.reducers.simulation.sentences import range_text
+from tolalloc.reports.document import Document, Section
 
 IMPLIED = 3.67e7
 """Stiffness of every pin contact at which 16 to 17 carry, as xi2015's printed angles imply [N/m]."""

@@ -22,8 +22,8 @@ import tolalloc as ta
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.cli.progress import shown_progress
-from tolalloc.report.document import Document
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reports.document import Document
 
 SEED = 20250711
 """Seed of the parts that stand for zhang2025's Table 3, which is lost."""

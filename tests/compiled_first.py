@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolalloc.compiled import is_kept
-from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
-from tolalloc.rv.dynamics.properties import Damping, inertia_of, newmark
-from tolalloc.rv.dynamics.simulation import simulate
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.design import Clearances
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of
+from tolalloc.reducers.dynamics.properties import Damping, inertia_of, newmark
+from tolalloc.reducers.dynamics.simulation import simulate
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.running.compiled import is_kept
 
 FEW = AngleSearch(coarse=8)
 

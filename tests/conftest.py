@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.compiled_first import compile_in_two_processes
-from tolalloc.compiled import use_threads
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.running.compiled import use_threads
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     use_threads(1)  # every core has a worker already

@@ -7,7 +7,7 @@ import numpy as np
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 
 def random_plan(seed: int) -> AssemblyPlan:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
-from tolalloc.rv.reducer.stiffness import Material, Stiffness
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
+from tolalloc.reducers.reducer.stiffness import Material, Stiffness
 
 LAWS = ("constant", "table2", "logarithmic")
 SINGLE, DISC_TILT = r"^each_|\.each_", r"^disc\d+\.tilt"

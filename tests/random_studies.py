@@ -12,11 +12,11 @@ from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv import LOST_MOTION, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
-from tolalloc.rv.choice import ReducerChoice
-from tolalloc.rv.reducer.design import Modification, Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reducers import LOST_MOTION, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
+from tolalloc.reducers.choice import ReducerChoice
+from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 _TABLE_UNITS = 1024
 """Units at the zones of the table that the limits are set by [-]."""

@@ -26,7 +26,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 
 Margin = Callable[[np.ndarray], np.ndarray]
 

@@ -9,7 +9,7 @@ import numpy as np
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel
 
 FIRST_STAGE = ("sun.", "planet", "mesh")
 STANDING = ("housing.", "each_pin.", "carrier.assembly", "carrier.tilt", "sun.assembly")

@@ -32,29 +32,29 @@ if TYPE_CHECKING:
     from tolalloc.exceptions import SolveError as SolveError
     from tolalloc.exceptions import TolallocError as TolallocError
     from tolalloc.exceptions import UnknownNameError as UnknownNameError
-    from tolalloc.function_model import from_fmu as from_fmu
-    from tolalloc.function_model import model as model
-    from tolalloc.models import Evaluation as Evaluation
-    from tolalloc.models import Model as Model
-    from tolalloc.report.answer import Answer as Answer
-    from tolalloc.report.document import Document as Document
-    from tolalloc.report.document import Section as Section
-    from tolalloc.report.figure import Figure as Figure
-    from tolalloc.report.figure import Series as Series
-    from tolalloc.rv import BACKLASH as BACKLASH
-    from tolalloc.rv import EFFICIENCY as EFFICIENCY
-    from tolalloc.rv import FRICTION_TORQUE as FRICTION_TORQUE
-    from tolalloc.rv import HYSTERESIS_LOSS as HYSTERESIS_LOSS
-    from tolalloc.rv import LOST_MOTION as LOST_MOTION
-    from tolalloc.rv import LOST_MOTION_WITH_FRICTION as LOST_MOTION_WITH_FRICTION
-    from tolalloc.rv import PEAK_TO_PEAK as PEAK_TO_PEAK
-    from tolalloc.rv import PRELOAD as PRELOAD
-    from tolalloc.rv import RADIAL_CLEARANCE as RADIAL_CLEARANCE
-    from tolalloc.rv import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
-    from tolalloc.rv.choice import reducer as reducer
+    from tolalloc.models.function_model import from_fmu as from_fmu
+    from tolalloc.models.function_model import model as model
+    from tolalloc.models.model import Evaluation as Evaluation
+    from tolalloc.models.model import Model as Model
+    from tolalloc.models.settings import Setting as Setting
+    from tolalloc.reducers import BACKLASH as BACKLASH
+    from tolalloc.reducers import EFFICIENCY as EFFICIENCY
+    from tolalloc.reducers import FRICTION_TORQUE as FRICTION_TORQUE
+    from tolalloc.reducers import HYSTERESIS_LOSS as HYSTERESIS_LOSS
+    from tolalloc.reducers import LOST_MOTION as LOST_MOTION
+    from tolalloc.reducers import LOST_MOTION_WITH_FRICTION as LOST_MOTION_WITH_FRICTION
+    from tolalloc.reducers import PEAK_TO_PEAK as PEAK_TO_PEAK
+    from tolalloc.reducers import PRELOAD as PRELOAD
+    from tolalloc.reducers import RADIAL_CLEARANCE as RADIAL_CLEARANCE
+    from tolalloc.reducers import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
+    from tolalloc.reducers.choice import reducer as reducer
+    from tolalloc.reports.answer import Answer as Answer
+    from tolalloc.reports.document import Document as Document
+    from tolalloc.reports.document import Section as Section
+    from tolalloc.reports.figure import Figure as Figure
+    from tolalloc.reports.figure import Series as Series
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
-    from tolalloc.settings import Setting as Setting
     from tolalloc.study.effort import Effort as Effort
     from tolalloc.study.limit import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -67,58 +67,61 @@ if TYPE_CHECKING:
 _WHERE = {
     "Allocation": "study.questions",
     "AllocationEffort": "allocation.effort",
-    "Answer": "report.answer",
+    "Answer": "reports.answer",
     "AtCpk": "allocation.guarantee",
     "AtYield": "allocation.guarantee",
-    "BACKLASH": "rv",
+    "BACKLASH": "reducers",
     "Calculation": "study.questions",
     "Difference": "study.questions",
-    "Document": "report.document",
+    "Document": "reports.document",
     "Drawing": "drawings.drawing",
-    "EFFICIENCY": "rv",
+    "EFFICIENCY": "reducers",
     "Effort": "study.effort",
-    "Evaluation": "models",
-    "FRICTION_TORQUE": "rv",
-    "Figure": "report.figure",
+    "Evaluation": "models.model",
+    "FRICTION_TORQUE": "reducers",
+    "Figure": "reports.figure",
     "FrontEffort": "allocation.effort",
-    "HYSTERESIS_LOSS": "rv",
+    "HYSTERESIS_LOSS": "reducers",
     "InputError": "exceptions",
-    "LOST_MOTION": "rv",
-    "LOST_MOTION_WITH_FRICTION": "rv",
+    "LOST_MOTION": "reducers",
+    "LOST_MOTION_WITH_FRICTION": "reducers",
     "Limit": "study.limit",
-    "Model": "models",
-    "PEAK_TO_PEAK": "rv",
-    "PRELOAD": "rv",
+    "Model": "models.model",
+    "PEAK_TO_PEAK": "reducers",
+    "PRELOAD": "reducers",
     "QualityLoss": "allocation.cost.unit_price",
     "Question": "study.questions",
-    "RADIAL_CLEARANCE": "rv",
+    "RADIAL_CLEARANCE": "reducers",
     "Ranking": "study.questions",
     "RankingEffort": "sensitivity.effort",
     "RootSumSquare": "allocation.classical_guarantee",
     "RunFolderError": "exceptions",
     "SamplingDesign": "drawings.seeds",
     "SearchEffort": "allocation.effort",
-    "Section": "report.document",
+    "Section": "reports.document",
     "SeedTree": "drawings.seeds",
-    "Series": "report.figure",
-    "Setting": "settings",
+    "Series": "reports.figure",
+    "Setting": "models.settings",
     "SobolEffort": "sensitivity.effort",
     "SolveError": "exceptions",
     "Study": "study.study",
-    "TORSIONAL_STIFFNESS": "rv",
+    "TORSIONAL_STIFFNESS": "reducers",
     "TolallocError": "exceptions",
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
     "WorstCase": "allocation.classical_guarantee",
     "drawing": ("drawings.drawing", "load_drawing"),
-    "from_fmu": "function_model",
-    "model": ("function_model", "model"),
-    "reducer": "rv.choice",
+    "from_fmu": "models.function_model",
+    "model": ("models.function_model", "model"),
+    "reducer": "reducers.choice",
     "run_script": "cli.main",
 }
 """Public name → where it stands, with its name there if that is another one."""
 
-__all__ = sorted(_WHERE)
+_INQUIRIES = ("costs",)
+"""Questions that need no study, asked by a function of their own name and by the command of the same."""
+
+__all__ = sorted([*_WHERE, *_INQUIRIES])
 
 
 def __getattr__(name: str) -> Any:
@@ -126,6 +129,10 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("tolalloc")
+    if name in _INQUIRIES:
+        from tolalloc.study.inquiry import door
+
+        return door(import_module(f"tolalloc.study.inquiries.{name}").INQUIRY)
     place = _WHERE.get(name)
     if place is None:
         raise AttributeError(f"module 'tolalloc' has no attribute {name!r}")

@@ -17,11 +17,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import tolalloc as ta
-from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.equivalent.pins import pin_contact
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.pins import pin_contact
 from tolalloc.study.prepared import Prepared
-from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 
 study = ta.Study(
     ta.reducer("rv20e_liu2020"),

@@ -5,7 +5,7 @@
 One run measures in turn, round after round, the distances per second of 40 pins at 360 phases of an RV-40E from the
 teeth of random modifications, on all cores:
 
-* (a) the package, `tolalloc.rv.cycloid.clearance.exact_clearance`;
+* (a) the package, `tolalloc.reducers.cycloid.clearance.exact_clearance`;
 * (b) NumPy, Newton's method on all distances of a design at once, laid on the cores in the way that a trial finds
   fastest: threads, which share the memory (NumPy works without the interpreter's lock), or processes;
 * (c) the machine's bound, below.
@@ -50,11 +50,11 @@ from jaxtyping import Float
 from kernel_speed import SEED, figures, product_rate, progress, run_benchmark
 from numpy_cores import CORES, timed
 
-from tolalloc.rv.cycloid.clearance import exact_clearance
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
-from tolalloc.rv.reducer.design import CycloidStage, Modification
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.cycloid.clearance import exact_clearance
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, require_sound
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.reducer.files import load_reducer
 
 PHASES = 360
 PAIRS = 2

@@ -5,7 +5,7 @@
 One run measures in turn, round after round and on one core, the seconds per unit of one output turn of an RV-20E at
 1 rpm in 1,404 steps of the generalised-α method:
 
-* (a) `tolalloc.rv.dynamics.simulation.simulate` of one unit, tables and all;
+* (a) `tolalloc.reducers.dynamics.simulation.simulate` of one unit, tables and all;
 * (b) the tables alone, which all units of a batch share;
 * (c) the steps alone: a batch of units less the tables, per unit;
 * (d) the same steps in NumPy, all coordinates at once: Newton's method with a line search, its rows made beforehand.
@@ -28,18 +28,18 @@ from numpy_cores import timed
 from scipy.optimize import brentq
 
 from tests.random_units import random_units
-from tolalloc.blas import one_blas_thread
-from tolalloc.compiled import use_threads
-from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of, nominal_acceleration
-from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, inertia_of
-from tolalloc.rv.dynamics.simulation import simulate
-from tolalloc.rv.dynamics.tables import Steps
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of, nominal_acceleration
+from tolalloc.reducers.dynamics.properties import Damping, generalised_alpha, inertia_of
+from tolalloc.reducers.dynamics.simulation import simulate
+from tolalloc.reducers.dynamics.tables import Steps
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.compiled import use_threads
 
 STEPS, FIRST_STEPS, TORQUE, TURN = 1404, 100, -10.0, 60.0
 DELAY = 1e-5  # damping per stiffness, s

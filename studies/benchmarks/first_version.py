@@ -39,8 +39,8 @@ RATIOS = {
 def model(reducer: str) -> Any:
     """Return the equivalent model of a reducer, of either version."""
     try:
-        from tolalloc.rv.equivalent.model import EquivalentModel
-        from tolalloc.rv.reducer.files import load_reducer
+        from tolalloc.reducers.equivalent.model import EquivalentModel
+        from tolalloc.reducers.reducer.files import load_reducer
     except ImportError:  # version 0.1
         from tolalloc.equivalent.model import EquivalentModel
         from tolalloc.reducer.files import load_reducer

@@ -31,10 +31,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tolalloc as ta
 from tests.prepared import prepared
-from tolalloc.chunks import SAMPLES_AT_ONCE
-from tolalloc.compiled import use_threads
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.workers import AHEAD, workers_at
+from tolalloc.running.chunks import SAMPLES_AT_ONCE
+from tolalloc.running.compiled import use_threads
+from tolalloc.running.workers import AHEAD, workers_at
 
 WORKERS = 2
 PORT = 8799

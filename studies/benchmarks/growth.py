@@ -36,12 +36,12 @@ from tolalloc.allocation.program.discrete import DiscreteProblem, feature_option
 from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.plots import save_png
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.plots import save_png
 
 SEED, TORQUE, UNITS = 20261124, -1.0, 256
 REQUIREMENTS = (

@@ -48,10 +48,10 @@ from numpy_cores import ANGLES, CORES, TORQUE, TRIAL_ANGLES, numpy_curves, numpy
 from threadpoolctl import threadpool_info
 
 from tests.random_units import random_units
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
 
 SEED = 20201121
 ALLOWED_DIFFERENCE = 1e-6  # arcsec

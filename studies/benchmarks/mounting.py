@@ -29,13 +29,13 @@ from kernel_speed import SEED, progress
 
 from tolalloc.assembly.mounting.search import EvaluatedUnits, best_mounting, random_mounting, units_from
 from tolalloc.assembly.mounting.stock import PartStock, drawn_parts
-from tolalloc.compiled import thread_count
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.running.compiled import thread_count
 
 TARGET_SECONDS = 2.0
 CLIMBERS = 8

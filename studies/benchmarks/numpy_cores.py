@@ -19,7 +19,7 @@ from jaxtyping import Float
 from numpy_kernel import NumpyKernel
 from threadpoolctl import threadpool_limits
 
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 ANGLES = 936
 TRIAL_ANGLES = 48

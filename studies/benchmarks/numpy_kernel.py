@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy_tables import Tables, condensed_tables
 
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.reducer.design import Reducer
 
 _ANGLES_AT_ONCE = 64
 _WHOLE_STEPS = 8  # by then, what has not settled goes round in circles

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.springs import SpringGroup
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.equivalent.kinematics import Coordinates
+from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.reducer.design import Reducer
 
 _RIDGE = 1e-13  # of the largest stiffness; makes of a singular tangent a long step downhill
 

@@ -18,11 +18,11 @@ from collections import Counter
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.rv.equivalent.answers import count_statuses
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, MICROMETRE
+from tolalloc.reducers.equivalent.answers import count_statuses
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
 
 CHUNK, SCALE = 1024, 3.0
 TORQUES = np.array([-167.0, -10.0, -1.0, -0.1, 1.0, 167.0])

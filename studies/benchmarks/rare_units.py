@@ -27,7 +27,7 @@ from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Response
+from tolalloc.models.model import Response
 
 LIMITS = (105.0, 115.0)
 UNITS, AT_ONCE = 16_384, 65_536

@@ -28,7 +28,7 @@ from numpy_cores import CORES, timed
 from SALib.analyze import sobol as salib
 
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.saltelli import one_pass, saltelli_indices
 
 SOURCES, OUTPUTS, RESAMPLES = 30, 9, 100

@@ -23,8 +23,8 @@ from pymoo.operators.mutation.bitflip import BitflipMutation
 from pymoo.optimize import minimize
 
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.modification.problem import Amounts, ModificationProblem
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.modification.problem import Amounts, ModificationProblem
 
 from .modification_searches import Recorder, SearchResult
 

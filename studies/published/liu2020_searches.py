@@ -24,9 +24,9 @@ from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.request import STARTS
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.progress import Progress
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 from .liu2020_swarm import ImprovedPSO
 from .search_history import History, quartiles

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
 
 BOUNDS = {
     "crank_disc_bearing": (0.8e10, 1.3e10),

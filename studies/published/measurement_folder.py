@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.exceptions import InputError
-from tolalloc.files import as_toml, require_new, write_new
-from tolalloc.rv.reducer.unit_table import write_table, write_units
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.reading.files import as_toml, require_new, write_new
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.reducer.unit_table import write_table, write_units
 
 
 def write_measurements(measurements: Measurements, folder: str | Path) -> Path:

@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.progress import Progress
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.modification.answer import ModificationAnswer
-from tolalloc.rv.modification.problem import ModificationProblem
-from tolalloc.rv.modification.request import ModificationRequest, choose
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.teeth.answer import span
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.modification.answer import ModificationAnswer
+from tolalloc.reducers.modification.problem import ModificationProblem
+from tolalloc.reducers.modification.request import ModificationRequest, choose
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.teeth.answer import span
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 from .li2018_genetic import binary_search
 from .modification_searches import ALGORITHMS, REACHED, SearchResult, Spread, polish, search

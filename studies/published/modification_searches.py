@@ -18,7 +18,8 @@ from scipy.optimize import minimize as minimize_downhill
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.problem import (
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.modification.problem import (
     Amounts,
     BestPoint,
     EvaluatedAmounts,
@@ -26,7 +27,6 @@ from tolalloc.rv.modification.problem import (
     Optimum,
     reference,
 )
-from tolalloc.units import MILLIMETRE
 
 from .search_history import History, quartiles
 

@@ -16,7 +16,7 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.capability.monte_carlo import Yield, proportion
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Reducer
 
 from .simulated_bench import SimulatedBench
 

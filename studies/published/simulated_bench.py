@@ -12,8 +12,8 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.measurement.files import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.unit_file import BuiltUnit
 
 _ANY = ("*",)
 

@@ -16,7 +16,7 @@ from tolalloc.assembly.angular.program import angular_problem, requirements_of
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 
 @dataclass(frozen=True, kw_only=True)

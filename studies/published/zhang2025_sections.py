@@ -23,14 +23,14 @@ from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.equivalent.line_load import contact_pattern
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.units import ARCSECOND, MEGAPASCAL, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE
+from tolalloc.reducers.equivalent.line_load import contact_pattern
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
 
 SEEDS = SeedTree(1).child("zhang2025")
 PRECISIONS = (0.0, 5.0, 10.0)

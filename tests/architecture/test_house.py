@@ -13,7 +13,7 @@ import pytest
 from tolalloc.bench.identification.parameters import SYMBOLS
 from tolalloc.cli.identify import NAMES
 from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
-from tolalloc.rv.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.columns import source_name
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
@@ -21,15 +21,15 @@ DOORS = {
     "SALib": ("sensitivity/",),
     "pymoo": ("allocation/",),
     "cvxpy": ("allocation/",),
-    "sklearn": ("surrogate/", "rv/stand_ins.py"),
-    "matplotlib": ("report/",),
-    "jinja2": ("report/",),
-    "openpyxl": ("start/", "report/", "allocation/answer/", "drawings/workbook.py"),
-    "distributed": ("workers.py",),
-    "numba": ("compiled.py", "compiled_parts.py", "rv/equivalent/solvers/lanes.py"),
-    "llvmlite": ("compiled_parts.py", "rv/equivalent/solvers/lanes.py"),
-    "ezdxf": ("rv/teeth/", "report/feature_frame.py"),
-    "exudyn": ("rv/multibody/",),
+    "sklearn": ("sensitivity/surrogate/", "reducers/stand_ins.py"),
+    "matplotlib": ("reports/",),
+    "jinja2": ("reports/",),
+    "openpyxl": ("cli/start/", "reports/", "allocation/answer/", "drawings/workbook.py"),
+    "distributed": ("running/workers.py",),
+    "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
+    "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
+    "ezdxf": ("reducers/teeth/", "reports/feature_frame.py"),
+    "exudyn": ("reducers/multibody/",),
     "typer": ("cli/",),
     "rich": ("cli/",),
 }

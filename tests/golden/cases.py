@@ -155,8 +155,23 @@ LONGER = (
             ("identify", "@mine/bench.toml", *MINE, "--out", "@identify"),
             ("diagnose", "@mine/unit7.csv", *MINE, "--tolerances", "@mine/zones.xlsx", "--out", "@diagnose"),
             ("mount", "@mine/parts.csv", *MINE, "--out", "@mount"),
-            ("simulate", "--reducer", "rv40e_xi2015", "--speed", "5250", "--ramp", "0.02", "--duration", "0.06",
-             "--step", "1e-5", "--torque", "-572", "--out", "@simulate"),
+            (
+                "simulate",
+                "--reducer",
+                "rv40e_xi2015",
+                "--speed",
+                "5250",
+                "--ramp",
+                "0.02",
+                "--duration",
+                "0.06",
+                "--step",
+                "1e-5",
+                "--torque",
+                "-572",
+                "--out",
+                "@simulate",
+            ),
         ),
     ),
 )
@@ -168,4 +183,6 @@ SHIPPED = "shipped_{}"
 
 def shipped(study: str) -> Case:
     """Return the case of a shipped study by its file's stem."""
-    return Case(name=SHIPPED.format(study), files={}, commands=(("run", f"studies/{study}.py", "--quick", "--out", "@run"),))
+    return Case(
+        name=SHIPPED.format(study), files={}, commands=(("run", f"studies/{study}.py", "--quick", "--out", "@run"),)
+    )

@@ -1,6 +1,7 @@
 """What the commands of a golden case said and wrote: prose as one text, numbers as one record.
 
-``python -m tests.golden.record NAME …`` makes golden files anew, all of them unless named; ``--check`` compares instead,
+``python -m tests.golden.record NAME …`` makes golden files anew, all of them unless named; ``--check`` compares
+instead,
 to the last bit.
 """
 
@@ -134,11 +135,13 @@ def main(words: list[str]) -> int:
             prose, numbers = recorded(CASES[name], Path(made))
         text = json.dumps(numbers, ensure_ascii=False, indent=1) + "\n"
         if "--check" in words:
-            was = [*map(str.splitlines, (kept(name)[0], json.dumps(kept(name)[1], ensure_ascii=False, indent=1) + "\n"))]
+            was = [
+                *map(str.splitlines, (kept(name)[0], json.dumps(kept(name)[1], ensure_ascii=False, indent=1) + "\n"))
+            ]
             for old, new, what in zip(was, (prose.splitlines(), text.splitlines()), ("prose", "numbers"), strict=True):
                 lines = list(difflib.unified_diff(old, new, f"{name} {what}", "now", lineterm="", n=0))
                 different += bool(lines)
-                sys.stdout.write("\n".join(line[:400] for line in lines[:200]) + ("\n" if lines else ""))
+                sys.stdout.write("\n".join(line[:160] for line in lines[:24]) + ("\n" if lines else ""))
             sys.stdout.write(f"{name}: compared\n")
         else:
             (FOLDER / f"{name}.txt").write_text(prose, encoding="utf-8")

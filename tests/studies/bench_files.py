@@ -18,8 +18,8 @@ from tests.studies.command import tolalloc
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.files import load_reducer
 
 NAME, TRUTH, START = "crank_disc_bearing", 1.4e10, 1.09e10
 NOISE = {"curve": 0.2, "loop": 0.1}

@@ -8,7 +8,7 @@ import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
-from tolalloc.report import pdf
+from tolalloc.reports import pdf
 
 MISSING = "no browser that prints a page, or no pdftotext of poppler, is installed"
 

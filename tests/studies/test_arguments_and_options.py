@@ -11,7 +11,7 @@ from tolalloc.bench.diagnosis.request import DiagnosisRequest
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 
 @pytest.mark.parametrize(

@@ -280,7 +280,7 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
 
 @pytest.mark.slow
 def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
-    from tolalloc.rv.reducer.files import PRESETS
+    from tolalloc.reducers.reducer.files import PRESETS
 
     text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     path = tmp_path / "loose.toml"
@@ -337,7 +337,7 @@ def test_a_truncated_table_is_refused(tmp_path):
     ],
 )
 def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
-    from tolalloc.rv.reducer.files import PRESETS
+    from tolalloc.reducers.reducer.files import PRESETS
 
     text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
     assert old in text
@@ -350,7 +350,7 @@ def test_unknown_names_offer_the_nearest(tmp_path):
     refused(tolalloc("te", "--reducer", "rv20"), "rv20", "rv20e")
     refused(tolalloc("te", "--unit", "tabel4"), "tabel4", "table4")
     path = tmp_path / "unit.toml"
-    from tolalloc.rv.reducer.files import PRESETS
+    from tolalloc.reducers.reducer.files import PRESETS
 
     text = (PRESETS / "table4.unit.toml").read_text(encoding="utf-8")
     path.write_text(text.replace('"carrier.bore1.position"', '"carrier.bore3.position"'), encoding="utf-8")

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.rv.reducer.files import PRESETS
+from tolalloc.reducers.reducer.files import PRESETS
 
 
 def reducer_with(tmp_path, *changes: tuple[str, str]):

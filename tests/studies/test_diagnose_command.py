@@ -14,8 +14,8 @@ from tests.prepared import prepared
 from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.report.excel import write_sheets
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reports.excel import write_sheets
 
 REPORT = ("--reducer", "rv20e_liu2020", "--out")
 

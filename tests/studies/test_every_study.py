@@ -11,7 +11,7 @@ import pytest
 
 from tests.studies.command import ROOT, process, refused
 from tests.studies.paper import can_print, lost
-from tolalloc.report import pdf
+from tolalloc.reports import pdf
 
 STUDIES = sorted((ROOT / "studies").glob("*.py"))
 

@@ -19,8 +19,8 @@ from tolalloc.cli.console import print_table
 from tolalloc.cli.main import main
 from tolalloc.cli.progress import Bars, Lines
 from tolalloc.drawings.drawing import Drawing
-from tolalloc.report.excel import write_sheets
-from tolalloc.report.writer import write_csv
+from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.writer import write_csv
 
 
 @pytest.mark.parametrize(

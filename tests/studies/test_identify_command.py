@@ -24,7 +24,7 @@ from tests.studies.bench_files import (
     value,
 )
 from tests.studies.command import refused, tolalloc
-from tolalloc.rv.reducer.files import load_identified_stiffness
+from tolalloc.reducers.reducer.files import load_identified_stiffness
 
 
 @dataclass(frozen=True)

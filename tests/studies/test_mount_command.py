@@ -11,8 +11,8 @@ from tolalloc.assembly.mounting.stock import drawn_parts
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.reducer.files import load_reducer
 
 
 def parts_file(folder, units, seed=5):

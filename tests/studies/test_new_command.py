@@ -15,12 +15,12 @@ from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.main import app
+from tolalloc.cli.start.bench_files import FACTOR, STIFFER
+from tolalloc.cli.start.reducer_text import PRESETS
 from tolalloc.drawings.drawing import load_drawing
-from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.start.bench_files import FACTOR, STIFFER
-from tolalloc.start.reducer_text import PRESETS
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
 
 
 @pytest.mark.parametrize(("preset", "cranks", "discs"), [("rv20e", 2, 1), ("rv40e", 3, 2), ("rv160e", 4, 3)])

@@ -11,9 +11,9 @@ import pytest
 
 import tolalloc as ta
 from tests.studies.command import tolalloc
-from tolalloc.rv.cycloid.assessment import assess
-from tolalloc.rv.equivalent.perfect import perfect_reducer
-from tolalloc.rv.reducer.files import PRESETS
+from tolalloc.reducers.cycloid.assessment import assess
+from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.reducer.files import PRESETS
 
 TORQUE = 572.0
 

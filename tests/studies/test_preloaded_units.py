@@ -12,9 +12,9 @@ import tolalloc as ta
 from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.exceptions import InputError
-from tolalloc.rv.choice import ReducerChoice
-from tolalloc.rv.equivalent.preload import preload
-from tolalloc.rv.rigidity import rated_pin_force
+from tolalloc.reducers.choice import ReducerChoice
+from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.rigidity import rated_pin_force
 from tolalloc.study.prepared import Prepared
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}

@@ -14,12 +14,12 @@ import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tests.studies.paper import MISSING, can_print, lost
 from tolalloc.exceptions import InputError
-from tolalloc.report import pdf
-from tolalloc.report.document import Document, Section, joined
-from tolalloc.report.feature_frame import FeatureFrame
-from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.report.html_table import html_table
-from tolalloc.report.writer import write_document
+from tolalloc.reports import pdf
+from tolalloc.reports.document import Document, Section, joined
+from tolalloc.reports.feature_frame import FeatureFrame
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.html_table import html_table
+from tolalloc.reports.writer import write_document
 
 TITLE = "A title that is far longer than its picture is wide, as it has to say what an empty cell of it means"
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}

@@ -14,10 +14,10 @@ import pytest
 
 from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
-from tolalloc import kept_units
 from tolalloc.cli.progress import Lines
-from tolalloc.report import writer
-from tolalloc.report.folder import claimed
+from tolalloc.reports import writer
+from tolalloc.reports.folder import claimed
+from tolalloc.running import result_cache as kept_units
 
 COMPARED = ("summary.json", "allocation.csv", "tables/drawing.csv", "tables/front.csv")
 KEPT = ".tolalloc-units"
@@ -84,7 +84,7 @@ def test_a_report_fills_an_empty_folder_that_stands_there(tmp_path):
 def test_what_a_killed_writer_left_is_cleared_by_the_next_one(tmp_path):
     writing = f"""
 from pathlib import Path
-from tolalloc.report.folder import claimed
+from tolalloc.reports.folder import claimed
 with claimed(Path({str(tmp_path / "mine")!r})) as folder:
     (folder / "report.html").write_text("half")
     print("writing", flush=True)

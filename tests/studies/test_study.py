@@ -24,7 +24,12 @@ LATE = ("cvxpy", "sklearn", "pymoo", "pandas")
 DOCUMENTED = (
     "tolalloc",
     *(f"tolalloc.study.{path.stem}" for path in sorted((ROOT / "tolalloc" / "study").glob("*.py"))),
-    *("tolalloc.function_model", "tolalloc.drawings.drawing", "tolalloc.rv.choice", "tolalloc.report.wording"),
+    *(
+        "tolalloc.models.function_model",
+        "tolalloc.drawings.drawing",
+        "tolalloc.reducers.choice",
+        "tolalloc.reports.wording",
+    ),
 )
 
 

@@ -64,11 +64,11 @@ def of_the_wheel(installed, folder, *words):
 def test_the_wheel_holds_what_it_needs_and_no_more(installed):
     names = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
     needed = {
-        "tolalloc/report/page/chart.js",
-        "tolalloc/report/page/mechanism.js",
-        "tolalloc/report/templates/document.html.j2",
-        "tolalloc/live/page/live.html",
-        "tolalloc/rv/reducer/presets/rv20e.reducer.toml",
+        "tolalloc/reports/page/chart.js",
+        "tolalloc/reports/page/mechanism.js",
+        "tolalloc/reports/templates/document.html.j2",
+        "tolalloc/cli/live/page/live.html",
+        "tolalloc/reducers/reducer/presets/rv20e.reducer.toml",
         "tolalloc/drawings/data/rv20e_all_sources.tolerances.csv",
     }
     assert needed <= names

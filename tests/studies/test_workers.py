@@ -16,8 +16,8 @@ from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.kept_units import KeptUnits
-from tolalloc.workers import workers_at
+from tolalloc.running.result_cache import KeptUnits
+from tolalloc.running.workers import workers_at
 
 UNITS = 12 * 1024
 
@@ -25,7 +25,7 @@ UNITS = 12 * 1024
 @pytest.fixture(autouse=True)
 def two_workers(monkeypatch):
     """Have two workers where the tests themselves share the cores, too."""
-    monkeypatch.setattr("tolalloc.workers.thread_count", lambda: 2)
+    monkeypatch.setattr("tolalloc.running.workers.thread_count", lambda: 2)
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_what_workers_solved_is_kept_for_this_process(study, units, in_this_proc
 
 @pytest.mark.slow
 def test_nobody_at_the_address_is_a_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolalloc.workers._PATIENCE", 1)
+    monkeypatch.setattr("tolalloc.running.workers._PATIENCE", 1)
     script = study_script(tmp_path)
     result = tolalloc("rank", script, "--out", tmp_path / "run", "--scheduler", "tcp://127.0.0.1:9")
     assert result.returncode == 2

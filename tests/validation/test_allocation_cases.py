@@ -17,7 +17,7 @@ from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
 
 CHAIN = ("reciprocal", "t_min of x1 is 0.25", "t_max of x3 is 0.30", "exponential")
 METHODS = ("root sum square", "worst case")

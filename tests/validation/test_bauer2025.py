@@ -15,10 +15,10 @@ import pytest
 
 from tests.three_cranks import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.reducer.files import load_reducer
 
 TEETH, PINS = 45, 46
 TORQUE = -10.0

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from studies.published.li2018_genetic import LI2018, binary_search
-from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.rv.cycloid.mesh import flank_angle
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.problem import reference
-from tolalloc.rv.modification.residual_gap import closed_form, residual_gap
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
+from tolalloc.reducers.cycloid.mesh import flank_angle
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.modification.problem import reference
+from tolalloc.reducers.modification.residual_gap import closed_form, residual_gap
+from tolalloc.reducers.reducer.files import load_reducer
 
 STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e_liu2020", "rv40e_xi2015", "rv80e")}
 RV40E, J = STAGES["rv40e_xi2015"], 15 * MICROMETRE

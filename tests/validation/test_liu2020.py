@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from tests.validation_manual import shown
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.units import ARCMINUTE, ARCSECOND
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import order_spectrum
 
 PUBLISHED = np.loadtxt(Path(__file__).parent / "rv20e_table4_curves.csv", delimiter=",", skiprows=1)
 TORQUES = (-1.0, -10.0, -167.0)
@@ -190,7 +190,7 @@ def test_torsional_stiffness_of_the_perfect_reducer(rv20e):
 
 def test_modification_gap_on_the_flank_and_at_tip_and_root(rv20e, table4):
     """Table 4's modification opens every pin: 8.0 µm at tip and root, 1.04 µm where cos φ′ = K1."""
-    from tolalloc.rv.equivalent.condensation import spring_groups
+    from tolalloc.reducers.equivalent.condensation import spring_groups
 
     contact = spring_groups(rv20e.reducer, np.array([0.0]))[-1]
     columns = [contact.columns.index(f"modification.{name}") for name in ("equidistant", "shift")]

@@ -16,11 +16,11 @@ import pytest
 from tolalloc.allocation.grade import grade_zones
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.models.model import Evaluation
+from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices
-from tolalloc.units import ARCSECOND, MICROMETRE, MILLIMETRE
 
 BLOCKS = 1024
 ANGLES = 2 * np.pi * np.arange(468) / 468

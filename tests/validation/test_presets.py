@@ -12,16 +12,16 @@ import pytest
 from tests.studies.command import refused, tolalloc
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces, order_spectrum
-from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.equivalent.preload import preload
-from tolalloc.rv.reducer.files import PRESETS, load_reducer
-from tolalloc.rv.reducer.friction import SLIDING_FRICTION
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.rigidity import FACTOR, against_catalogue, rated_pin_force, twist_shares
-from tolalloc.units import ARCMINUTE
+from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.friction import SLIDING_FRICTION
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.rigidity import FACTOR, against_catalogue, rated_pin_force, twist_shares
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
 

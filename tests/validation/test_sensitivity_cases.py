@@ -20,7 +20,7 @@ import pytest
 from scipy.stats import norm
 
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import saltelli_indices
 

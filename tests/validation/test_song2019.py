@@ -12,10 +12,10 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from tolalloc.rv.cycloid.clearance import exact_clearance
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.reducer.design import CycloidStage, Modification
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import exact_clearance
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 STAGE = CycloidStage(
     pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=1.5e-3, face_width=0.01

@@ -11,13 +11,13 @@ import pytest
 
 from studies.published.modification_searches import Recorder, polish
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.rv.cycloid.mesh import flank_angle
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.modification.problem import reference
-from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
-from tolalloc.rv.reducer.design import CycloidStage, Modification
-from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
+from tolalloc.reducers.cycloid.mesh import flank_angle
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.modification.problem import reference
+from tolalloc.reducers.modification.rotated_profile import rotated_profile_fit
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 STAGE = CycloidStage(
     pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=0.0015, face_width=0.01

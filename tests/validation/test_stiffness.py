@@ -9,17 +9,23 @@ import pytest
 
 from studies.published.liu2020_table2 import mesh_as_printed, pin_contact_as_printed
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.cycloid.contact_stiffness import pin_contact_table2
-from tolalloc.rv.reducer.design import CycloidStage
-from tolalloc.rv.reducer.files import (
+from tolalloc.reducers.cycloid.contact_stiffness import pin_contact_table2
+from tolalloc.reducers.reducer.design import CycloidStage
+from tolalloc.reducers.reducer.files import (
     PRESETS,
     load_identified_stiffness,
     load_reducer,
     with_stiffness,
     write_identified_stiffness,
 )
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness, Material, contact_modulus, line_contact, pin_bending
-from tolalloc.rv.reducer.table2 import (
+from tolalloc.reducers.reducer.stiffness import (
+    IdentifiedStiffness,
+    Material,
+    contact_modulus,
+    line_contact,
+    pin_bending,
+)
+from tolalloc.reducers.reducer.table2 import (
     TAPER_ANGLE,
     ball_bearing,
     ball_coefficient_as_printed,

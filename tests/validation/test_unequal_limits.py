@@ -12,7 +12,7 @@ import pytest
 import tolalloc as ta
 from studies.published.stacks import root_sum_square, stack_limits, worst_case
 from tolalloc.exceptions import InputError
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
 
 DIRECTIONS, SIZES = np.array([1.0, -1.0]), np.array([10.0, 9.8])
 PLUS, MINUS = np.array([0.05, 0.03]), np.array([-0.05, -0.02])  # mm

@@ -16,12 +16,12 @@ from scipy.optimize import brentq
 
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.clearance import formula_gap
-from tolalloc.rv.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
-from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import PRESETS, load_reducer
-from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import formula_gap
+from tolalloc.reducers.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
+from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 
 DEFLECTION = 17.603 * MICROMETRE
 PIN_0 = np.zeros(1)

@@ -17,10 +17,10 @@ import pytest
 from tests.three_cranks import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
 from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.reducer.files import load_reducer
 
 MEASURED = np.array([29.68 + 30.39, 31.51 + 33.13])
 """Peak-to-peak of the two prototypes [arcsec]."""

@@ -17,7 +17,7 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.steps import Choice, Efforts, state_space, steps_in_order
 from tolalloc.assembly.trajectory import foreseen
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 OPPOSITE = (0.0, 0.0, np.pi)
 BX40E = DatumFlowChain(

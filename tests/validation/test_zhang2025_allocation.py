@@ -19,7 +19,7 @@ from tolalloc.assembly.control import kalman_filter, regulator
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 PLAN = load_plan("bx40e")
 PRICED = replace(PLAN, requirements=replace(PLAN.requirements, effort_price=0.02 / ARCSECOND**2))

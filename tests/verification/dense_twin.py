@@ -13,11 +13,11 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 from scipy.special import lambertw
 
-from tolalloc.rv.cycloid.contact_stiffness import equivalent_length
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates
-from tolalloc.rv.equivalent.springs import SpringGroup
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.cycloid.contact_stiffness import equivalent_length
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import HARMONICS, Coordinates
+from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.reducer.design import Reducer
 
 Response = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Energy [element], force [element, row] and its derivative [element, row, row] of an interface."""

@@ -15,11 +15,11 @@ from scipy.optimize import brentq
 from scipy.special import ellipe
 
 from tests.verification.dense_twin import DenseModel, Interface, Response, interface, play_response
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.equivalent.springs import SpringGroup
-from tolalloc.rv.reducer.design import Clearances, Reducer
-from tolalloc.rv.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.reducer.design import Clearances, Reducer
+from tolalloc.reducers.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
 
 
 def hertz(bearing: BallBearing) -> float:

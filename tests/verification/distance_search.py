@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tests.verification.test_cycloid_profile import modified_points, path_bend
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 Curve = Callable[[np.ndarray], np.ndarray]
 

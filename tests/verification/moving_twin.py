@@ -9,10 +9,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
-from tolalloc.rv.dynamics.motion import SpeedProfile
-from tolalloc.rv.dynamics.properties import Inertia
-from tolalloc.rv.equivalent.kinematics import HARMONICS, Coordinates
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.dynamics.motion import SpeedProfile
+from tolalloc.reducers.dynamics.properties import Inertia
+from tolalloc.reducers.equivalent.kinematics import HARMONICS, Coordinates
+from tolalloc.reducers.reducer.design import Reducer
 
 
 def part_paths(reducer: Reducer, carrier_angle: float) -> np.ndarray:

@@ -22,8 +22,8 @@ from tolalloc.allocation.verification import Verifier
 from tolalloc.allocation.yield_cost import cost_at_yield
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.model import FLANK, RADIAL
-from tolalloc.rv.reducer.files import load_identified_stiffness
+from tolalloc.reducers.model import FLANK, RADIAL
+from tolalloc.reducers.reducer.files import load_identified_stiffness
 
 UNITS = 1152
 

@@ -15,7 +15,7 @@ from tests.random_studies import random_reducer, random_sources
 from tests.studies.command import ROOT
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.choice import ReducerChoice
+from tolalloc.reducers.choice import ReducerChoice
 from tolalloc.study.prepared import Prepared
 
 BENCHMARKS = ROOT / "studies" / "benchmarks"

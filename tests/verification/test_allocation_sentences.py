@@ -15,8 +15,8 @@ from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.report.document import Section
-from tolalloc.rv.reducer.files import load_identified_stiffness
+from tolalloc.reducers.reducer.files import load_identified_stiffness
+from tolalloc.reports.document import Section
 
 pytestmark = pytest.mark.slow  # one allocation of all limits, in a minute or two, is what all read
 

@@ -15,7 +15,7 @@ from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.files import load_plan
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 PLAN = load_plan("bx40e")
 FREE = np.full(4, np.inf)

@@ -21,7 +21,7 @@ from tolalloc.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_
 from tolalloc.assembly.trajectory import Trajectory, foreseen, simulated
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 SEEDS = range(6)
 NOISE = 2 * ARCSECOND, 1 * ARCSECOND

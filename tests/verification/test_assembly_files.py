@@ -12,11 +12,11 @@ from tolalloc.assembly.files import DATA, load_errors, load_plan
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, check_steps
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.rv.equivalent.interfaces import crank_disc
-from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import PRESETS, load_reducer
-from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
+from tolalloc.reducers.equivalent.interfaces import crank_disc
+from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 
 SHORT = """
 name = "short"

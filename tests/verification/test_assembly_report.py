@@ -20,10 +20,10 @@ from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, Tra
 from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.trajectory import random_numbers
-from tolalloc.report.charts import chart
-from tolalloc.rv.equivalent.line_load import ContactPattern
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.line_load import ContactPattern
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reports.charts import chart
 
 CHAIN = """
 name = "pump"

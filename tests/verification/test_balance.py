@@ -24,12 +24,12 @@ from tests.random_reducers import Case, random_case, random_reducer, random_unit
 from tests.seeds import seeds
 from tests.validation_manual import shown
 from tests.verification.dense_twin import DenseModel, dense_model
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import Coordinates
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
 
 SEEDS = seeds(40)
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tests.random_units import random_units
-from tolalloc import chunks
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.running import chunks
 
 
 @pytest.mark.slow

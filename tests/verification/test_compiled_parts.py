@@ -9,8 +9,8 @@ import numba as nb
 import numpy as np
 import pytest
 
-from tolalloc import compiled
-from tolalloc.compiled_parts import Whole
+from tolalloc.running import compiled
+from tolalloc.running.compiled_parts import Whole
 
 
 def _inner(values, at):
@@ -77,7 +77,7 @@ def test_what_is_kept_is_not_compiled_again(tmp_path, monkeypatch):
 
 
 def test_numba_compiles_in_its_own_way_where_parts_cannot_stand(monkeypatch):
-    monkeypatch.setitem(sys.modules, "tolalloc.compiled_parts", None)
+    monkeypatch.setitem(sys.modules, "tolalloc.running.compiled_parts", None)
     ordinary = compiled._new(_inner, {"nogil": True, "error_model": "numpy"})
     assert not isinstance(ordinary, Whole)
     assert ordinary(VALUES, 1) == 11.0

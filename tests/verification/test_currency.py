@@ -15,9 +15,9 @@ from tests.verification.test_own_words import ROWS, summed
 from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError
-from tolalloc.report.answer import Header
-from tolalloc.report.currency import in_currency
-from tolalloc.report.feature_frame import FeatureFrame, Frames
+from tolalloc.reports.currency import in_currency
+from tolalloc.reports.feature_frame import FeatureFrame, Frames
+from tolalloc.reports.header import Header
 from tolalloc.study.comparison import ComparisonAnswer
 from tolalloc.study.finished_run import read_run
 from tolalloc.study.prepared import Prepared

@@ -13,7 +13,8 @@ from tests.seeds import seeds
 from tests.verification.distance_search import grindable, places, random_amounts, searched, searched_between
 from tests.verification.test_cycloid_profile import path_bend
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.clearance import (
+from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import (
     LARGE,
     clearance_of,
     exact_clearance,
@@ -21,10 +22,9 @@ from tolalloc.rv.cycloid.clearance import (
     is_large,
     linear_clearance,
 )
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
-from tolalloc.rv.reducer.design import CycloidStage, Modification
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, require_sound
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.reducer.files import load_reducer
 
 NANOMETRE_MILLIONTH = 1e-12  # 1e-9 mm
 FLANK = np.linspace(0.0, np.pi, 181)

@@ -17,14 +17,14 @@ from scipy.optimize import brentq
 from tests.random_reducers import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.rv.cycloid.pressed import pressed, pressed_linear
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.reducer.design import Clearances, CycloidStage, Modification, Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
+from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.reducer.design import Clearances, CycloidStage, Modification, Reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 SEEDS = (0, 1, 4, 7)  # odd and even pin counts, one and two first contacts, 3 to 912 N·m
 BILATERAL = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")

@@ -11,8 +11,8 @@ from scipy.optimize import brentq, minimize_scalar
 from tests.random_reducers import random_cycloid_stage
 from tests.seeds import seeds
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile, require_sound
-from tolalloc.rv.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, require_sound
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 SEEDS = seeds(40)
 AROUND = np.linspace(-np.pi, np.pi, 4001)

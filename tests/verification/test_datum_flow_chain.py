@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.files import load_plan
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 LARGEST = 60 * ARCSECOND
 

@@ -17,8 +17,8 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Evaluation
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.models.model import Evaluation
+from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
 
 

@@ -10,10 +10,10 @@ import pytest
 from tests.random_reducers import is_angle, random_case
 from tests.random_units import random_units
 from tests.seeds import seeds
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 
 
 @pytest.mark.slow

@@ -26,10 +26,10 @@ from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.study.prepared import Prepared
-from tolalloc.units import ARCSECOND, DEGREE
 
 NOISE = Noise()
 ANGLES = 2 * np.pi * np.arange(480) / 480

@@ -14,7 +14,7 @@ from tests.studies.command import tolalloc
 from tolalloc.capability.paired import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.study.prepared import Prepared
 
 ZONE = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 2}

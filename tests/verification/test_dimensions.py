@@ -15,8 +15,8 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
-from tolalloc.models import Evaluation
-from tolalloc.report.feature_frame import SYMBOLS, FeatureFrame, svg_of
+from tolalloc.models.model import Evaluation
+from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, svg_of
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices

@@ -10,17 +10,17 @@ from scipy.linalg import eigh
 
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.dynamics.motion import SpeedProfile, motion_of
-from tolalloc.rv.dynamics.properties import Damping, generalised_alpha, inertia_of, newmark
-from tolalloc.rv.dynamics.simulation import simulate
-from tolalloc.rv.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.reducer.design import Clearances
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of
+from tolalloc.reducers.dynamics.properties import Damping, generalised_alpha, inertia_of, newmark
+from tolalloc.reducers.dynamics.simulation import simulate
+from tolalloc.reducers.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.kinematics import Coordinates
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.reducers.reducer.files import load_reducer
 
 TURN = 2 * np.pi * np.arange(96) / 96
 

@@ -13,16 +13,16 @@ from tests.random_units import random_units
 from tests.seeds import seeds
 from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
-from tolalloc.compiled import thread_count, use_threads
 from tolalloc.exceptions import InputError
-from tolalloc.rv.dynamics.motion import Motion, SpeedProfile, motion_of, nominal_acceleration
-from tolalloc.rv.dynamics.properties import Damping, Inertia, Integrator, generalised_alpha, inertia_of, newmark
-from tolalloc.rv.dynamics.simulation import Simulated, simulate
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.kinematics import Coordinates, Positions
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Clearances
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.dynamics.motion import Motion, SpeedProfile, motion_of, nominal_acceleration
+from tolalloc.reducers.dynamics.properties import Damping, Inertia, Integrator, generalised_alpha, inertia_of, newmark
+from tolalloc.reducers.dynamics.simulation import Simulated, simulate
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.running.compiled import thread_count, use_threads
 
 UNDAMPED = Damping()
 

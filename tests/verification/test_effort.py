@@ -16,14 +16,14 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.sensitivity.surrogate.validation import answers_of
 from tolalloc.sensitivity.target import target_sensitivity
 from tolalloc.study.effort import QUICK
-from tolalloc.surrogate.validation import answers_of
 
 ERRORS = ErrorModel(
     (Source(name="a", part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0),)

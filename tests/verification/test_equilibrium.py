@@ -14,15 +14,15 @@ from tests.random_units import random_units
 from tests.seeds import seeds
 from tests.validation_manual import shown
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
-from tolalloc.compiled import thread_count, use_threads
-from tolalloc.rv.cycloid.solvers import LOGARITHMIC
-from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.cycloid.solvers import LOGARITHMIC
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.kinematics import Coordinates
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.running.compiled import thread_count, use_threads
 
 CASES = 200
 

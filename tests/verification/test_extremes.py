@@ -7,11 +7,11 @@ import pytest
 
 from tests.random_reducers import random_case
 from tests.random_units import random_units
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
 
 
 @pytest.mark.slow

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved
-from tolalloc.rv.force_figure import force_figure
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved
+from tolalloc.reducers.force_figure import force_figure
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
 
 
 def test_the_highest_points_of_the_force_figure_are_the_largest_forces():

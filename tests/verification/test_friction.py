@@ -12,17 +12,17 @@ import tolalloc as ta
 from tests.prepared import prepared
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.equivalent.friction import FrictionAtTorque, friction_torques, sliding_ways
-from tolalloc.rv.equivalent.friction_loop import friction_loop, twist_of_friction
-from tolalloc.rv.equivalent.hysteresis import DRAWN, TURN_ANGLES, hysteresis_loop, loop_torques
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import Solved
-from tolalloc.rv.equivalent.play import Play
-from tolalloc.rv.equivalent.preload import preload
-from tolalloc.rv.reducer.design import Clearances
-from tolalloc.rv.reducer.files import PRESETS, load_reducer
-from tolalloc.rv.reducer.friction import CONTACTS, Friction, loss_factor
-from tolalloc.units import ARCMINUTE
+from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.friction import FrictionAtTorque, friction_torques, sliding_ways
+from tolalloc.reducers.equivalent.friction_loop import friction_loop, twist_of_friction
+from tolalloc.reducers.equivalent.hysteresis import DRAWN, TURN_ANGLES, hysteresis_loop, loop_torques
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.equivalent.play import Play
+from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.friction import CONTACTS, Friction, loss_factor
 
 ANGLES = TURN_ANGLES[::3]
 NONE = Friction(**dict.fromkeys(CONTACTS, 0.0))

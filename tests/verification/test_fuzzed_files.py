@@ -37,9 +37,9 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 from tolalloc.exceptions import TolallocError
-from tolalloc.rv.reducer.files import PRESETS, load_identified_stiffness, load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.reducer.unit_table import load_units
+from tolalloc.reducers.reducer.files import PRESETS, load_identified_stiffness, load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.reducer.unit_table import load_units
 
 GIBIBYTE = 2**20
 """As Linux counts memory [kB]."""

@@ -19,11 +19,11 @@ from tolalloc.drawings.process_capability import load_process_capabilities
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
-from tolalloc.file_content import require_believable
-from tolalloc.files import shipped_or_path
-from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.rv.reducer.unit_table import load_units
+from tolalloc.reading.file_content import require_believable
+from tolalloc.reading.files import shipped_or_path
+from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.reducer.unit_table import load_units
 
 HEADERS, ROW = ("id", "plus", "minus", "unit", "min", "max", "cost"), ("a", 0.1, -0.1, "mm", 0.02, 0.5, 3)
 HEADER, LINE = ",".join(HEADERS), ",".join(map(str, ROW))

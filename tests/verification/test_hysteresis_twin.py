@@ -13,13 +13,13 @@ from tests.random_reducers import is_angle
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
 from tests.verification.dense_twin_bearings import standing, turning, with_bearings, with_secants
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.files import validated
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.own_loads import own_load_loop
-from tolalloc.rv.equivalent.perfect import exact_unit
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import PRESETS, ReducerRecord, load_reducer
+from tolalloc.reading.files import validated
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.own_loads import own_load_loop
+from tolalloc.reducers.equivalent.perfect import exact_unit
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
 
 ORDERS = (1, 2)
 ANGLES = np.array([0.41, 2.3, 0.0, 5.1])

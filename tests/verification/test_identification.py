@@ -27,13 +27,13 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.rv.equivalent.hysteresis import hysteresis_loop
-from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.surrogate.regression import fit_box_polynomial, total_degrees
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_degrees
 
 NONE = np.empty(0)
 RV20E = load_reducer("rv20e_liu2020")

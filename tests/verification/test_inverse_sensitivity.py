@@ -14,7 +14,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.inverse import inverse_sensitivity
 
 NAMES = ("a", "b", "c", "d")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from tolalloc.report.document import Document, Section, joined
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.writer import write_document
+from tolalloc.reports.document import Document, Section, joined
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.writer import write_document
 
 SAME = pd.DataFrame({"zone [µm]": [1.0, 2.0]})
 FRONT = Figure(

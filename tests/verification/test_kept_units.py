@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from tests.studies.command import ROOT
-from tolalloc import kept_units
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.kept_units import KeptUnits
-from tolalloc.models import Evaluation
-from tolalloc.rv import LOST_MOTION, RADIAL_CLEARANCE
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.model import ReducerModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.models.model import Evaluation
+from tolalloc.reducers import LOST_MOTION, RADIAL_CLEARANCE
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.running import result_cache as kept_units
+from tolalloc.running.result_cache import KeptUnits
 
 ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
 UNITS = 24
@@ -162,8 +162,8 @@ def test_a_full_disk_leaves_no_half_file(model, x, solved, tmp_path, monkeypatch
 WRITTEN = """
 import numpy as np
 import tolalloc as ta
-from tolalloc.kept_units import _digest
-from tolalloc.rv import LOST_MOTION
+from tolalloc.running.result_cache import _digest
+from tolalloc.reducers import LOST_MOTION
 
 drawing = ta.drawing("rv20e_baseline")
 model = ta.reducer("rv20e", neglected=("*",)).bound(drawing.errors, "digest")

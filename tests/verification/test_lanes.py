@@ -7,21 +7,21 @@ import pytest
 
 from tests.prepared import prepared
 from tests.random_units import random_units
-from tolalloc.compiled import jit
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.cycloid.solvers import LINEAR
-from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.solvers.guesses import guess_next, make_history
-from tolalloc.rv.equivalent.solvers.lane_solver import solve_tile_at
-from tolalloc.rv.equivalent.solvers.lanes import WIDTH, aligned, load, logarithm, spread, store
-from tolalloc.rv.equivalent.solvers.line_contact import DEEPEST, line_contact
-from tolalloc.rv.equivalent.solvers.problem import values_of
-from tolalloc.rv.equivalent.solvers.tile import ROW, TILE, make_tile, nonzero_rows, nonzero_waves
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.unit_file import load_unit
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.cycloid.solvers import LINEAR
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.solvers.guesses import guess_next, make_history
+from tolalloc.reducers.equivalent.solvers.lane_solver import solve_tile_at
+from tolalloc.reducers.equivalent.solvers.lanes import WIDTH, aligned, load, logarithm, spread, store
+from tolalloc.reducers.equivalent.solvers.line_contact import DEEPEST, line_contact
+from tolalloc.reducers.equivalent.solvers.problem import values_of
+from tolalloc.reducers.equivalent.solvers.tile import ROW, TILE, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.running.compiled import jit
 
 
 @jit

@@ -9,17 +9,23 @@ import pytest
 
 from tests.random_reducers import random_reducer
 from tolalloc.exceptions import InputError
-from tolalloc.rv.cycloid.contact_stiffness import peak_pressure
-from tolalloc.rv.cycloid.mesh import normals
-from tolalloc.rv.cycloid.solvers import LINEAR
-from tolalloc.rv.cycloid.solvers.contact_law import pin_force
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
-from tolalloc.rv.equivalent.line_load import LineContact, contact_pattern, line_contact, peak_line_load, unit_pressure
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import Solved
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.outputs import OutputsResponse
-from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.reducers.cycloid.contact_stiffness import peak_pressure
+from tolalloc.reducers.cycloid.mesh import normals
+from tolalloc.reducers.cycloid.solvers import LINEAR
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
+from tolalloc.reducers.equivalent.line_load import (
+    LineContact,
+    contact_pattern,
+    line_contact,
+    peak_line_load,
+    unit_pressure,
+)
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.outputs import OutputsResponse
 
 TORQUE = -100.0
 

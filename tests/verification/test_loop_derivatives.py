@@ -10,12 +10,12 @@ import pytest
 from tests.three_cranks import table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.model import ReducerModel
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.loop_derivatives import DIFFERENTIABLE
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.loop_derivatives import DIFFERENTIABLE
 
 UNITS = 12
 STEP = 1e-10

@@ -19,9 +19,9 @@ from tolalloc.bench.measurement.files import (
 from tolalloc.bench.measurement.readings import RawReadings
 from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
 from tolalloc.exceptions import InputError
-from tolalloc.rv.reducer.unit_file import BuiltUnit
-from tolalloc.rv.reducer.unit_table import load_units, write_units
-from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.reducer.unit_table import load_units, write_units
 
 TURN = 2 * np.pi
 ORDERS = (1, 2, 39, 78, 80)

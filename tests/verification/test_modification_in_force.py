@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.model import ReducerModel
-from tolalloc.rv.modification.request import ModificationRequest, choose
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reading.units import ARCMINUTE, MICROMETRE
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.modification.request import ModificationRequest, choose
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.study.prepared import Prepared
-from tolalloc.units import ARCMINUTE, MICROMETRE
 
 
 @pytest.fixture(scope="module")

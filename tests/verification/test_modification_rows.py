@@ -7,7 +7,7 @@ import pytest
 
 import tolalloc as ta
 from tests.studies.command import ROOT
-from tolalloc.rv.model import ReducerModel
+from tolalloc.reducers.model import ReducerModel
 from tolalloc.study.prepared import Prepared
 
 STUDIES = ROOT / "studies"

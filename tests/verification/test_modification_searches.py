@@ -18,12 +18,12 @@ from studies.published.li2018_genetic import (
 from studies.published.modification_searches import ALGORITHMS, REACHED, Recorder, Spread, polish, search, spread
 from studies.published.search_history import History
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.rv.modification.problem import EvaluatedAmounts, reference
-from tolalloc.rv.modification.residual_gap import residual_gap
-from tolalloc.rv.modification.rotated_profile import rotated_profile_fit
-from tolalloc.rv.reducer.design import CycloidStage
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reducers.modification.problem import EvaluatedAmounts, reference
+from tolalloc.reducers.modification.residual_gap import residual_gap
+from tolalloc.reducers.modification.rotated_profile import rotated_profile_fit
+from tolalloc.reducers.reducer.design import CycloidStage
+from tolalloc.reducers.reducer.files import load_reducer
 
 SONG = CycloidStage(
     pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=0.0015, face_width=0.01

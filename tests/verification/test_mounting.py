@@ -29,15 +29,15 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
-from tolalloc.models import Evaluation
-from tolalloc.rv.equivalent.interfaces import crank_disc
-from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.pins import dense_rows
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.units import ARCSECOND, MICROMETRE
+from tolalloc.models.model import Evaluation
+from tolalloc.reading.units import ARCSECOND, MICROMETRE
+from tolalloc.reducers.equivalent.interfaces import crank_disc
+from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.pins import dense_rows
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
 
 TORQUE = -1.0
 ROUNDING = 1e-9  # arcsec

@@ -16,16 +16,16 @@ import pytest
 
 from tests.prepared import prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table
-from tolalloc.report.document import Document, Section
-from tolalloc.report.page import as_json, asset
-from tolalloc.report.picture.blocks import block, coarse_block, values_of
-from tolalloc.report.picture.moving import MovingPicture
-from tolalloc.report.picture.pose import Pose
-from tolalloc.report.plots import drawn, save_png
-from tolalloc.report.writer import write_document
-from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.scene.scene import Scene, scene_of
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.page import as_json, asset
+from tolalloc.reports.picture.blocks import block, coarse_block, values_of
+from tolalloc.reports.picture.moving import MovingPicture
+from tolalloc.reports.picture.pose import Pose
+from tolalloc.reports.plots import drawn, save_png
+from tolalloc.reports.writer import write_document
 
 SOURCES = tuple(source.name for source in load_tolerance_table("rv20e_all_sources"))
 LARGEST = 300_000

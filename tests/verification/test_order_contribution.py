@@ -13,7 +13,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import Growth, Step
 from tolalloc.sensitivity.saltelli import saltelli_indices

@@ -14,13 +14,13 @@ from tolalloc.assembly.orientations import OrientationResponse, transmission_cur
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.models import Response
-from tolalloc.rv.equivalent.line_load import peak_line_load
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import Solved
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.models.model import Response
+from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.reducers.equivalent.line_load import peak_line_load
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.files import load_reducer
 
 LOAD = "largest line load, rated torque [N/mm]"
 

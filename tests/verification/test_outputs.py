@@ -10,16 +10,16 @@ import pytest
 from tests.random_reducers import random_case
 from tests.seeds import seeds
 from tests.verification.dense_twin import dense_equilibrium
-from tolalloc.rv.equivalent.attribution import attribute
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
-from tolalloc.rv.equivalent.kinematics import Coordinates
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
-from tolalloc.rv.equivalent.solvers.records import AngleSearch
-from tolalloc.rv.reducer.design import Clearances
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.attribution import attribute
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
+from tolalloc.reducers.equivalent.kinematics import Coordinates
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.reducers.reducer.files import load_reducer
 
 INTERFACES = {
     "gear mesh": "gear_mesh",

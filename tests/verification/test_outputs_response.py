@@ -9,11 +9,11 @@ import pytest
 
 from tests.prepared import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.equivalent.answers import Status, count_statuses
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
-from tolalloc.rv.equivalent.outputs import order_spectrum
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
-from tolalloc.units import ARCMINUTE, ARCSECOND
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND
+from tolalloc.reducers.equivalent.answers import Status, count_statuses
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 
 ORDERS = (1, 39, 40)
 

@@ -20,8 +20,8 @@ from tolalloc.allocation.program.problem import Stack
 from tolalloc.allocation.quantile import QuantileResponse
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.rv.model import RADIAL
-from tolalloc.surrogate.regression import NEEDED_Q2
+from tolalloc.reducers.model import RADIAL
+from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 POPULATION = 80
 

@@ -21,7 +21,7 @@ from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
 
 HEADER = (
     "sources,process,model,fixed [cost units],factor [cost units µm^n],exponent [-],scale [µm],points,min [µm],"

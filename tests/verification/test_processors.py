@@ -16,7 +16,7 @@ SOLVED = """
 import sys
 import numpy as np
 import tolalloc as ta
-from tolalloc.compiled import processor
+from tolalloc.running.compiled import processor
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from tests.prepared import prepared as baseline
-from tolalloc.rv.cycloid.clearance import exact_clearance
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.equivalent.answers import Status
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.hysteresis import TURN_ANGLES
-from tolalloc.rv.equivalent.outputs import forces, radial_clearance
-from tolalloc.rv.reducer.design import Modification
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
-from tolalloc.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import exact_clearance
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
+from tolalloc.reducers.equivalent.outputs import forces, radial_clearance
+from tolalloc.reducers.reducer.design import Modification
+from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse
 
 CLEARANCE = "radial clearance at tip and root [µm]"
 

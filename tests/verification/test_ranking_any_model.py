@@ -13,9 +13,9 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
-from tolalloc.models import Evaluation, Model, Response
-from tolalloc.progress import RunRecord
-from tolalloc.report.answer import Header
+from tolalloc.models.model import Evaluation, Model, Response
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.answer import RankingAnswer, rank
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.measures import Measures

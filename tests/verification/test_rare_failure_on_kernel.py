@@ -23,7 +23,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:

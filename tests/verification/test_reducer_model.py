@@ -14,14 +14,14 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv import PEAK_TO_PEAK
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.model import ReducerModel
-from tolalloc.rv.reducer.design import Modification
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
-from tolalloc.rv.response.stiffness import StiffnessResponse
+from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.reducer.design import Modification
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
+from tolalloc.reducers.response.stiffness import StiffnessResponse
 from tolalloc.study.prepared import Prepared
 
 LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"

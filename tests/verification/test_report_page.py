@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tolalloc.report.charts import chart
-from tolalloc.report.document import Document, Section
-from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.report.plots import drawn
-from tolalloc.report.writer import write_document
+from tolalloc.reports.charts import chart
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.plots import drawn
+from tolalloc.reports.writer import write_document
 
 
 def test_histograms_of_samples_of_any_size_are_shares_in_the_same_bins():

@@ -14,9 +14,9 @@ import pytest
 from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # a search that does not converge only warns
 # A step moves the row that it moves most by STEP [m]. What then remains, relative to the column's largest coefficient,

@@ -10,7 +10,7 @@ from SALib.analyze import sobol as salib
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.ranking import (
     SourceRanking,
     before,

@@ -15,7 +15,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, SeedTree, uniform_chunk, uniform_chunks
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 
 COLUMNS = 3
 LATIN, SOBOL = SamplingDesign.LATIN_HYPERCUBE, SamplingDesign.SOBOL

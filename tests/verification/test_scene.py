@@ -11,22 +11,22 @@ import pytest
 from tests.random_reducers import random_case
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import SolveError, UnknownNameError
-from tolalloc.report.picture.blocks import values_of
-from tolalloc.report.picture.pose import Pose
-from tolalloc.rv.cycloid.clearance import linear_clearance
-from tolalloc.rv.cycloid.solvers import LAWS
-from tolalloc.rv.cycloid.solvers.contact_law import pin_forces
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.condensation import spring_groups
-from tolalloc.rv.equivalent.hysteresis import both_directions
-from tolalloc.rv.equivalent.kinematics import Positions
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.scene.places import is_placed, place_of, places_of
-from tolalloc.rv.scene.scene import Scene, scene_of
-from tolalloc.units import MILLIMETRE
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import linear_clearance
+from tolalloc.reducers.cycloid.solvers import LAWS
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_forces
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.condensation import spring_groups
+from tolalloc.reducers.equivalent.hysteresis import both_directions
+from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.scene.places import is_placed, place_of, places_of
+from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reports.picture.blocks import values_of
+from tolalloc.reports.picture.pose import Pose
 
 CASES = range(12)
 

@@ -19,7 +19,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.given_data import OutputDensity, delta_index, pawn_index
 from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 

@@ -15,7 +15,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolIndices

@@ -19,7 +19,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 
 SIGMA_ZONE = float(2 * -ndtri((1 - 0.9973) / 2))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.report.answer import Header
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.simulation.answer import AtRest, SimulationAnswer, TimeSeries
-from tolalloc.rv.simulation.figures import error_figure, line
-from tolalloc.rv.simulation.sentences import range_text
-from tolalloc.units import ARCSECOND, RPM
+from tolalloc.reading.units import ARCSECOND, RPM
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.simulation.answer import AtRest, SimulationAnswer, TimeSeries
+from tolalloc.reducers.simulation.figures import error_figure, line
+from tolalloc.reducers.simulation.sentences import range_text
+from tolalloc.reports.header import Header
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
 TIMES = 5001

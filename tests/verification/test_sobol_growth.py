@@ -15,7 +15,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.saltelli import SAMPLES_AT_ONCE, SaltelliDesign, saltelli_indices
 from tolalloc.sensitivity.sobol import sobol_indices

@@ -10,9 +10,9 @@ import pytest
 from tests.studies.command import refused, tolalloc
 from tolalloc.bench.identification.catalogue import BEARINGS, identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
-from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
-from tolalloc.units import ARCMINUTE
+from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,12 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.models import Evaluation
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.stiffness import (
+from tolalloc.models.model import Evaluation
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.stiffness import (
     NAME,
     SEEN,
     StiffnessResponse,

@@ -12,19 +12,19 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation, Response
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
-from tolalloc.surrogate.choice import ENOUGH_Q2, choose, shortfalls
-from tolalloc.surrogate.quadratic_form import fit_quadratic_form
-from tolalloc.surrogate.regression import (
+from tolalloc.models.model import Evaluation, Response
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
+from tolalloc.sensitivity.surrogate.choice import ENOUGH_Q2, choose, shortfalls
+from tolalloc.sensitivity.surrogate.quadratic_form import fit_quadratic_form
+from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     on_products_of_two,
     quadratic_regression,
     sparse_quadratic_regression,
 )
-from tolalloc.surrogate.validation import Candidate, Score, answers_of, cross_validate
+from tolalloc.sensitivity.surrogate.validation import Candidate, Score, answers_of, cross_validate
 
 COLUMNS = ("a", "b", "c")
 OUTPUTS = ("answer [arcsec]",)

@@ -16,7 +16,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source, limited_measure
 from tolalloc.drawings.zones import Feature, parsed_spectrum
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity
 
 

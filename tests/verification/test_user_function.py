@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.user_function import UserFunction, identity
+from tolalloc.models.user_function import UserFunction, identity
 
 
 def returned(function, values, samples):
@@ -133,7 +133,7 @@ def test_what_a_function_calls_in_its_module_tells_it_too(monkeypatch):
 
 def test_a_function_is_the_same_in_another_process():
     code = textwrap.dedent("""
-        from tolalloc.user_function import identity
+        from tolalloc.models.user_function import identity
         def outer(k):
             return lambda x: [k * y for y in (x, lambda: x) if y not in {"a", "b", "c", "d"}]
         print(identity(outer(2)))

@@ -13,20 +13,20 @@ import pytest
 from scipy.optimize import brentq
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.cycloid.clearance import exact_clearance
-from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-from tolalloc.rv.dynamics.properties import Damping, Inertia
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import forces
-from tolalloc.rv.multibody import system as door
-from tolalloc.rv.multibody.drive import TimeCourse
-from tolalloc.rv.multibody.part_errors import mesh_of, part_errors
-from tolalloc.rv.multibody.prototype import RIGID, with_rigid_bearings
-from tolalloc.rv.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.rv.multibody.solvers.pin_forces import fill_forces, pin_contacts
-from tolalloc.rv.reducer.design import Modification, Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reducers.cycloid.clearance import exact_clearance
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.dynamics.properties import Damping, Inertia
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.multibody import system as door
+from tolalloc.reducers.multibody.drive import TimeCourse
+from tolalloc.reducers.multibody.part_errors import mesh_of, part_errors
+from tolalloc.reducers.multibody.prototype import RIGID, with_rigid_bearings
+from tolalloc.reducers.multibody.simulation import TimeSteps, simulate_prototype
+from tolalloc.reducers.multibody.solvers.pin_forces import fill_forces, pin_contacts
+from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 pytest.importorskip("exudyn")
 

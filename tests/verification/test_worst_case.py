@@ -10,7 +10,6 @@ import pytest
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.worst_unit import worst_unit
-from tolalloc.differences import DifferencedResponse
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -18,9 +17,10 @@ from tolalloc.drawings.sources import Source, limited_measure
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.models import Evaluation
-from tolalloc.rv.response.kernel import KernelResponse, WithDerivatives
-from tolalloc.rv.response.outputs import REQUIREMENTS, OutputsResponse
+from tolalloc.models.differences import DifferencedResponse
+from tolalloc.models.model import Evaluation
+from tolalloc.reducers.response.kernel import KernelResponse, WithDerivatives
+from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse
 
 SEEDS = SeedTree(0).child("worst case")
 

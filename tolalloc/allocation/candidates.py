@@ -10,7 +10,7 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.graded import GradedAllocation
 from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, answer
-from tolalloc.settings import DrawnAmounts
+from tolalloc.models.settings import DrawnAmounts
 
 _ROUNDING = 1e-9
 """Distance of a cost from its bound, over the bound, up to which it is rounding [-]."""

@@ -16,7 +16,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError
-from tolalloc.settings import Setting
+from tolalloc.models.settings import Setting
 
 _ROUNDING = 1e-9
 """Distance from a bound, over the bound, up to which it is rounding [-]."""

@@ -19,12 +19,13 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
-from tolalloc.models import Model, Response
-from tolalloc.progress import RunRecord
-from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Section
-from tolalloc.report.wording import short, unit_of
-from tolalloc.units import MICROMETRE
+from tolalloc.models.model import Model, Response
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.header import Header
+from tolalloc.reports.wording import short
+from tolalloc.running.progress import RunRecord
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields
-from tolalloc.surrogate import validation
+from tolalloc.reading.named_fields import NamedFields
+from tolalloc.sensitivity.surrogate import validation
 
 _FEWEST_ALLOCATING = {
     "": {

@@ -14,7 +14,7 @@ from tolalloc.allocation.graded import choice_beside
 from tolalloc.allocation.judging import Judge
 from tolalloc.allocation.trust_region import step_from
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
-from tolalloc.settings import DrawnAmounts
+from tolalloc.models.settings import DrawnAmounts
 
 _REACH = 1.1
 """Factor by which a variable may change from a judged design to the next one [-]."""

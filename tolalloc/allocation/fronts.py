@@ -20,7 +20,7 @@ from tolalloc.allocation.program.problem import Solution, Stack
 from tolalloc.allocation.programs import Programs
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.surrogate.validation import Score
+from tolalloc.sensitivity.surrogate.validation import Score
 
 _SPAN = 2.5
 """Factor around the scales of a design within which the surrogate learns [-]."""

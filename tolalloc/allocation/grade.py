@@ -36,7 +36,7 @@ from jaxtyping import Float
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 
 SIZE_STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 """Largest nominal size of every size step [mm]."""

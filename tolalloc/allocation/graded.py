@@ -16,7 +16,7 @@ from tolalloc.allocation.trust_region import aimed, kept_stacks
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import SolveError
-from tolalloc.settings import DrawnAmounts
+from tolalloc.models.settings import DrawnAmounts
 
 _STEPS_AROUND = 4
 """Steps to either side of the free amounts that are tried; the local models are trusted no further [-]."""

@@ -15,7 +15,7 @@ from tolalloc.allocation.trial import OutputTrial
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number
 
 USUAL_YIELD = 0.9973
 """Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""

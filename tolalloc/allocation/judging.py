@@ -17,12 +17,12 @@ from tolalloc.allocation.local_model import Side
 from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.screen import Screen
 from tolalloc.allocation.verification import Confirming, VerifiedDesign
-from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Evaluation, Model, Response
+from tolalloc.models.model import Evaluation, Model, Response
+from tolalloc.running.blas import one_blas_thread
 
 AS_GOOD_AS = 4
 """Plain random units for each solved one that would place the limit as well, as measured on the RV-20E [-]."""

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.models import Evaluation, Model
+from tolalloc.models.model import Evaluation, Model
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
 
 _ROUNDING = 1e-6
 """Share of a zone up to which it is a rounded bound [-]."""

@@ -14,7 +14,7 @@ from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature
 from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign, Verifier
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Model
+from tolalloc.models.model import Model
 
 COST_CHANGE = 0.2
 """Relative change of every cost, up or down, in the corners that are tried [-]."""

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.requirement import Requirement
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.surrogate.quadratic_form import QuadraticForm, fit_quadratic_form
+from tolalloc.sensitivity.surrogate.quadratic_form import QuadraticForm, fit_quadratic_form
 
 _LEARNT = 0.8
 """Share of the units that the regression learns from; the others tell how far it is off [-]."""

@@ -35,13 +35,13 @@ from tolalloc.allocation.trade import SettingTrade, setting_trade
 from tolalloc.allocation.trust_region import kept_stacks
 from tolalloc.allocation.verification import VerifiedDesign, Verifier, answer
 from tolalloc.allocation.yield_cost import cost_at_yield
-from tolalloc.blas import one_blas_thread
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.models import Examination, Model
-from tolalloc.progress import RunRecord
-from tolalloc.report.answer import Header
+from tolalloc.models.model import Examination, Model
+from tolalloc.reports.header import Header
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices

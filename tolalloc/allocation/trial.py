@@ -17,11 +17,11 @@ from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.capability.worst_unit import worst_unit
-from tolalloc.differences import derived
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.models import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
+from tolalloc.models.differences import derived
+from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
 
 _SCALE_STEP = 0.05
 """Step of a scale to either side, over the scale [-]."""

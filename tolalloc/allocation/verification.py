@@ -18,7 +18,7 @@ from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Model
+from tolalloc.models.model import Model
 
 SLOPE_UNITS = 1024
 """Units that differences of an output without derivatives are averaged over [-]."""

@@ -17,9 +17,9 @@ from tolalloc.assembly.plan import LARGEST_PRECISION, AngularRequirements, Assem
 from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.files import Record, read_toml, shipped_or_path, validated
-from tolalloc.rv.reducer.files import PRESETS
-from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
+from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
+from tolalloc.reducers.reducer.files import PRESETS
 
 SMALLEST, LARGEST = 0.1, 3600.0
 """Smallest and largest tolerance and limit that is believed, and largest error; smaller ones are degrees [arcsec]."""

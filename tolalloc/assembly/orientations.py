@@ -16,19 +16,19 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation, Observer
-from tolalloc.rv import PEAK_TO_PEAK
-from tolalloc.rv.cycloid.solvers import LAWS, LINEAR
-from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.line_load import ContactPattern, contact_pattern, peak_line_load, unit_pressure
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.equivalent.outputs import Solved
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.series import at_torque
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.rv.response.outputs import Answer, OutputsResponse, Reading
-from tolalloc.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.models.model import Evaluation, Observer
+from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
+from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.line_load import ContactPattern, contact_pattern, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.outputs import Answer, OutputsResponse, Reading
 
 _DRAWS = 50
 """Random assemblies whose transmission is solved where the parts are not measured [-]."""
@@ -47,7 +47,7 @@ class TransmissionCurves:
     line_load: Float[np.ndarray, "sample angle"]  # Largest line load of pins and teeth [N/m]
     pressure: Float[np.ndarray, "sample angle"]  # Largest Hertz pressure of pins and teeth [Pa]
     pins_in_contact: Float[np.ndarray, "sample angle"]  # Pins that carry load, all discs [-]
-    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.rv.equivalent.answers.Status` [-]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.reducers.equivalent.answers.Status` [-]
 
 
 def transmission_curves(

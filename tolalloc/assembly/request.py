@@ -21,9 +21,9 @@ from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, RunRecord
-from tolalloc.report.answer import Header
-from tolalloc.rv.equivalent.answers import OUTCOMES
+from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress, RunRecord
 
 SWEPT = (
     0.0,

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record
+from tolalloc.reading.files import Record
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Choice = Literal["current", "mounted", "all"]

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Response, ResponseWithDerivatives
+from tolalloc.models.model import Response, ResponseWithDerivatives
 
 LARGEST_FAILED_SHARE = 0.01
 """Share of the units that may fail unless a study says otherwise [-]."""

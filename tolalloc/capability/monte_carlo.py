@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 
 CONFIDENCE = 0.95
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import ResponseWithDerivatives
+from tolalloc.models.model import ResponseWithDerivatives
 
 _WEIGHT = 0.3
 """Weight of the newest gradient in the mean of all before [-]."""

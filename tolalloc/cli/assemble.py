@@ -27,7 +27,7 @@ def assemble(
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.assembly.request import assemble as assembled
     from tolalloc.assembly.request import prepare_assembly
-    from tolalloc.report.folder import require_usable
+    from tolalloc.reports.folder import require_usable
 
     request = prepare_assembly(chain, measured, precision, seed)
     require_usable(out)

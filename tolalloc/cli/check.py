@@ -10,7 +10,7 @@ import typer
 from tolalloc.cli.console import AsJson, announce_kernel, print_json
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,8 +52,8 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
 def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
     from tolalloc.drawings.plausibility import doubts
-    from tolalloc.report.currency import in_currency
-    from tolalloc.report.wording import COST_UNITS
+    from tolalloc.reading.units import COST_UNITS
+    from tolalloc.reports.currency import in_currency
 
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space

@@ -16,7 +16,8 @@ import typer
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolalloc.report.answer import Answer
+    from tolalloc.reports.answer import Answer as Told
+    from tolalloc.study.answer import Answer
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
@@ -32,7 +33,7 @@ def note(sentence: str, *, dim: bool = False) -> None:
 
 def announce_compilation(room: str = "equivalent") -> None:
     """Say what the next minute is spent on where a room of this version has not run on this machine before."""
-    from tolalloc.compiled import is_kept
+    from tolalloc.running.compiled import is_kept
 
     module, lasts = {"equivalent": ("turn", "some twenty seconds"), "cycloid": ("distance", "some seconds")}[room]
     if not is_kept(module):
@@ -41,8 +42,8 @@ def announce_compilation(room: str = "equivalent") -> None:
 
 def announce_kernel(model: object) -> None:
     """Say the same of the kernel of a study's model; a user's own model has none."""
-    from tolalloc.rv.choice import ReducerChoice
-    from tolalloc.rv.equivalent.compiled_ahead import compile_ahead
+    from tolalloc.reducers.choice import ReducerChoice
+    from tolalloc.reducers.equivalent.compiled_ahead import compile_ahead
 
     if isinstance(model, ReducerChoice):
         announce_compilation()
@@ -116,7 +117,7 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def tell(answer: Answer, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:
+def tell(answer: Answer[Any] | Told, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:
     """Print an answer: its summary for a program; titled tables, its sentences and its warnings for a person."""
     if as_json:
         print_json(answer.summary)
@@ -129,7 +130,7 @@ def tell(answer: Answer, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> No
         typer.secho(warning, fg="yellow")
 
 
-def write_report(answer: Answer, out: Path | None) -> None:
+def write_report(answer: Answer[Any] | Told, out: Path | None) -> None:
     """Write the report on an answer into a folder, if one was asked for."""
     if out:
         note(f"Report: {answer.save(out) / 'report.html'}")

@@ -11,9 +11,9 @@ from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, not
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 if TYPE_CHECKING:
-    from tolalloc.report.answer import Answer
-    from tolalloc.rv.cycloid.tooth_profile import ToothProfile
-    from tolalloc.rv.reducer.design import Reducer
+    from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+    from tolalloc.reducers.reducer.design import Reducer
+    from tolalloc.reports.answer import Answer
 
 ProfileFile = Annotated[Path | None, typer.Option(help="Write the tooth profile to this new .csv or .dxf file.")]
 ProfilePoints = Annotated[int, typer.Option(help="Points per tooth of that file.")]
@@ -40,9 +40,9 @@ def contact(
 ) -> None:
     """Clearance, backlash, pins in contact, forces and pressure of the modified teeth, without errors."""
     from tolalloc.exceptions import InputError, UnknownNameError
-    from tolalloc.rv.cycloid.solvers import LAWS
-    from tolalloc.rv.reducer.files import load_reducer
-    from tolalloc.rv.teeth.answer import contact_answer
+    from tolalloc.reducers.cycloid.solvers import LAWS
+    from tolalloc.reducers.reducer.files import load_reducer
+    from tolalloc.reducers.teeth.answer import contact_answer
 
     named = named_reducer(reducer, out, profile)
     require_writable(out, profile, points)
@@ -69,7 +69,7 @@ def asked_reducer(reducer: Reducer, width_mm: float | None, support_mm: float | 
         Not a width or a span of a reducer.
     """
     from tolalloc.exceptions import InputError
-    from tolalloc.units import MILLIMETRE
+    from tolalloc.reading.units import MILLIMETRE
 
     if width_mm is not None:
         if not 0.5 <= width_mm <= 200:
@@ -84,11 +84,11 @@ def asked_reducer(reducer: Reducer, width_mm: float | None, support_mm: float | 
 
 def require_writable(out: Path | None, file: Path | None, points: int) -> None:
     """Refuse a report or a profile that could not be written, before anything long runs."""
-    from tolalloc.report.folder import require_usable
+    from tolalloc.reports.folder import require_usable
 
     require_usable(out)
     if file:
-        from tolalloc.rv.teeth.profile_files import require_profile_file
+        from tolalloc.reducers.teeth.profile_files import require_profile_file
 
         require_profile_file(file, points)
 
@@ -97,8 +97,8 @@ def write_asked(answer: Answer, out: Path | None, teeth: ToothProfile, file: Pat
     """Write the report and the profile that were asked for."""
     write_report(answer, out)
     if file:
-        from tolalloc.rv.teeth.profile_files import write_profile
-        from tolalloc.units import MICROMETRE
+        from tolalloc.reading.units import MICROMETRE
+        from tolalloc.reducers.teeth.profile_files import write_profile
 
         made = write_profile(teeth, points, file)
         note(

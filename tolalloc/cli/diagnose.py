@@ -32,8 +32,8 @@ def diagnose(
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.bench.diagnosis.request import DiagnosisRequest, diagnose_unit
     from tolalloc.drawings.drawing import load_drawing
-    from tolalloc.report.folder import require_usable
-    from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+    from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+    from tolalloc.reports.folder import require_usable
 
     design = load_reducer(named_reducer(reducer, out))
     if stiffness:

@@ -19,9 +19,9 @@ _AGREES = 0.001
 
 def doctor(as_json: AsJson = False) -> None:
     """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
-    from tolalloc.blas import blas_libraries
-    from tolalloc.compiled import is_kept, processor, thread_count
-    from tolalloc.report.writer import versions
+    from tolalloc.reports.writer import versions
+    from tolalloc.running.blas import blas_libraries
+    from tolalloc.running.compiled import is_kept, processor, thread_count
 
     kept = [path.stat().st_size for path in Path("runs/.tolalloc-units").glob("*.units")]
     found = {
@@ -55,10 +55,10 @@ def doctor(as_json: AsJson = False) -> None:
 
 def _peak_to_peak() -> float:
     """Return the peak-to-peak of liu2020's Table 4 unit [arcsec]."""
-    from tolalloc.rv.equivalent.model import EquivalentModel
-    from tolalloc.rv.reducer.files import load_reducer
-    from tolalloc.rv.reducer.unit_file import load_unit
-    from tolalloc.units import ARCSECOND
+    from tolalloc.reading.units import ARCSECOND
+    from tolalloc.reducers.equivalent.model import EquivalentModel
+    from tolalloc.reducers.reducer.files import load_reducer
+    from tolalloc.reducers.reducer.unit_file import load_unit
 
     reducer, unit = load_reducer("rv20e_liu2020"), load_unit("table4")
     model = EquivalentModel(reducer, orders=unit.orders)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tolalloc.bench.identification.answer import IdentificationAnswer
     from tolalloc.bench.identification.catalogue import CatalogueAnswer
     from tolalloc.bench.identification.parameters import Parameter
-    from tolalloc.rv.reducer.design import Reducer
+    from tolalloc.reducers.reducer.design import Reducer
 
 PLACE = "tolalloc identify"
 NAMES = "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, pin_contact, torque, bias"
@@ -54,8 +54,8 @@ def identify(
 ) -> None:
     """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
     answer: IdentificationAnswer | CatalogueAnswer
-    from tolalloc.report.folder import require_usable
-    from tolalloc.rv.reducer.files import load_reducer, write_identified_stiffness
+    from tolalloc.reducers.reducer.files import load_reducer, write_identified_stiffness
+    from tolalloc.reports.folder import require_usable
 
     design = load_reducer(named_reducer(reducer, write, out))
     require_usable(out)
@@ -80,7 +80,7 @@ def identify(
 
 def _require_stiffness_file(file: Path, out: Path | None) -> None:
     """Refuse a stiffness file that could not be written, before anything long runs."""
-    from tolalloc.files import require_new
+    from tolalloc.reading.files import require_new
 
     require_new(file)
     if file.suffix != ".toml":

@@ -14,11 +14,11 @@ from tolalloc.cli.check import check
 from tolalloc.cli.compare import compare
 from tolalloc.cli.console import note
 from tolalloc.cli.contact import contact
-from tolalloc.cli.costs import costs
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.doctor import doctor
 from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.identify import identify
+from tolalloc.cli.inquiries import inquiry_command
 from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new
@@ -61,7 +61,7 @@ _COMMANDS = (
     whatif,
     series,
     compare,
-    costs,
+    inquiry_command("costs"),
     te,
     contact,
     modify,

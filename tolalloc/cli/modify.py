@@ -12,7 +12,7 @@ from tolalloc.cli.contact import ProfileFile, ProfilePoints, require_writable, w
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 if TYPE_CHECKING:
-    from tolalloc.rv.modification.rotated_profile import Metric
+    from tolalloc.reducers.modification.rotated_profile import Metric
 
 
 def modify(
@@ -35,10 +35,10 @@ def modify(
     as_json: AsJson = False,
 ) -> None:
     """Choose equidistant and shift amount by a published objective, and say what they deliver."""
-    from tolalloc.files import require_new
-    from tolalloc.rv.modification.request import ModificationRequest, choose
-    from tolalloc.rv.reducer.files import load_reducer, write_modified
-    from tolalloc.units import MICROMETRE
+    from tolalloc.reading.files import require_new
+    from tolalloc.reading.units import MICROMETRE
+    from tolalloc.reducers.modification.request import ModificationRequest, choose
+    from tolalloc.reducers.reducer.files import load_reducer, write_modified
 
     request = ModificationRequest(
         method=method,

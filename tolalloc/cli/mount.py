@@ -25,7 +25,7 @@ def mount(
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
     from tolalloc.assembly.mounting.request import mount as mounted
     from tolalloc.assembly.mounting.request import prepare_mounting
-    from tolalloc.report.folder import require_usable
+    from tolalloc.reports.folder import require_usable
 
     request = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)
     require_usable(out)

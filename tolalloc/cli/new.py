@@ -22,8 +22,8 @@ def new(
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
-    from tolalloc.start.folder import SAMPLES, NewFolder
-    from tolalloc.start.reducer_text import PRESETS, Likeness
+    from tolalloc.cli.start.folder import SAMPLES, NewFolder
+    from tolalloc.cli.start.reducer_text import PRESETS, Likeness
 
     if name is None:
         if not sys.stdin.isatty():

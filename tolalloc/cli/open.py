@@ -14,9 +14,9 @@ from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:
-    from tolalloc.live.address import Address
-    from tolalloc.live.desk import Desk
-    from tolalloc.live.server import LiveServer
+    from tolalloc.cli.live.address import Address
+    from tolalloc.cli.live.desk import Desk
+    from tolalloc.cli.live.server import LiveServer
 
 
 def open_page(
@@ -25,9 +25,9 @@ def open_page(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
     """Open the live page of a study: move a zone, see cost, curve and yield of the real model."""
-    from tolalloc.live.address import Address
-    from tolalloc.live.desk import Desk
-    from tolalloc.live.session import Session
+    from tolalloc.cli.live.address import Address
+    from tolalloc.cli.live.desk import Desk
+    from tolalloc.cli.live.session import Session
     from tolalloc.study.prepared import Prepared
 
     study = load_study(script)
@@ -52,7 +52,7 @@ def open_page(
 
 def _server(desk: Desk, last: Address, port: int) -> LiveServer:
     """Return the server at the port that is asked for, at that of last time, or where that is taken at a free one."""
-    from tolalloc.live.server import LiveServer
+    from tolalloc.cli.live.server import LiveServer
 
     if not port and last.port:
         with suppress(InputError):

@@ -52,7 +52,7 @@ def named_reducer(reducer: str | None, *written: Path | None) -> str:
     if reducer is not None:
         return reducer
     if any(written):
-        from tolalloc.rv.reducer.files import PRESETS
+        from tolalloc.reducers.reducer.files import PRESETS
 
         presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
         raise InputError(

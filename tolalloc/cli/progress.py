@@ -13,7 +13,7 @@ import typer
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from tolalloc.progress import Progress
+    from tolalloc.running.progress import Progress
 
 _BETWEEN = 5.0
 """Time between two lines of one stage in a log [s]."""

@@ -15,8 +15,8 @@ from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
 
 if TYPE_CHECKING:
-    from tolalloc.chunks import Mapper
-    from tolalloc.report.answer import Answer
+    from tolalloc.reports.answer import Answer
+    from tolalloc.running.chunks import Mapper
     from tolalloc.study.study import Study
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
@@ -163,7 +163,7 @@ class _Way:
 
 def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
-    from tolalloc.report.pdf import require_printable, write_pdf
+    from tolalloc.reports.pdf import require_printable, write_pdf
     from tolalloc.study.questions import named
     from tolalloc.study.runner import kept_beside
     from tolalloc.study.runner import run as run_study
@@ -196,7 +196,7 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     """Return what solves the units: this process, or the workers of a scheduler."""
     if not scheduler:
         return nullcontext(map)
-    from tolalloc.workers import workers_at
+    from tolalloc.running.workers import workers_at
 
     return workers_at(scheduler)
 

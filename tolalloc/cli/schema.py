@@ -13,6 +13,6 @@ def schema(
     kind: Annotated[str, typer.Argument(help="Kind of TOML file: reducer, unit, stiffness, bench or chain.")],
 ) -> None:
     """Print the JSON schema of a kind of TOML file: its fields, their units and ranges."""
-    from tolalloc.start.schema import schema as schema_of
+    from tolalloc.cli.start.schema import schema as schema_of
 
     print_json(schema_of(kind))

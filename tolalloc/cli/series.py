@@ -25,7 +25,7 @@ def series(
     as_json: AsJson = False,
 ) -> None:
     """Run many studies, a product series or a grid of limits, and tell all answers in one table."""
-    from tolalloc.report.answer import Header
+    from tolalloc.reports.header import Header
     from tolalloc.study.finished_run import common_currency
     from tolalloc.study.series import SeriesAnswer, run_series
 

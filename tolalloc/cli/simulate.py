@@ -43,9 +43,9 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
-    from tolalloc.report.folder import require_usable
-    from tolalloc.rv.simulation.request import SimulationRequest, prepare_simulation
-    from tolalloc.rv.simulation.run import simulate as simulated
+    from tolalloc.reducers.simulation.request import SimulationRequest, prepare_simulation
+    from tolalloc.reducers.simulation.run import simulate as simulated
+    from tolalloc.reports.folder import require_usable
 
     asked = SimulationRequest(
         reducer=named_reducer(reducer, out),

@@ -56,7 +56,7 @@ def _modules_beside(folder: Path, modules: dict[str, ModuleType]) -> Iterator[No
 
 def _belongs_to(name: str, folder: Path) -> bool:
     """Return whether the folder has the module of this name, wherever the one in memory was read."""
-    from tolalloc.user_function import is_users_module
+    from tolalloc.models.user_function import is_users_module
 
     top = folder / name.partition(".")[0]
     return name != "__main__" and (top.with_suffix(".py").is_file() or top.is_dir()) and is_users_module(name)
@@ -86,8 +86,8 @@ def load_script(path: Path) -> StudyScript:
     InputError
         The script is missing, broken, or defines no study.
     """
-    from tolalloc.file_content import is_file
-    from tolalloc.files import relative_to
+    from tolalloc.reading.file_content import is_file
+    from tolalloc.reading.files import relative_to
     from tolalloc.study.study import Study
 
     if not is_file(path):

@@ -24,11 +24,11 @@ def te(
     as_json: AsJson = False,
 ) -> None:
     """Transmission error of one built unit over one output turn."""
-    from tolalloc.report.folder import require_usable
-    from tolalloc.rv.equivalent.compiled_ahead import compile_ahead
-    from tolalloc.rv.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
-    from tolalloc.rv.reducer.unit_file import load_unit
-    from tolalloc.rv.transmission_error import transmission_error
+    from tolalloc.reducers.equivalent.compiled_ahead import compile_ahead
+    from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+    from tolalloc.reducers.reducer.unit_file import load_unit
+    from tolalloc.reducers.transmission_error import transmission_error
+    from tolalloc.reports.folder import require_usable
 
     design = load_reducer(named_reducer(reducer, out))
     if stiffness:

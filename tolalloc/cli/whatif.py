@@ -28,7 +28,7 @@ def whatif(
     as_json: AsJson = False,
 ) -> None:
     """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units."""
-    from tolalloc.report.folder import require_usable
+    from tolalloc.reports.folder import require_usable
     from tolalloc.study.questions import Difference
 
     require_usable(out)

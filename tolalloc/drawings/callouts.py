@@ -7,8 +7,8 @@ from math import ceil, floor
 
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
-from tolalloc.report.feature_frame import FeatureFrame
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reports.feature_frame import FeatureFrame
 
 STEP = 0.1 * MICROMETRE
 """Step in which a drawing writes a zone [m]."""

@@ -21,10 +21,10 @@ from tolalloc.drawings.table_file import (
 )
 from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
 from tolalloc.exceptions import InputError
-from tolalloc.file_content import is_file
-from tolalloc.files import found_from_here, write_new
-from tolalloc.report.currency import in_currency
-from tolalloc.report.wording import currency_in
+from tolalloc.reading.file_content import is_file
+from tolalloc.reading.files import found_from_here, write_new
+from tolalloc.reading.units import currency_in
+from tolalloc.reports.currency import in_currency
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -173,7 +173,7 @@ class Drawing:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the name and the table."""
-        from tolalloc.report.html_table import html_table
+        from tolalloc.reports.html_table import html_table
 
         return f"<p><b>{self.name}: {len(self.sources)} sources</b></p>\n{html_table(self.to_frame())}"
 

@@ -15,9 +15,8 @@ from tolalloc.drawings.mixtures import batches_text, parsed_batches
 from tolalloc.drawings.sources import ANGULAR, Source
 from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
-from tolalloc.files import Record
-from tolalloc.report.wording import COST_UNITS
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.files import Record
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
 
 LARGEST_ZONE = 2000.0
 """Largest zone that is believed [µm]; a metre typed for a millimetre is far above it, and a model may ask for less."""

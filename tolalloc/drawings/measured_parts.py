@@ -16,7 +16,7 @@ from tolalloc.drawings.distributions import RAYLEIGH, Distribution
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE
 
 FEWEST_PARTS = 20
 LARGEST_DEVIATION = 2000.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 
 _FINEST, _COARSEST = 0.2, 640.0
 """Zone over the standard tolerance factor i of ISO 286-1 outside which it is doubted: IT01 is 0.4 of it and more, and

@@ -12,7 +12,7 @@ from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record, shipped_or_path
+from tolalloc.reading.files import Record, shipped_or_path
 
 _UNITS = {"Cp": "-", "shift": "half zone", "shape": "-"}
 """Field → unit that its header may state."""

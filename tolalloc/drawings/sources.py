@@ -14,7 +14,7 @@ from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Distribution, Fami
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.mixtures import Batch, Mixture, smoothed, smoothed_magnitude, smoothing_width
 from tolalloc.drawings.zones import Feature, Spectrum, ZoneMapping
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 
 ANGULAR = ("tilt", "phase", "rotation")
 """Last part of the name of a source whose columns are angles."""

@@ -13,9 +13,9 @@ from types import MappingProxyType
 from typing import Literal, TypeVar, get_args, get_origin
 
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.file_content import read_text, require_believable
-from tolalloc.files import Record, validated
-from tolalloc.report.wording import COST_UNITS, currency_in, in_cost_units
+from tolalloc.reading.file_content import read_text, require_believable
+from tolalloc.reading.files import Record, validated
+from tolalloc.reading.units import COST_UNITS, currency_in, in_cost_units
 
 DATA = Path(__file__).parent / "data"
 """Shipped tables."""
@@ -33,7 +33,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _TEXTS = ("id", "part", "group", "process", "grade", "drawing", "label", "note", "sources")
 """Columns whose cells are no numbers, whatever they look like."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
-"""What `tolalloc.files.no_formula` writes before a text."""
+"""What `tolalloc.reading.files.no_formula` writes before a text."""
 
 
 def read_table_file(path: Path, header: Sequence[str] = (), sheet: str = "") -> tuple[NumberedRow, ...]:

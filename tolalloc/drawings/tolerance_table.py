@@ -23,9 +23,9 @@ from tolalloc.drawings.table_file import (
     usual_signs,
 )
 from tolalloc.exceptions import Faults, InputError
-from tolalloc.files import no_formula, shipped_or_path, validated
-from tolalloc.report.currency import in_currency
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.files import no_formula, shipped_or_path, validated
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reports.currency import in_currency
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ from typing import Any
 from zipfile import ZipFile
 
 from tolalloc.exceptions import InputError
-from tolalloc.file_content import read_bytes, require_believable
+from tolalloc.reading.file_content import read_bytes, require_believable
 
 _LARGEST_CONTENT = 16 * 2**20
 """Largest content of a workbook when unpacked, all parts together [B]."""

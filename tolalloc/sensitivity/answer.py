@@ -7,18 +7,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tolalloc.blas import one_blas_thread
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import MonteCarlo
 from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.models import KeepsTables, Model
-from tolalloc.progress import RunRecord
-from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Section
-from tolalloc.report.wording import sign_of, unit_of
+from tolalloc.models.model import KeepsTables, Model
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.header import Header
+from tolalloc.reports.wording import sign_of
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.derivatives import (
     ClassicalEstimate,
     DerivativeMeasures,
@@ -37,9 +39,9 @@ from tolalloc.sensitivity.sections import driver_sections, limit_sections, trust
 from tolalloc.sensitivity.sentences import assumptions, sentences, summary, warnings
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, SobolIndices, order_contribution
+from tolalloc.sensitivity.surrogate.choice import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
-from tolalloc.surrogate.choice import Choice
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,10 +12,10 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Response, ResponseWithDerivatives
+from tolalloc.models.model import Response, ResponseWithDerivatives
+from tolalloc.reading.units import MICROMETRE
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import resample_counts
-from tolalloc.units import MICROMETRE
 
 _STEP = 1e-4
 """Step of the differences in standard normal space; rounding and curvature then both cost about 1e-8 [-]."""

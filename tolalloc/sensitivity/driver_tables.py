@@ -10,11 +10,11 @@ import pandas as pd
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
-from tolalloc.report.feature_frame import Frames
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reports.feature_frame import Frames
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
-from tolalloc.units import MICROMETRE
 
 if TYPE_CHECKING:
     from tolalloc.sensitivity.answer import RankingAnswer

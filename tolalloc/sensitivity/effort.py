@@ -9,8 +9,8 @@ from typing import ClassVar
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields
-from tolalloc.surrogate import validation
+from tolalloc.reading.named_fields import NamedFields
+from tolalloc.sensitivity.surrogate import validation
 
 WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.report.wording import quantity, sign_of
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.wording import quantity, sign_of
 
 if TYPE_CHECKING:
     from tolalloc.sensitivity.answer import RankingAnswer

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import quantile_interval
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Response
+from tolalloc.models.model import Response
 
 _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from tolalloc.capability.indices import Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import proportion
-from tolalloc.report.wording import quantity, unit_of
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.wording import quantity
 
 if TYPE_CHECKING:
     from tolalloc.sensitivity.answer import RankingAnswer

@@ -12,21 +12,25 @@ from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.capability.one_sided import OneSided
 from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
-from tolalloc.differences import derived
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models import Model, Response, ResponseWithDerivatives
+from tolalloc.models.differences import derived
+from tolalloc.models.model import Model, Response, ResponseWithDerivatives
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.surrogate.choice import Choice, choose
+from tolalloc.sensitivity.surrogate.regression import (
+    RegressionCandidate,
+    quadratic_regression,
+    sparse_quadratic_regression,
+)
+from tolalloc.sensitivity.surrogate.validation import Candidate
 from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
-from tolalloc.surrogate.choice import Choice, choose
-from tolalloc.surrogate.regression import RegressionCandidate, quadratic_regression, sparse_quadratic_regression
-from tolalloc.surrogate.validation import Candidate
 
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""

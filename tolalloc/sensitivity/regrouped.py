@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.saltelli import saltelli_indices
 from tolalloc.sensitivity.sobol import solved
 from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices, indices_of

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
-from tolalloc.blas import one_blas_thread
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
+from tolalloc.running.blas import one_blas_thread
 
 SAMPLES_AT_ONCE = 8192
 """Samples of a chunk at most, unless one block has more [-]."""

@@ -15,11 +15,11 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
-from tolalloc.compiled import in_threads
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Response
+from tolalloc.models.model import Response
+from tolalloc.running.compiled import in_threads
 from tolalloc.sensitivity.effort import CLASSES, FEWEST_TRAJECTORIES, FEWEST_UNITS_OF_CLASS
 from tolalloc.sensitivity.given_data import OutputDensity, delta_index, pawn_index
 from tolalloc.sensitivity.ranking import percentile_interval

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from tolalloc.drawings.tolerance_table import table_frame
-from tolalloc.report.document import Section
+from tolalloc.reports.document import Section
 from tolalloc.sensitivity import driver_tables, figures, limit_tables
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.report.wording import QUICK_RUN, quantity, sign_of
+from tolalloc.reports.wording import QUICK_RUN, quantity, sign_of
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 if TYPE_CHECKING:

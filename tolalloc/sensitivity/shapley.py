@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.ranking import percentile_interval, rank_interval
 from tolalloc.sensitivity.saltelli import resample_counts
 

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import Resampled, grow_until_stable
 from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices

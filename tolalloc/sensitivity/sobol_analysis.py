@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.models import Evaluation
+from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.ranking import Growth, SourceRanking, indistinguishable_from_zero, percentile_interval
 from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Model
+from tolalloc.models.model import Model
 
 _UNITS = 256
 """Units over which the effect is averaged [-]."""

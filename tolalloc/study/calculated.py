@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Document, Section
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.header import Header
 
 if TYPE_CHECKING:
     from tolalloc.study.prepared import Prepared

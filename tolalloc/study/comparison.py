@@ -9,10 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 
-from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Section, tables_of
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.wording import COST_UNITS, with_unit
+from tolalloc.reading.units import COST_UNITS
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section, tables_of
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.header import Header
+from tolalloc.reports.wording import with_unit
 from tolalloc.study.finished_run import HIGH, LOW, TOTAL, FinishedRun, common_currency
 
 

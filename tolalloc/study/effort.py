@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from tolalloc.allocation.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields
+from tolalloc.reading.named_fields import NamedFields
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
 
 

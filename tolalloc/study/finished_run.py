@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 
 from tolalloc.exceptions import InputError
-from tolalloc.file_content import is_file, read_text
-from tolalloc.report.wording import in_cost_units, unit_of
+from tolalloc.reading.file_content import is_file, read_text
+from tolalloc.reading.units import in_cost_units, unit_of
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)

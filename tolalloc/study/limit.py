@@ -8,7 +8,7 @@ from typing import ClassVar
 from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield, Guarantee
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,11 +13,11 @@ from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.effort import AllocationEffort
 from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
 from tolalloc.allocation.requirement import JointRequirement, Requirement
-from tolalloc.chunks import Mapper
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Model
-from tolalloc.report.answer import Header
+from tolalloc.models.model import Model
+from tolalloc.reports.header import Header
+from tolalloc.running.chunks import Mapper
 from tolalloc.study.limit import Limit
 
 if TYPE_CHECKING:

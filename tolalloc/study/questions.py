@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number
 
 if TYPE_CHECKING:
-    from tolalloc.progress import RunRecord
-    from tolalloc.report.answer import Answer
-    from tolalloc.report.document import Document
+    from tolalloc.reports.answer import Answer
+    from tolalloc.reports.document import Document
+    from tolalloc.running.progress import RunRecord
     from tolalloc.study.prepared import Prepared
 
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tolalloc.chunks import Mapper
-from tolalloc.kept_units import KeptUnits
-from tolalloc.progress import Progress, RunRecord, Silent
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Document, joined
-from tolalloc.report.folder import claimed
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Document, joined
+from tolalloc.reports.folder import claimed
+from tolalloc.running.chunks import Mapper
+from tolalloc.running.progress import Progress, RunRecord, Silent
+from tolalloc.running.result_cache import KeptUnits
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.questions import Calculation, Question
 from tolalloc.study.study import Study
@@ -89,7 +89,7 @@ def run(
             question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
             for question in asked
         }
-        from tolalloc.report.writer import write_document
+        from tolalloc.reports.writer import write_document
 
         document = _document(prepared, answers)
         if study.model is not None:

@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 
 import pandas as pd
 
-from tolalloc.chunks import Mapper
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.progress import Progress
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.running.chunks import Mapper
+from tolalloc.running.progress import Progress
 from tolalloc.study.finished_run import FinishedRun, read_run
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.runner import run

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number
 from tolalloc.study.effort import QUICK, Effort
 from tolalloc.study.limit import Limit
 from tolalloc.study.questions import Allocation, Question, Ranking, named
@@ -18,9 +18,9 @@ from tolalloc.study.questions import Allocation, Question, Ranking, named
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer
     from tolalloc.drawings.drawing import Drawing
-    from tolalloc.models import ModelSource
-    from tolalloc.progress import Progress
-    from tolalloc.report.answer import Answer
+    from tolalloc.models.model import ModelSource
+    from tolalloc.reports.answer import Answer
+    from tolalloc.running.progress import Progress
     from tolalloc.sensitivity.answer import RankingAnswer
     from tolalloc.study.runner import Run
 

@@ -26,10 +26,11 @@ from tolalloc.allocation.trade import SettingTrade
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
-from tolalloc.models import Examination, Model
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
-from tolalloc.report.wording import short, unit_of
+from tolalloc.models.model import Examination, Model
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.wording import short
 from tolalloc.sensitivity.sobol_analysis import SobolIndices
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.capability.indices import Limits
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.wording import short, with_unit
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.wording import short, with_unit
 
 
 def zones_figure(drawing: pd.DataFrame, after: str) -> Figure:

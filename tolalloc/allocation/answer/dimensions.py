@@ -11,9 +11,9 @@ import pandas as pd
 from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
-from tolalloc.report.feature_frame import FeatureFrame, Frames
-from tolalloc.report.figure import Figure, Series
-from tolalloc.report.wording import short, with_unit
+from tolalloc.reports.feature_frame import FeatureFrame, Frames
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.wording import short, with_unit
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -17,12 +17,11 @@ from tolalloc.allocation.cost.process_costs_file import today
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import table_frame, with_own_words
-from tolalloc.report.currency import in_currency
-from tolalloc.report.excel import write_sheets
-from tolalloc.report.feature_frame import write_frames
-from tolalloc.report.wording import unit_of
-from tolalloc.report.writer import write_csv
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.currency import in_currency
+from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.feature_frame import write_frames
+from tolalloc.reports.writer import write_csv
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

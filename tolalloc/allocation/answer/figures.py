@@ -12,8 +12,9 @@ from tolalloc.allocation.answer import tables
 from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.guarantee import AtYield
 from tolalloc.allocation.trade import SettingTrade
-from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.report.wording import quantity, short, unit_of, with_unit
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.wording import quantity, short, with_unit
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

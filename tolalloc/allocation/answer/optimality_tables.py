@@ -11,8 +11,8 @@ from tolalloc.allocation.answer.tables import searches, solver_noise
 from tolalloc.allocation.candidates import GRADES
 from tolalloc.allocation.fronts import Fronts
 from tolalloc.allocation.pareto import Front
-from tolalloc.report.wording import short, unit_of
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.wording import short
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -12,8 +12,9 @@ from tolalloc.allocation.answer.dimensions import effects_figure
 from tolalloc.allocation.answer.drawing import full_drawing_table
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
 from tolalloc.allocation.guarantee import AtYield
-from tolalloc.report.document import Section
-from tolalloc.report.wording import quantity, short, unit_of, with_unit
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.document import Section
+from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.sensitivity.driver_tables import sobol_table
 
 if TYPE_CHECKING:

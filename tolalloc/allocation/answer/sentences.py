@@ -10,8 +10,9 @@ from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
 from tolalloc.drawings.callouts import callout_assumptions
-from tolalloc.report.wording import QUICK_RUN, short, unit_of, with_unit
-from tolalloc.surrogate.regression import NEEDED_Q2
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.wording import QUICK_RUN, short, with_unit
+from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -14,7 +14,8 @@ from tolalloc.allocation.program.problem import Solution
 from tolalloc.allocation.requirement import Check
 from tolalloc.allocation.search import ZoneAllocation
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.report.wording import short, unit_of
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.wording import short
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -10,8 +10,8 @@ import pandas as pd
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.robustness import Robustness
 from tolalloc.allocation.trade import SettingTrade
-from tolalloc.report.wording import quantity, unit_of
-from tolalloc.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.wording import quantity
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.closed_forms import ClosedForm, Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.points import Points
+from tolalloc.allocation.cost.points import Points, ShopPoints
 from tolalloc.exceptions import InputError
 
 FORMS: tuple[type[ClosedForm], ...] = (Reciprocal, ReciprocalPower, Exponential, Combined)
@@ -188,3 +188,44 @@ def _linear(unit: Float[np.ndarray, " point"], costs: Float[np.ndarray, " point"
     columns = np.stack([1.0 / costs, unit / unit.max() / costs], axis=1)
     (fixed, factor), _ = nnls(columns, np.ones_like(costs))
     return float(fixed), float(factor / unit.max())
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShopFit:
+    """The closed forms through the points of one process of a shop.
+
+    Parameters
+    ----------
+    process
+        Its name, with the kind of callout if it is for one alone.
+    points
+        Zones [µm] and costs.
+    forms
+        Every form that the points suffice for.
+    best
+        The form that is taken.
+    """
+
+    process: str
+    points: Points
+    forms: tuple[CostFit, ...]
+    best: CostFit
+
+
+def shop_fits(shop: ShopPoints) -> tuple[ShopFit, ...]:
+    """Return the fits of every process of a shop, each alone for a kind of callout where it is priced so.
+
+    Raises
+    ------
+    InputError
+        As `fits`.
+    """
+    return tuple(
+        ShopFit(
+            process=process if feature is None else f"{process}, {feature}",
+            points=points,
+            forms=fits(points),
+            best=best_fit(points),
+        )
+        for (process, feature), points in shop.items()
+    )

@@ -15,8 +15,8 @@ from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_COST, SMALLEST_ZONE,
 from tolalloc.drawings.table_file import read_rows, read_text_table, split_header, stated_currency
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.files import Record
-from tolalloc.report.wording import COST_UNITS
+from tolalloc.reading.files import Record
+from tolalloc.reading.units import COST_UNITS
 
 MOST_POINTS = 200
 """Most prices of one process; a fit leaves out each of them in turn, and a workbook's formula names all [-]."""

@@ -27,10 +27,9 @@ from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.table_file import DATA, read_rows, read_text_table, split_header, stated_currency
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.file_content import is_file
-from tolalloc.files import Record, shipped_or_path
-from tolalloc.report.wording import COST_UNITS
-from tolalloc.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.file_content import is_file
+from tolalloc.reading.files import Record, shipped_or_path
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
 
 Cost = Annotated[float, Field(ge=0, le=1e9)]
 Zone = Annotated[float | None, Field(ge=SMALLEST_ZONE, le=LARGEST_ZONE)]

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
-from tolalloc.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
-from tolalloc.models import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response
 
 _PROBED = 1e-6
 """Relative difference up to which an answer asked for again is the same, on another machine too [-]."""

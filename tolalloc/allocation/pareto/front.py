@@ -15,8 +15,8 @@ from tolalloc.allocation.pareto.found import SearchedDesigns, knee, spread_over
 from tolalloc.allocation.pareto.problem import DesignProblem, Ladders
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
-from tolalloc.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
-from tolalloc.surrogate.validation import FOLDS, Score, answers_of, cross_validate
+from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
+from tolalloc.sensitivity.surrogate.validation import FOLDS, Score, answers_of, cross_validate
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, UInt8
 from tolalloc.allocation.design_space import DesignSpace
 from tolalloc.allocation.local_model import Side
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models import Response
+from tolalloc.models.model import Response
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.capability.indices import ShareInterval, wilson_interval
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 
 @dataclass(frozen=True, kw_only=True)

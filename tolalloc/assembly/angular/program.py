@@ -14,7 +14,7 @@ from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature
 from tolalloc.assembly.gains import FinalErrors
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.exceptions import InputError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,8 +21,8 @@ from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.precision_sweep import PrecisionSweep
 from tolalloc.assembly.trajectory import Trajectory
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ import numpy as np
 from tolalloc.assembly.answer.tables import MISSED, at_precision, has_limits, larger
 from tolalloc.assembly.answer.tolerance_tables import is_retuned, limited_tolerances
 from tolalloc.assembly.answer.transmission import risen
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer

@@ -14,9 +14,9 @@ from tolalloc.assembly.answer.tables import at_precision, larger, norm_of, state
 from tolalloc.assembly.answer.tolerance_tables import is_priced
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer

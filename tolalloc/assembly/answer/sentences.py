@@ -10,8 +10,8 @@ from tolalloc.assembly.answer.tables import at_precision, norm_of
 from tolalloc.assembly.answer.tolerance_tables import is_priced, is_retuned, limited_tolerances, verified_name
 from tolalloc.assembly.answer.transmission import LINE_LOAD, PIN_FORCE, RATED_PEAK_TO_PEAK, answers, change, perfect
 from tolalloc.assembly.orientations import TransmissionEffect
-from tolalloc.rv import PEAK_TO_PEAK
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers import PEAK_TO_PEAK
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer

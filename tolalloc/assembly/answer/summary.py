@@ -13,7 +13,7 @@ from tolalloc.assembly.answer.tables import has_limits
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, adjustable, efforts
-from tolalloc.units import ARCSECOND, DEGREE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer

@@ -10,7 +10,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.assembly.steps import adjustable
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AdjustedParts, AssemblyAnswer

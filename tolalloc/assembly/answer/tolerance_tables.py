@@ -12,7 +12,7 @@ from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem
 from tolalloc.assembly.answer.tables import has_limits, rounded
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 if TYPE_CHECKING:
     from tolalloc.assembly.answer.answer import AngularTolerances, AssemblyAnswer

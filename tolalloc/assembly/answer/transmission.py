@@ -10,9 +10,9 @@ from jaxtyping import Float
 
 from tolalloc.assembly.answer.tables import rounded
 from tolalloc.assembly.orientations import TransmissionEffect
-from tolalloc.report.figure import Figure, HeatMap, Series
-from tolalloc.rv import PEAK_TO_PEAK
-from tolalloc.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reports.figure import Figure, HeatMap, Series
 
 RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
 PIN_FORCE = "largest pin force, rated torque [N]"

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.mounting.stock import Mountings, PartStock
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import cos, gcd, pi, sin
 from typing import NamedTuple
 
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Reducer
 
 _WAVE = re.compile(r"(.*)\.(cos|sin)(\d+)")
 _MEMBER = re.compile(r"(each_(?:pin|tooth)\.\w+)\.(\d+)(.*)")

@@ -10,13 +10,13 @@ from tolalloc.assembly.mounting.search import best_mounting, random_mounting
 from tolalloc.assembly.mounting.stock import PartStock, load_parts
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, RunRecord
-from tolalloc.report.answer import Header
-from tolalloc.rv.equivalent.answers import OUTCOMES
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.files import load_reducer
-from tolalloc.rv.reducer.series import at_torque
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress, RunRecord
 
 MOST_STARTS = 64
 

@@ -21,7 +21,7 @@ from tolalloc.assembly.mounting.stock import Mountings, PartStock
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models import Response
+from tolalloc.models.model import Response
 
 _Answer = TypeVar("_Answer")
 
@@ -125,7 +125,7 @@ class EvaluatedUnits:
     """Units that were evaluated, and how many failed."""
 
     stock: PartStock  # The parts
-    response: Response  # What is to be small, first output, such as `tolalloc.rv.response.kernel.KernelResponse`
+    response: Response  # What is to be small, first output, such as `tolalloc.reducers.response.kernel.KernelResponse`
     # Units evaluated, and those of them without an answer [-]
     evaluations: int = 0
     failures: int = 0

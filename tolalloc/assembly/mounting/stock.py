@@ -18,11 +18,11 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.equivalent.columns import source_name
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.unit_table import LARGEST_LENGTH
-from tolalloc.units import ARCSECOND, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, MICROMETRE
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.unit_table import LARGEST_LENGTH
 
 Mountings = Int[np.ndarray, "_unit _place 2"]
 """For every unit and place, the number of the part that stands there and of its turn."""

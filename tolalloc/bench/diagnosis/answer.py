@@ -12,11 +12,11 @@ from tolalloc.bench.diagnosis.diagnosis import Diagnosis
 from tolalloc.bench.diagnosis.problem import Noise
 from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
-from tolalloc.report.figure import Figure, Series
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
     import pandas as pd

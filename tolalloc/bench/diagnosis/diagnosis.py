@@ -27,7 +27,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.rv.response.kernel import KernelResponse
+from tolalloc.reducers.response.kernel import KernelResponse
 
 IMPLAUSIBLE = 0.001
 """Probability of residuals as large, were the model true, below which a curve is not explained [-]."""

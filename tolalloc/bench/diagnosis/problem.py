@@ -10,12 +10,12 @@ from jaxtyping import Float
 
 from tolalloc.bench.measurement.angles import TURN
 from tolalloc.bench.measurement.files import MeasuredCurve
-from tolalloc.chunks import map_chunks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError
-from tolalloc.rv.equivalent.answers import Equilibria
-from tolalloc.rv.response.kernel import KernelResponse
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.equivalent.answers import Equilibria
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.running.chunks import map_chunks
 
 FEWEST_READINGS = 24
 """Fewest readings that a diagnosis starts from [-]."""

@@ -12,16 +12,16 @@ from tolalloc.bench.diagnosis.search import DiagnosisEffort
 from tolalloc.bench.measurement.cleaning import clean_curve
 from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.bench.measurement.readings import ANGLE, TRANSMISSION_ERROR, load_readings
-from tolalloc.blas import one_blas_thread
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress, RunRecord
-from tolalloc.report.answer import Header
-from tolalloc.rv.choice import bind
-from tolalloc.rv.equivalent.answers import OUTCOMES
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.choice import bind
+from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reports.header import Header
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import Progress, RunRecord
 
 LARGEST_NOISE = 60.0
 """Largest error of a reading that is believed [arcsec]."""

@@ -18,7 +18,7 @@ from tolalloc.bench.diagnosis.bridge import LogDensity
 from tolalloc.bench.diagnosis.problem import CurveProblem
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.exceptions import SolveError
-from tolalloc.rv.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Reducer
 
 _OTHER = {"1": "2", "2": "1"}
 _PAST = {"disc1": 1, "disc2": -1}

@@ -19,13 +19,13 @@ from tolalloc.bench.identification.prediction import LARGE_DRIFT, Prediction
 from tolalloc.bench.identification.profile import ParameterEstimate, ParameterProfile, as_stiffness
 from tolalloc.bench.identification.resampling import ParameterChoice
 from tolalloc.bench.measurement.files import Measurements
-from tolalloc.report.answer import Answer
-from tolalloc.report.document import Section
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.rv.reducer.files import write_identified_stiffness
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.surrogate.regression import BoxPolynomial
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import write_identified_stiffness
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.sensitivity.surrogate.regression import BoxPolynomial
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,22 +10,23 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.exceptions import InputError
-from tolalloc.report.answer import Answer, Header
-from tolalloc.report.document import Section
-from tolalloc.rv.equivalent.hysteresis import HysteresisLoop
-from tolalloc.rv.equivalent.perfect import exact_loop
-from tolalloc.rv.reducer.design import Catalogue, Reducer
-from tolalloc.rv.reducer.rolling_bearing import RollingBearing
-from tolalloc.rv.reducer.series import at_torque
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
-from tolalloc.rv.rigidity import twist_shares
-from tolalloc.units import ARCMINUTE
+from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.reducer.design import Catalogue, Reducer
+from tolalloc.reducers.reducer.rolling_bearing import RollingBearing
+from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.rigidity import twist_shares
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.header import Header
 
 if TYPE_CHECKING:
     import pandas as pd
 
 BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
-"""Interfaces with rolling bearings, as fields of `tolalloc.rv.reducer.stiffness.Stiffness`."""
+"""Interfaces with rolling bearings, as fields of `tolalloc.reducers.reducer.stiffness.Stiffness`."""
 RIGIDITY_UNCERTAINTY = 0.1
 """Relative standard uncertainty of a rigidity that a catalogue states without one; an assumption [-]."""
 _FARTHEST = 1000.0

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.exceptions import InputError
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
 
 PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
 """Kinds of readings."""

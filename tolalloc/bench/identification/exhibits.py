@@ -12,8 +12,8 @@ from jaxtyping import Float, Int
 from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, ReadingBlock
 from tolalloc.bench.identification.information import LEVEL
 from tolalloc.bench.identification.parameters import BIAS, Parameter
-from tolalloc.report.figure import Figure, Series
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
     from tolalloc.bench.identification.answer import IdentificationAnswer

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.design import Reducer
 
 SYMBOLS = {
     "sun_support": "K_s",
@@ -24,7 +24,7 @@ SYMBOLS = {
     "torque": "torque",
     "bias": "bias",
 }
-"""Name of each parameter → its symbol; stiffnesses are fields of `tolalloc.rv.reducer.stiffness.Stiffness`."""
+"""Name of each parameter → its symbol; stiffnesses are fields of `tolalloc.reducers.reducer.stiffness.Stiffness`."""
 
 BIAS, TORQUE = "bias", "torque"
 

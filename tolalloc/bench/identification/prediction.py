@@ -19,12 +19,12 @@ from tolalloc.bench.identification.parameters import (
 )
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.rv.equivalent.answers import Derivatives
-from tolalloc.rv.equivalent.kinematics import HARMONICS
-from tolalloc.rv.equivalent.model import EquivalentModel
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.surrogate.regression import BoxPolynomial, fit_box_polynomial
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.answers import Derivatives
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.sensitivity.surrogate.regression import BoxPolynomial, fit_box_polynomial
 
 _SAMPLES_AT_ONCE = 16
 """Curves solved together; each takes some 3 kB an angle for its derivatives [-]."""

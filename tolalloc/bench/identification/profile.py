@@ -14,7 +14,7 @@ from tolalloc.bench.identification.information import Information
 from tolalloc.bench.identification.parameters import Parameter
 from tolalloc.bench.identification.prediction import Prediction, Predictor
 from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.rv.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 
 BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
 """Values at which a parameter is held: evenly between its bounds, and within so many standard errors of its best."""

@@ -19,10 +19,10 @@ from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoi
 from tolalloc.bench.measurement.files import Measurements
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.progress import Progress
-from tolalloc.report.answer import Header
-from tolalloc.rv.reducer.design import Reducer
-from tolalloc.units import ARCSECOND
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress
 
 _ANY_BIAS = (-3600.0, 3600.0)
 STARTS = 8

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from tolalloc.bench.measurement.readings import RawReadings, counted, require_readings
 from tolalloc.exceptions import InputError
-from tolalloc.units import DEGREE
+from tolalloc.reading.units import DEGREE
 
 TURN = 2.0 * pi
 

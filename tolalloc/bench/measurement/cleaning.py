@@ -24,7 +24,7 @@ from tolalloc.bench.measurement.angles import (
 from tolalloc.bench.measurement.readings import RawReadings, counted, require_readings
 from tolalloc.bench.measurement.resampling import FULL, READINGS, Cleaned, resampled
 from tolalloc.exceptions import InputError
-from tolalloc.units import DEGREE
+from tolalloc.reading.units import DEGREE
 
 MISSING_SHARE = 0.05
 """Largest share of readings without a number; an instrument that loses more is not trusted with the rest [-]."""

@@ -24,10 +24,10 @@ from tolalloc.bench.measurement.readings import (
 from tolalloc.bench.measurement.resampling import Cleaned
 from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.files import Record, read_toml, validated
-from tolalloc.rv.reducer.unit_file import BuiltUnit, load_unit
-from tolalloc.rv.reducer.unit_table import load_units, unit_names
-from tolalloc.units import ARCSECOND, DEGREE
+from tolalloc.reading.files import Record, read_toml, validated
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
+from tolalloc.reducers.reducer.unit_table import load_units, unit_names
 
 
 @dataclass(frozen=True, kw_only=True)

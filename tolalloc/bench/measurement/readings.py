@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError
-from tolalloc.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
 MISSING = ("", "nan", "na", "n/a", "-", "inf", "+inf", "-inf")
 """What instruments write where they have no number."""

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import SolveError
-from tolalloc.models import Response
+from tolalloc.models.model import Response
 
 _CALLS_TO_JUDGE = 100
 """Below so many calls one failed sample would already exceed the allowed share."""

@@ -1,0 +1,45 @@
+"""What commands say and write is what it was, word for word; numbers as far as processors agree.
+
+``python -m tests.golden.record --check`` compares to the last bit on the machine that made the files.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from math import isclose
+
+import pytest
+
+from tests.golden.cases import SMALL
+from tests.golden.record import CASES, kept, recorded
+
+NUMBER = re.compile(r"(?<![\w.])[-−+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d+)?")
+DEFAULT = [case.name for case in SMALL]
+
+
+def value(text: str) -> float:
+    return float(text.replace(",", "").replace("−", "-"))
+
+
+def alike(one: str, other: str, relative: float) -> bool:
+    """Return whether two numbers agree, or differ by one in the last place that is written."""
+    decimals = len(one.partition(".")[2]) if "e" not in one.lower() else 0
+    last = 10.0**-decimals if decimals < 8 else 0.0
+    return isclose(value(one), value(other), rel_tol=relative, abs_tol=max(1.01 * last, 1e-9))
+
+
+def require_alike(before: str, now: str, relative: float) -> None:
+    assert NUMBER.sub("#", now).splitlines() == NUMBER.sub("#", before).splitlines()
+    pairs = zip(NUMBER.findall(before), NUMBER.findall(now), strict=True)
+    assert not [pair for pair in pairs if not alike(*pair, relative)]
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in DEFAULT else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
+)
+def test_a_command_says_and_writes_what_it_did(name, tmp_path):
+    prose, numbers = recorded(CASES[name], tmp_path)
+    before, known = kept(name)
+    require_alike(before, prose, 1e-3)
+    require_alike(json.dumps(known, indent=1), json.dumps(numbers, indent=1), 1e-6)

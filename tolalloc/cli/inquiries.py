@@ -1,0 +1,64 @@
+"""Commands that are made from the record of an inquiry: its fields are the options, its docstring the help."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import MISSING, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
+
+import typer
+
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
+from tolalloc.cli.options import named_reducer
+from tolalloc.cli.progress import shown_progress
+from tolalloc.study.inquiry import Inquiry, Word
+
+
+def inquiry_command(name: str) -> Callable[..., None]:
+    """Return the command of a module of `tolalloc.study.inquiries`."""
+    inquiry: type[Inquiry[Any]] = import_module(f"tolalloc.study.inquiries.{name}").INQUIRY
+
+    def command(out: Path | None, as_json: bool, **given: Any) -> None:
+        from tolalloc.reports.folder import require_usable
+
+        if "reducer" in given:
+            given["reducer"] = named_reducer(given["reducer"], out, *(given[own] for own in inquiry.written))
+        asked = inquiry(**given)
+        require_usable(out)
+        prepared = asked.prepare()
+        if inquiry.kernel:
+            announce_compilation(inquiry.kernel)
+        with shown_progress(inquiry.counted) as progress:
+            answer = asked.solve(prepared, progress)
+        write_report(answer, out)
+        for sentence in asked.write(answer):
+            note(sentence)
+        tell(answer, as_json, *answer.teller.terminal)
+
+    command.__name__ = inquiry.word
+    command.__doc__ = inspect.cleandoc(inquiry.__doc__ or "").split("\n\n")[0]
+    own = [_parameter(inquiry, at) for at in range(len(fields(inquiry)))]
+    last = [_keyword("out", ReportFolder, None), _keyword("as_json", AsJson, False)]
+    command.__signature__ = inspect.Signature([*own, *last])  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in (*own, *last)}
+    return command
+
+
+def _parameter(inquiry: type[Inquiry[Any]], at: int) -> inspect.Parameter:
+    """Return the argument or option of a field."""
+    own = fields(inquiry)[at]
+    kind, word = get_args(get_type_hints(inquiry, include_extras=True)[own.name])[:2]
+    if not isinstance(word, Word):
+        raise TypeError(f"{inquiry.__name__}.{own.name}: its annotation has no Word")
+    names = (word.option,) if word.option else ()
+    said = typer.Argument(help=word.help) if at < inquiry.by_position else typer.Option(*names, help=word.help)
+    return _keyword(own.name, Annotated[kind, said], ... if own.default is MISSING else own.default)
+
+
+def _keyword(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    empty = inspect.Parameter.empty
+    given = empty if default is ... else default
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=given, annotation=annotation)

@@ -1,0 +1,1 @@
+"""What is asked: models, their settings, own functions."""

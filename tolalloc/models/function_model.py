@@ -1,0 +1,328 @@
+"""A user's own function as a model: ranked, judged and allocated like the equivalent model of a reducer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import ANGULAR
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models.model import Evaluation, Examination, Model, Observer, SettingDerivatives, unobserved
+from tolalloc.models.settings import Setting, require_settings
+from tolalloc.models.user_function import UserFunction, identity
+from tolalloc.reading.units import MILLIMETRE
+
+_STEP = 1e-4
+"""Step of a difference to either side, over the zone, for a function without noise [-]."""
+_AT_ONCE = 2**16
+"""Samples that a function is given at once, so that its arguments stay small [-]."""
+_ASKED = 16
+"""Samples that tell whether a function takes whole columns [-]."""
+_STEP_OF_SIMULATION = 0.02
+"""The same for a simulation, whose solver leaves noise [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionModel:
+    """A function of the dimensions on a drawing.
+
+    Parameters
+    ----------
+    function
+        Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is
+        the nominal plus the deviation [mm], of an angle the deviation [rad]; a function may take arrays of samples,
+        each output then being a number or one number per sample, or single numbers.
+    inputs
+        Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``.
+    outputs
+        Names of the outputs with their units.
+    settings
+        What the designer chooses beside the zones.
+    jacobian
+        Takes what the function takes and returns, for every output, the derivative by every input [unit of the output
+        per mm]; central differences unless given.
+    step
+        Step of these differences to either side, over the zone [-].
+    name
+        What a report calls the model.
+    """
+
+    function: Callable[..., Any]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    settings: tuple[Setting, ...] = ()
+    jacobian: Callable[..., Any] | None = None
+    step: float = _STEP
+    name: str = "own model"
+
+    def __post_init__(self) -> None:
+        for field_name, names in (("inputs", self.inputs), ("outputs", self.outputs)):
+            if not names or len(set(names)) != len(names):
+                raise InputError.at(f"model {self.name}", field_name, names, "one name or more, each once")
+        for output in self.outputs:
+            if not re.fullmatch(r".*\S \[\S.*\]", output):
+                allowed = f"a name with its unit, such as '{output} [mm]', or [-] for a plain number"
+                raise InputError.at(f"model {self.name}", "outputs", output, allowed)
+
+    def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
+        """Return the function with other values of its settings [units of their names].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, or a value outside its bounds.
+        """
+        require_settings(f"model {self.name}", self.settings, settings)
+        changed = (replace(own, value=settings.get(own.name, own.value)) for own in self.settings)
+        return replace(self, settings=tuple(changed))
+
+    def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
+        """Return the model at the sources of a drawing.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A source that is no input, or an input without a row.
+        """
+        nominal = {source.name: source.nominal for source in errors.sources}
+        for column in (*errors.columns, *errors.fixed):
+            if column not in self.inputs:
+                raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
+        given = {*errors.columns, *errors.fixed}
+        missing = [name for name in self.inputs if name not in given]
+        if missing:
+            raise InputError(
+                f"{place}, model {self.name}: the input {missing[0]!r} has no row in the drawing; give it one, with "
+                "zone 0 if it does not vary."
+            )
+        return BoundFunction(
+            source=self,
+            varied=errors.columns,
+            steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
+            offsets=np.array([nominal.get(name, 0.0) + errors.fixed.get(name, 0.0) for name in self.inputs]),
+            values=tuple(setting.value for setting in self.settings),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundFunction(Model):
+    """A function at the sources of a drawing.
+
+    Parameters
+    ----------
+    source
+        The function with its names.
+    varied
+        Names of the inputs that vary, in the order of X.
+    steps
+        Step of every varied input to either side of a difference [m, angles rad].
+    offsets
+        Nominal of every input, with what a zone of 0 leaves it [m, angles rad].
+    values
+        Values of the settings in force [units of their names].
+    asked
+        Names of the outputs that a call returns; all unless given.
+    observe
+        Told the statuses of each call.
+    """
+
+    source: FunctionModel
+    varied: tuple[str, ...]
+    steps: Float[np.ndarray, " column"]
+    offsets: Float[np.ndarray, " input"]
+    values: tuple[float, ...] = ()
+    asked: tuple[str, ...] = ()
+    observe: Observer = unobserved
+
+    @property
+    def name(self) -> str:
+        """The name that its user gave."""
+        return self.source.name
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs that vary."""
+        return self.varied
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a reader must know: inputs that the drawing gives no nominal size."""
+        bare = [name for name, offset in zip(self.source.inputs, self.offsets, strict=True) if offset == 0.0]
+        return (f"no nominal size on the drawing, taken as deviations from 0: {', '.join(bare)}",) if bare else ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
+        """Return which inputs have no nominal size: a size that was forgotten moves every output."""
+        return Examination(tuple(f"{said[0].upper()}{said[1:]}." for said in self.assumptions))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units."""
+        return self.asked or self.source.outputs
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """What the designer chooses beside the zones."""
+        return self.source.settings
+
+    @property
+    def exact(self) -> tuple[str, ...]:
+        """All outputs: a function is cheap enough for differences where it has no derivatives."""
+        return self.source.outputs
+
+    @cached_property
+    def is_fast(self) -> bool:
+        """Whether the function takes whole columns: then a million samples take seconds."""
+        widths = self.steps / self.source.step
+        arguments = self._arguments(np.linspace(-0.5, 0.5, _ASKED)[:, np.newaxis] * widths)
+        return self._user_function(self.source.function, len(self.source.outputs)).takes_columns(arguments)
+
+    @property
+    def content(self) -> Any:
+        """Names, settings, and the function's code."""
+        own = (identity(self.source.function), identity(self.source.jacobian))
+        return (self.name, self.source.inputs, self.source.outputs, self.settings, *own)
+
+    def observed(self, observe: Observer) -> BoundFunction:
+        """Return the model that tells someone the statuses of each call, those of differences among them."""
+        return replace(self, observe=observe)
+
+    def at(self, values: Float[np.ndarray, " setting"]) -> BoundFunction:
+        """Return the model at other values of its settings."""
+        return replace(self, values=tuple(float(value) for value in values))
+
+    def reading(self, outputs: tuple[str, ...]) -> BoundFunction:
+        """Return the response of these outputs alone."""
+        for name in outputs:
+            if name not in self.source.outputs:
+                raise UnknownNameError.among(f"model {self.name}", "output", name, self.source.outputs)
+        return replace(self, asked=outputs)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample; one for which the function raises or returns no number fails."""
+        found = self._called(self.source.function, x, len(self.source.outputs))
+        values = found[:, [self.source.outputs.index(name) for name in self.outputs]]
+        status = np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8)
+        self.observe(status)
+        return Evaluation(values=values, status=status)
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the first output of every sample with its derivatives."""
+        return self.derivatives(self.outputs[0], x)
+
+    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return an output of every sample with its derivatives, by the user's jacobian or by central differences."""
+        own = self.reading((output,))
+        found, settings = own(x), np.array(self.values)
+        by_setting = np.empty((x.shape[0], settings.size))
+        for at, setting in enumerate(self.settings):
+            step = setting.step * np.eye(settings.size)[at]
+            by_setting[:, at] = (own.at(settings + step)(x).values - own.at(settings - step)(x).values)[:, 0]
+            by_setting[:, at] /= 2 * setting.step
+        return SettingDerivatives(evaluation=found, by_column=self._by_column(own, x), by_setting=by_setting)
+
+    def _by_column(
+        self, own: BoundFunction, x: Float[np.ndarray, "sample column"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the derivative of one output by every column [unit of the output per m]."""
+        if self.source.jacobian is not None:
+            inputs, outputs = len(self.source.inputs), len(self.source.outputs)
+            found = self._called(self.source.jacobian, x, inputs * outputs).reshape(-1, outputs, inputs)
+            varied = [self.source.inputs.index(name) for name in self.varied]
+            own_rows = found[:, self.source.outputs.index(own.outputs[0])]
+            return np.asarray(own_rows[:, varied] * self._per_input[varied])
+        slopes = np.empty(x.shape)
+        for at, step in enumerate(np.diag(self.steps)):
+            slopes[:, at] = (own(x + step).values - own(x - step).values)[:, 0] / (2 * self.steps[at])
+        return slopes
+
+    @cached_property
+    def _per_input(self) -> Float[np.ndarray, " input"]:
+        """Input per metre, or per radian for an angle: lengths reach the function in millimetres."""
+        return np.array(
+            [1.0 if name.rsplit(".", 1)[-1] in ANGULAR else 1.0 / MILLIMETRE for name in self.source.inputs]
+        )
+
+    def _called(
+        self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
+    ) -> Float[np.ndarray, "sample value"]:
+        """Return what a function says of every sample, NaN where it says nothing."""
+        asked = self._user_function(function, count)
+        parts = np.split(x, range(_AT_ONCE, x.shape[0], _AT_ONCE))
+        return np.concatenate([asked(self._arguments(part)) for part in parts])
+
+    def _user_function(self, function: Callable[..., Any], count: int) -> UserFunction:
+        return UserFunction(function=function, values=count, place=f"model {self.name}")
+
+    def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
+        """Return what the function takes: inputs [mm, angles rad], then settings [units of their names]."""
+        inputs = np.tile(self.offsets, (x.shape[0], 1))
+        inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
+        settings = np.tile(self.values, (x.shape[0], 1))
+        return np.concatenate([inputs * self._per_input, settings], axis=1)
+
+
+def model(
+    function: Callable[..., Any],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    settings: Sequence[Setting] = (),
+    jacobian: Callable[..., Any] | None = None,
+    name: str = "",
+) -> FunctionModel:
+    """Return a model of your own: any function of the dimensions on a drawing.
+
+    The parameters are those of `FunctionModel`; the name is the function's unless given.
+
+    Examples
+    --------
+    >>> import tolalloc as ta
+    >>> gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
+    >>> gap.outputs
+    ('gap [mm]',)
+    """
+    for field, names in (("inputs", inputs), ("outputs", outputs)):
+        if isinstance(names, str):
+            raise InputError.at("ta.model", field, names, f"a sequence of names, such as ({names!r},)")
+    called = name or getattr(function, "__name__", "own model").replace("_", " ").replace("<lambda>", "own model")
+    return FunctionModel(
+        function=function,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        settings=tuple(settings),
+        jacobian=jacobian,
+        name=called,
+    )
+
+
+def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], stop_time: float = 1.0) -> FunctionModel:
+    """Return a Functional Mock-up Unit as a model: parameters in, values at the end of a simulation out.
+
+    Parameters
+    ----------
+    path
+        The unit, an ``.fmu`` file (FMI 2 or 3).
+    inputs
+        Id of the drawing → name of the unit's parameter, which takes millimetres (angles: radians).
+    outputs
+        Name of the output with its unit → name of the unit's variable.
+    stop_time
+        Simulated time after which the outputs are read [s].
+
+    Raises
+    ------
+    InputError
+        The optional library that runs such units is not installed, or there is no such file.
+    """
+    from tolalloc.models.fmu import simulated
+
+    function = simulated(path, tuple(inputs.values()), tuple(outputs.values()), stop_time)
+    return FunctionModel(
+        function=function, inputs=tuple(inputs), outputs=tuple(outputs), step=_STEP_OF_SIMULATION, name=function.name
+    )

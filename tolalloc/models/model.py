@@ -1,0 +1,406 @@
+"""What a model is: named inputs that vary, named outputs with units, and settings that a designer may choose.
+
+The equivalent model of a reducer, a surrogate of it and a user's own function all look like this to the rooms that
+rank, judge and allocate.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from tolalloc.models.settings import DrawnAmounts, Setting
+from tolalloc.running.chunks import Mapper
+
+if TYPE_CHECKING:
+    from tolalloc.drawings.correlation import CorrelatedSource
+    from tolalloc.drawings.error_model import ErrorModel
+    from tolalloc.reports.document import Section
+    from tolalloc.reports.figure import Figure
+
+Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
+"""Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
+
+Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
+"""Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
+
+
+def unobserved(status: UInt8[np.ndarray, " sample"]) -> None:
+    """Observe nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """Answers of a response.
+
+    Parameters
+    ----------
+    values
+        Outputs [as the response's output names state].
+    status
+        0 for a good sample; anything else is a failed one, whose values must not be used [-].
+    """
+
+    values: Float[np.ndarray, "sample output"]
+    status: UInt8[np.ndarray, " sample"]
+
+    @property
+    def good(self) -> Bool[np.ndarray, " sample"]:
+        """Which samples may be used."""
+        return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What a check of a study says of a model and of some random units."""
+
+    sentences: tuple[str, ...] = ()
+    but: str = ""  # What speaks against the drawing, as the end of a sentence; empty if nothing
+    fault: str = ""  # Why units of the drawing cannot be built, a sentence for a first page; empty if they can
+    figures: Mapping[str, float] = field(default_factory=dict)  # What was counted, units in the names
+
+
+@runtime_checkable
+class Response(Protocol):
+    """Anything that maps named columns to named outputs, sample by sample."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of X."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units, in the order of Y."""
+        ...
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample."""
+        ...
+
+
+@runtime_checkable
+class Derived(Protocol):
+    """Answers with the derivative of the first output by every column."""
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """Outputs and status of every sample."""
+        ...
+
+    @property
+    def by_column(self) -> Float[np.ndarray, "sample column"]:
+        """Derivatives [output per unit of the column]."""
+        ...
+
+
+@runtime_checkable
+class ResponseWithDerivatives(Protocol):
+    """A response that knows its derivatives."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of X."""
+        ...
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
+        """Return the outputs of every sample and their derivatives."""
+        ...
+
+
+@runtime_checkable
+class KeepsTables(Protocol):
+    """What keeps tables, and makes them again when they are needed."""
+
+    def put_away(self) -> None:
+        """Let go of the tables."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettingDerivatives:
+    """Answers of one output with its exact derivatives.
+
+    Parameters
+    ----------
+    evaluation
+        The output and the status of every sample.
+    by_column
+        Derivative by every column [output per unit of the column].
+    by_setting
+        Derivative by every setting [output per unit of the setting].
+    """
+
+    evaluation: Evaluation
+    by_column: Float[np.ndarray, "sample column"]
+    by_setting: Float[np.ndarray, "sample setting"]
+
+
+class Model(ABC):
+    """A model at the sources of one drawing: what every question asks.
+
+    A subclass says what it varies and what it answers; everything else has a default that asks for nothing special.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What a report calls it."""
+
+    @property
+    def kind(self) -> str:
+        """What a summary calls such a model."""
+        return "model"
+
+    @property
+    @abstractmethod
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs that the drawing lets vary, in the order of X."""
+
+    @property
+    @abstractmethod
+    def outputs(self) -> tuple[str, ...]:
+        """Names of all outputs with their units."""
+
+    @abstractmethod
+    def reading(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of these outputs alone, in their order, which may cost less than all of them."""
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """What the designer chooses beside the zones."""
+        return ()
+
+    def at(self, values: Float[np.ndarray, " setting"]) -> Model:
+        """Return the model at other values of its settings."""
+        if values.size:
+            raise ValueError(f"{self.name} has no settings")
+        return self
+
+    @property
+    def settings_word(self) -> str:
+        """What a sentence calls all settings together."""
+        return "settings"
+
+    @property
+    def exact(self) -> tuple[str, ...]:
+        """Names of the outputs whose exact derivatives cost hardly more than they do."""
+        return ()
+
+    @property
+    def is_fast(self) -> bool:
+        """Whether a million units take seconds, as of a function that takes whole arrays."""
+        return False
+
+    @property
+    def differentiable(self) -> tuple[str, ...]:
+        """Names of the outputs whose exact derivatives cost much more than they do, and are asked of few samples."""
+        return ()
+
+    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return an output of `exact` or `differentiable` of every sample with its derivatives."""
+        raise ValueError(f"{self.name} knows no exact derivatives of {output} at {x.shape[0]} samples")
+
+    def observed(self, observe: Observer) -> Model:  # noqa: ARG002
+        """Return the model that tells someone the statuses of each chunk; a model may not care."""
+        return self
+
+    def mapped(self, mapper: Mapper) -> Model:  # noqa: ARG002
+        """Return the model whose chunks of samples a mapper solves; `tolalloc.running.chunks` has one."""
+        return self
+
+    @property
+    def outcomes(self) -> Mapping[int, str]:
+        """Status → outcome of a sample in words, the good one first."""
+        return {0: "answer found", 1: "no answer"}
+
+    @property
+    def conditions(self) -> Mapping[str, float | str]:
+        """Under which conditions it answers, units in the names."""
+        return {}
+
+    @property
+    def operating_conditions(self) -> tuple[Setting, ...]:
+        """Those of its conditions that a user may vary, which change no part: a torque and not a name."""
+        return ()
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """What is worth knowing of the model itself, units in the names."""
+        return {}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source of the model states."""
+        return ()
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the drawing does not state and the model takes as exact, a sentence each."""
+        return ()
+
+    @property
+    def content(self) -> Any:
+        """What tells it from other models, for the digest of a study; its ``repr`` counts."""
+        return (self.name, self.columns, self.outputs, self.settings)
+
+    @property
+    def uncertain(self) -> tuple[CorrelatedSource, ...]:
+        """What is not known of the model itself and stands on no drawing; `with_uncertain` answers for it."""
+        return ()
+
+    @property
+    def uncertain_name(self) -> str:
+        """What a summary calls `uncertain`."""
+        return "not known of the model"
+
+    def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of these outputs with the columns of `uncertain` after its own."""
+        return self.reading(outputs)
+
+    def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> Model:
+        """Return the model with other values in the columns of `uncertain`, exactly and for all units."""
+        if change.size:
+            raise ValueError(f"nothing is uncertain of {self.name}")
+        return self
+
+    @property
+    def accuracy(self) -> Mapping[str, float]:
+        """Output → how well it answers for it; no smaller difference means anything [unit of the output]."""
+        return {}
+
+    @property
+    def spectra(self) -> Mapping[int, tuple[str, str]]:
+        """Order → names of the outputs that hold its cosine and sine, for models with a periodic curve.
+
+        `reading` knows them beside `outputs`.
+        """
+        return {}
+
+    @property
+    def spectra_note(self) -> str:
+        """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
+        return ""
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output, which has no unit."""
+        return output.split(" [")[0]
+
+    def stand_ins(self) -> tuple[Any, ...]:
+        """Return surrogates that know the model's structure, `tolalloc.sensitivity.surrogate.validation.Candidate`."""
+        return ()
+
+    @property
+    def drawn_amounts(self) -> DrawnAmounts:
+        """What a drawing says of the settings; the settings themselves unless a model says otherwise."""
+        settings = self.settings
+        return DrawnAmounts(
+            names=tuple(setting.name for setting in settings),
+            by_setting=np.eye(len(settings)),
+            steps=tuple(setting.step for setting in settings),
+        )
+
+    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
+        """Return what the settings mean on the drawing, units in the names."""
+        return {setting.name: float(value) for setting, value in zip(self.settings, values, strict=True)}
+
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:  # noqa: ARG002
+        """Return what a reader must know of these settings."""
+        return ()
+
+    @property
+    def ranked(self) -> tuple[str, ...]:
+        """Outputs that every ranking looks at; others, that cost more than they tell, once they are limited."""
+        return self.outputs
+
+    @property
+    def own_limits(self) -> Mapping[str, float]:
+        """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
+        return {}
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What every report says of the model itself beside what is asked, in sentences."""
+        return ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
+        """Return what a check of a study says of the model and of some random units."""
+        return Examination()
+
+    def put_away(self) -> None:  # noqa: B027
+        """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
+
+    def illustrated(
+        self,
+        units: Units,  # noqa: ARG002
+    ) -> tuple[Section, ...]:
+        """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
+        return ()
+
+    def pictured(
+        self,
+        units: Units,  # noqa: ARG002
+    ) -> tuple[Figure, ...]:
+        """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
+        return ()
+
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+        sources: tuple[str, ...],  # noqa: ARG002
+    ) -> dict[str, Any] | None:
+        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one.
+
+        Raises
+        ------
+        SolveError
+            The unit does not come to rest somewhere.
+        """
+        return None
+
+    def moving(
+        self,
+        errors: ErrorModel,  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        shares: Mapping[str, float],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+    ) -> tuple[Section, ...]:
+        """Return a picture of one unit's columns whose places show the sources' shares; nothing unless there is one."""
+        return ()
+
+
+@runtime_checkable
+class ModelSource(Protocol):
+    """What a study names as its model: it becomes a `Model` once the drawing says what varies."""
+
+    @property
+    def name(self) -> str:
+        """What a report calls the model."""
+        ...
+
+    def bound(self, errors: ErrorModel, place: str) -> Model:
+        """Return the model at the sources of a drawing; nothing is solved.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A source that the model does not have, or an input that nobody gives.
+        """
+        ...
+
+    def set_to(self, settings: Mapping[str, float]) -> ModelSource:
+        """Return the same at other values of its settings and operating conditions [units of their names].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, or a value outside its bounds.
+        """
+        ...

@@ -1,0 +1,108 @@
+"""Settings: what a designer chooses beside the zones, such as a clearance that the tooth modification leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.named_fields import NamedFields, is_number
+
+_ROUNDING = 1e-9
+"""How far a value may stand outside its bounds, as it was computed [unit of the setting]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting(NamedFields):
+    """A quantity that the designer chooses beside the zones, such as a clearance that the tooth modification leaves.
+
+    Parameters
+    ----------
+    name
+        Name with its unit.
+    value
+        As it is today [unit of the name].
+    lower, upper
+        Smallest and largest value that may be chosen; equal bounds lock it [unit of the name].
+    step
+        Step to either side of a difference by it [unit of the name].
+    """
+
+    called: ClassVar[str] = "setting"
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+    step: float
+
+    def __post_init__(self) -> None:
+        place = f"setting {self.name}"
+        for own in ("value", "lower", "upper", "step"):
+            if not (is_number(getattr(self, own)) and abs(getattr(self, own)) < float("inf")):
+                raise InputError.at(place, own, getattr(self, own), "a finite number")
+        if self.lower > self.upper:
+            raise InputError.at(place, "lower", self.lower, f"at most upper = {self.upper:g}")
+        if self.step <= 0:
+            raise InputError.at(place, "step", self.step, "above 0")
+
+    def allows(self, value: float) -> bool:
+        """Return whether a value may be chosen."""
+        return self.lower - _ROUNDING <= value <= self.upper + _ROUNDING
+
+    @property
+    def strays(self) -> bool:
+        """Whether the setting as it is today lies outside what may be chosen."""
+        return not self.allows(self.value)
+
+    @property
+    def sentence(self) -> str:
+        """How it is today, and what it may become."""
+        name, _, unit = self.name.rstrip("]").partition(" [")
+        present, allowed = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
+        if self.strays:
+            return f"{present} today, not among the {allowed} that it may become; only the table as it is may keep it"
+        return f"{present}; {f'may become {allowed}' if self.lower < self.upper else 'locked'}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnAmounts:
+    """What a drawing says of the settings: amounts that are linear in them, in steps.
+
+    Parameters
+    ----------
+    names
+        Names of the amounts with their units, as many as settings.
+    by_setting
+        Change of every amount (row) with every setting (column) [unit of the amount per unit of the setting].
+    steps
+        Step of every amount on a drawing [unit of the amount].
+    convention
+        What their signs mean, a sentence without its full stop; empty where a name says all.
+    """
+
+    names: tuple[str, ...]
+    by_setting: Float[np.ndarray, "amount setting"]
+    steps: tuple[float, ...]
+    convention: str = ""
+
+
+def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, float]) -> None:
+    """Raise unless every wanted value is one of a known setting, within its bounds.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The setting that is not known, or the value that is not allowed.
+    """
+    own = {setting.name: setting for setting in known}
+    for name, value in wanted.items():
+        if name not in own:
+            raise UnknownNameError.among(place, "setting", name, own)
+        if not (is_number(value) and own[name].allows(value)):
+            allowed = f"{own[name].lower:g} to {own[name].upper:g}, the bounds of this setting"
+            raise InputError.at(place, name, value, allowed)

@@ -1,0 +1,292 @@
+"""A function that a user gives: called for many samples at once where it can be, and told from other functions."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import sys
+import sysconfig
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from types import BuiltinFunctionType, CodeType, ModuleType
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError, SolveError
+
+FAILURES = (ArithmeticError, ValueError)
+"""What a function may raise for a sample that has no answer."""
+_SAME = 1e-9
+"""By how much a function of arrays may differ from itself called with numbers, over the largest value [-]."""
+
+
+_LONG = 4096
+"""Length of a value's text from which on its bytes tell it, as texts of large tables leave out their middle [-]."""
+_FEWEST = 30
+"""Samples from which on a function that raises for all of them has a fault rather than bad samples [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UserFunction:
+    """A function with the number of values that it returns for one sample, and whom messages name."""
+
+    function: Callable[..., Any]
+    values: int  # Numbers that it returns for one sample [-]
+    place: str  # Who is meant, for messages
+
+    def __call__(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+        """Return the values of every sample, NaN where there are none.
+
+        The function is first given whole columns, copies that it may change. What it returns counts only if every
+        value comes by itself, as a number or one number per sample, and if a few samples called alone say the same; it
+        is called sample by sample otherwise. A masked value and one with an imaginary part are no answer.
+
+        Raises
+        ------
+        InputError
+            The function takes another number of arguments, returns another number of values or what is no number, has
+            a fault, or answers differently when it is asked the same again.
+        SolveError
+            It raises for every one of many samples; a few without an answer are statuses.
+        """
+        self._require_arguments(arguments.shape[1])
+        with np.errstate(all="ignore"):
+            whole = self._of_columns(arguments)
+            if whole is not None:
+                return whole
+            rows, reasons = [], []
+            for sample in arguments:
+                row, reason = self._of_sample(sample)
+                rows.append(row)
+                reasons += [reason] * bool(reason)
+            found = np.array(rows).reshape(-1, self.values)
+            few = _few(len(arguments))
+            self._require_same(arguments[few], found[few])
+        if len(reasons) == len(rows) >= _FEWEST:
+            raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
+        return found
+
+    def takes_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> bool:
+        """Return whether one call with whole columns gives the values of all samples."""
+        with np.errstate(all="ignore"):
+            return self._of_columns(arguments) is not None
+
+    def _of_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"] | None:
+        """Return the values by one call with whole columns; None unless they can be trusted."""
+        samples = arguments.shape[0]
+        if samples < 2:
+            return None
+        try:
+            found = self.function(*(column.copy() for column in arguments.T))
+            single = self.values == 1 and np.shape(found) in ((), (samples,))
+            columns = [np.broadcast_to(self._numbers(one), samples) for one in _flat([found] if single else found)]
+        except (TypeError, *FAILURES):
+            return None
+        if len(columns) != self.values:
+            return None
+        whole, few = np.stack(columns, axis=1), _few(samples)
+        alone = self._alone(arguments[few])
+        if _agree(whole[few], alone):
+            return whole
+        self._require_same(arguments[few], alone)
+        return None
+
+    def _alone(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+        """Return the values of samples that are called one by one."""
+        return np.array([self._of_sample(sample)[0] for sample in arguments]).reshape(-1, self.values)
+
+    def _require_same(
+        self, arguments: Float[np.ndarray, "sample argument"], before: Float[np.ndarray, "sample value"]
+    ) -> None:
+        """Raise if the function says something else of the same samples in another order."""
+        again = self._alone(arguments[::-1])[::-1]
+        for sample, first, second in zip(arguments, before, again, strict=True):
+            if not _agree(first, second):
+                said = " and then ".join(", ".join(f"{value:.9g}" for value in own) for own in (first, second))
+                raise InputError(
+                    f"{self.place}: the function answers differently when it is asked the same again: {said} for "
+                    f"({_listed(sample)}); allowed is a function of its arguments alone, without random numbers and "
+                    "without memory of earlier calls."
+                )
+
+    def _of_sample(self, sample: Float[np.ndarray, " argument"]) -> tuple[Float[np.ndarray, " value"], str]:
+        """Return the values of one sample, and what the function raised if it did."""
+        nothing = np.full(self.values, np.nan)
+        try:
+            found = self._numbers(self.function(*sample.tolist())).ravel()
+        except FAILURES as reason:
+            return nothing, f"{type(reason).__name__} ({reason}) for ({_listed(sample)})"
+        except TypeError as error:
+            raise InputError(f"{self.place}: the function has a fault: {error}.") from error
+        if found.size != self.values:
+            raise InputError(f"{self.place}: the function returned {found.size} values; asked for are {self.values}.")
+        return found, ""
+
+    def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
+        """Return what the function returned as numbers of its own, NaN where that is no answer.
+
+        Raises
+        ------
+        InputError
+            Text, times, or numbers of 32 bits and less, whose rounding differences would take for a slope.
+        """
+        if isinstance(found, list | tuple):
+            return np.array([self._numbers(one) for one in found])
+        masked = np.ma.getmaskarray(found) if isinstance(found, np.ma.MaskedArray) else False
+        values = np.asarray(np.ma.getdata(found) if np.any(masked) else found)
+        if values.dtype.kind in "USmM":
+            raise InputError(f"{self.place}: the function returned {values.dtype.name}; allowed are numbers.")
+        if values.dtype in (np.float16, np.float32, np.complex64):
+            raise InputError(
+                f"{self.place}: the function returned {values.dtype.name}; allowed are numbers of 64 bits, as those of "
+                "less are too coarse to tell how an output changes with a deviation."
+            )
+        if values.dtype.kind == "c" or (values.dtype.kind == "O" and any(isinstance(v, complex) for v in values.flat)):
+            turned = values.astype(complex)
+            values = np.where(np.abs(turned.imag) <= _SAME * np.abs(turned), turned.real, np.nan)
+        return np.where(masked, np.nan, values.astype(float))
+
+    def _require_arguments(self, count: int) -> None:
+        """Raise if the function cannot be called with so many arguments; what hides its signature is tried."""
+        try:
+            signature = inspect.signature(self.function)
+        except (TypeError, ValueError):
+            return
+        try:
+            signature.bind(*range(count))
+        except TypeError as error:
+            raise InputError(
+                f"{self.place}: the function cannot be called with {count} values, inputs and settings ({error})."
+            ) from None
+
+
+def _few(samples: int) -> list[int]:
+    """Return the first, the middle and the last of some samples."""
+    return sorted({0, samples // 2, samples - 1} & {*range(samples)})
+
+
+def _agree(one: Float[np.ndarray, "..."], other: Float[np.ndarray, "..."]) -> bool:
+    """Return whether two answers to the same samples are the same, up to rounding."""
+    size = float(np.abs(other[np.isfinite(other)]).max(initial=0.0))
+    return bool(np.allclose(one, other, rtol=0.0, atol=_SAME * size, equal_nan=True))
+
+
+def _listed(sample: Float[np.ndarray, " argument"]) -> str:
+    return ", ".join(f"{value:.6g}" for value in sample)
+
+
+def _flat(found: Any) -> list[Any]:
+    """Return the items of nested tuples and lists, and the first axis of an array, in their order."""
+    if isinstance(found, np.ndarray) and found.ndim > 2:
+        return [row for part in found for row in part]
+    return [item for part in found for item in (_flat(part) if isinstance(part, list | tuple) else [part])]
+
+
+def identity(thing: Any, deep: int = 12) -> Any:
+    """Return what tells a function from another one in any process: its code, and the values that it was made with.
+
+    Code and values of the user's own modules count, those of installed libraries do not; of values within values only
+    so many levels.
+    """
+    if deep == 0:
+        return type(thing).__qualname__
+    inside = _inside(thing)
+    if inside is not None:
+        return [identity(item, deep - 1) for item in inside]
+    if isinstance(thing, set | frozenset):
+        return sorted(repr(identity(item, deep - 1)) for item in thing)
+    if isinstance(thing, ModuleType):
+        return (thing.__name__, _source(thing), [identity(own, deep - 1) for own in _modules_of(thing)])
+    if isinstance(thing, Path):
+        return (str(thing), _hashed_file(thing))
+    if isinstance(thing, type):
+        return (thing.__qualname__, _source(sys.modules.get(thing.__module__)))
+    if callable(thing) or hasattr(thing, "__dict__"):
+        own = vars(thing) if hasattr(thing, "__dict__") else {}
+        made = identity(type(thing), deep - 1) if is_users_module(type(thing).__module__) else type(thing).__qualname__
+        return (getattr(thing, "__qualname__", ""), made, identity(own, deep - 1))
+    return _plain(thing)
+
+
+def _plain(thing: Any) -> Any:
+    """Return what tells a value that is one thing: its text, or its bytes where that names a place in memory."""
+    text = repr(thing)
+    if " at 0x" not in text and len(text) < _LONG:
+        return text
+    try:
+        return sha256(pickle.dumps(thing, protocol=4)).hexdigest()
+    except Exception:  # what cannot be pickled raises what it likes
+        return type(thing).__qualname__
+
+
+def _inside(thing: Any) -> Sequence[Any] | None:
+    """Return what a thing is made of in its order; None for what is one thing, or has no order."""
+    if isinstance(thing, partial):
+        return (thing.func, thing.args, thing.keywords)
+    if isinstance(thing, CodeType):
+        return (thing.co_code.hex(), thing.co_names, thing.co_consts)
+    if isinstance(thing, np.ndarray):
+        return (thing.shape, thing.tolist())
+    if isinstance(thing, Mapping):
+        return tuple(thing.items())
+    if isinstance(thing, list | tuple):
+        return thing
+    return _made_of(thing) if hasattr(thing, "__code__") else None
+
+
+def _made_of(function: Any) -> tuple[Any, ...]:
+    """Return the code of a function, what it finds by name, what it encloses and what it was given."""
+    code, known = function.__code__, function.__globals__
+    named = {name: known[name] for name in _names(code) if _tells(known.get(name))}
+    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+    given = (function.__defaults__, function.__kwdefaults__, getattr(function, "__self__", None))
+    return (code, named, enclosed, given)
+
+
+def _names(code: CodeType) -> list[str]:
+    """Return the names that a function and those inside it look up."""
+    inside = (const for const in code.co_consts if isinstance(const, CodeType))
+    return [*dict.fromkeys((*code.co_names, *(name for own in inside for name in _names(own))))]
+
+
+def _tells(value: Any) -> bool:
+    """Return whether what a function finds by name tells it from others: anything but what a library defines."""
+    if value is None or isinstance(value, ModuleType):
+        return value is not None and is_users_module(value.__name__)
+    if hasattr(value, "__code__") or isinstance(value, type | BuiltinFunctionType):
+        return is_users_module(str(getattr(value, "__module__", "")))
+    return True
+
+
+def is_users_module(module: str) -> bool:
+    """Return whether a module is a script of the user's, rather than of Python, of this package or a library."""
+    path = getattr(sys.modules.get(module), "__file__", None)
+    if path is None:
+        return module == "__main__"
+    installed = [sysconfig.get_paths()[kind] for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
+    folders = [Path(__file__).resolve().parents[1], *(Path(folder).resolve() for folder in installed)]
+    return not any(Path(path).resolve().is_relative_to(folder) for folder in folders)
+
+
+def _source(module: ModuleType | None) -> str:
+    """Return the hash of a user's module's file, nothing for a library's."""
+    if module is None or not is_users_module(module.__name__):
+        return ""
+    return _hashed_file(Path(getattr(module, "__file__", None) or ""))
+
+
+def _modules_of(module: ModuleType) -> list[ModuleType]:
+    """Return the user's own modules that one of theirs names."""
+    if not is_users_module(module.__name__):
+        return []
+    found = {name: own for name, own in vars(module).items() if isinstance(own, ModuleType) and own is not module}
+    return [own for _, own in sorted(found.items()) if is_users_module(own.__name__)]
+
+
+def _hashed_file(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

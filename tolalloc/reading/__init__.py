@@ -1,0 +1,1 @@
+"""The door through which the user's files and arguments come in."""

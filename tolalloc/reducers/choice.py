@@ -1,0 +1,302 @@
+"""Which reducer a study asks, ``ta.reducer``, and how it is bound to the sources of a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import neglected_columns
+from tolalloc.drawings.tolerance_table import require_small_zones
+from tolalloc.exceptions import InputError
+from tolalloc.models.settings import require_settings
+from tolalloc.reading.named_fields import is_number
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reducers import TORQUE
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.model import EquivalentModel, remembered_model
+from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.settings import clearance_settings
+
+if TYPE_CHECKING:
+    from tolalloc.reducers.model import ReducerModel
+
+
+NEGLECTED = (
+    "sun.pitch",
+    "planet*.pitch",
+    "mesh*",
+    "*.phase",
+    "*.rotation",
+    "*.tilt",
+    "*.clearance",
+    "each_pin.*",
+    "*.each_tooth.*",
+)
+"""Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
+
+_LARGEST_ZONE = 200.0 * MICROMETRE
+"""Largest zone of a reducer's part that is believed; a metre typed for a millimetre is far above it [m]."""
+
+
+def bind(
+    reducer: Reducer,
+    errors: ErrorModel,
+    torque: float | None,
+    place: str,
+    neglected: Sequence[str] = NEGLECTED,
+    unit: BuiltUnit | None = None,
+) -> tuple[KernelResponse, tuple[str, ...]]:
+    """Return the equivalent model at the sources of a drawing, and what the binding assumes; nothing is solved.
+
+    The model stands at the reducer's own modification and has the orders of the unit that is to be shown, if any; the
+    arguments are those of `ReducerChoice`, and the place is who asks, for messages.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A source or torque that is not allowed, or a column of the model that nobody gives.
+    """
+    require_small_zones(errors.sources, _LARGEST_ZONE, place)
+    orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
+    carried = reducer.torque_on_carrier(torque, place)
+    # The next question of the same reducer finds the tables as they are.
+    model = remembered_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
+    listed = {*errors.columns, *errors.fixed}
+    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
+    fixed: Mapping[str, float] = {
+        **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
+        **dict.fromkeys(_absent_orders(errors, model, place), 0.0),
+        **errors.fixed,
+        **reducer.modification.deviations,
+    }
+    kernel = KernelResponse(
+        model=model,
+        torque=carried,
+        columns=errors.columns,
+        fixed=dict(sorted(fixed.items())),  # in one order in every process, as kept units ask for
+        offsets={name: errors.fixed[name] for name in reducer.modification.deviations if errors.fixed.get(name)},
+    )
+    if unit:
+        unit.errors(model.columns, reducer.modification.deviations)
+    exact = ", ".join(pattern for pattern, columns in left_out.items() if columns)
+    return kernel, ((f"not in the tolerance table and taken as exact: {exact}",) if exact else ())
+
+
+def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> list[str]:
+    """Return the columns of listed sources whose orders their spectra do not have.
+
+    Raises
+    ------
+    InputError
+        Sources that list more or fewer pins or teeth than there are.
+    """
+    own = {source.name: list[str]() for source in errors.sources}
+    for column in model.columns:
+        own.get(source_name(column), []).append(column)
+    _require_each(errors, own, model.reducer, place)
+    return [
+        column for source in errors.sources for column in own[source.name] if column not in frozenset(source.columns)
+    ]
+
+
+def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer: Reducer, place: str) -> None:
+    """Raise unless every source has as many like features as its columns say, one line for all that have not.
+
+    Raises
+    ------
+    InputError
+        The sources of single pins and teeth, and how many there are.
+    """
+    wrong: dict[int, list[str]] = {}
+    for source in errors.sources:
+        plain = {column.removesuffix(".x").removesuffix(".y") for column in own[source.name]}
+        numbered = [column for column in plain if column.removeprefix(f"{source.name}.").isdecimal()]
+        if own[source.name] and source.each != (len(numbered) or 1):
+            wrong.setdefault(source.each, []).append(source.name)
+    if not wrong:
+        return
+    stage, table = reducer.cycloid_stage, f"tolerance table {errors.table}".strip()
+    stated = " and ".join(f"{each} in {', '.join(names)}" for each, names in wrong.items())
+    raise InputError(
+        f"{place}, {table}: each is {stated}; allowed is pin_count of the reducer, {stage.pin_count}, in all rows of "
+        f"single pins, its disc_teeth, {stage.disc_teeth}, in all rows of single teeth, and 1 in all others."
+    )
+
+
+_LARGEST_MISMATCH = 0.01
+"""Largest share by which a nominal size of a table may differ from that of the reducer without a remark [-]."""
+
+
+def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
+    """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
+    radius, own = reducer.cycloid_stage.pin_radius, reducer.modification
+    meant = {
+        "pin.diameter": ("twice its pin radius", 2 * radius),
+        "housing.groove.radius": ("its pin radius", radius),
+        "each_pin.diameter": ("twice its pin radius", 2 * radius),
+        "each_pin.groove": ("its pin radius", radius),
+        "modification.equidistant": ("its equidistant amount", own.equidistant),
+        "modification.shift": ("its shift amount", own.shift),
+    }
+    sentences = []
+    for source in errors.sources:
+        what, size = meant.get(source.name, ("", 0.0))
+        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * abs(size):
+            sentences.append(
+                f"The table and the reducer differ: nominal of {source.name} is {source.nominal / MILLIMETRE:g} mm in "
+                f"{errors.table or 'the table'}, and {what} is {size / MILLIMETRE:g} mm in reducer {reducer.name}; the "
+                "model takes the reducer's, so correct the one that is wrong."
+            )
+    return tuple(sentences)
+
+
+_FARTHEST = 50.0
+"""Largest clearance that a modification may be asked to leave, either way [µm]."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ReducerChoice:
+    """A reducer as a study names it; it becomes a `tolalloc.reducers.model.ReducerModel` with the study's drawing."""
+
+    reducer: Reducer  # The reducer with the stiffness in use
+    identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
+    # As in `tolalloc.reducer` [N·m, µm, µm]
+    torque: float | None = None
+    flank_clearance: tuple[float, float] | None = None
+    radial_clearance: tuple[float, float] | None = None
+    neglected: tuple[str, ...] = NEGLECTED
+    unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
+
+    def __repr__(self) -> str:
+        stiffness = f", stiffness of {self.identified.source}" if self.identified else ""
+        cranks, discs = self.reducer.crank_count, self.reducer.disc_count
+        return f"<reducer {self.name}: {cranks} cranks, {discs} discs{stiffness}>"
+
+    @property
+    def name(self) -> str:
+        """The reducer's."""
+        return self.reducer.name
+
+    def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
+        """Return the reducer with a tooth modification that leaves other clearances [µm], or at another torque [N·m].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A setting that it does not have, a clearance outside its bounds, or a torque that is not allowed.
+        """
+        place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
+        self.reducer.torque_on_carrier(torque, place)
+        clearances = {name: value for name, value in settings.items() if name != TORQUE}
+        own, stage = self.reducer.modification, self.reducer.cycloid_stage
+        present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+        # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
+        anywhere = (-_FARTHEST, _FARTHEST)
+        known = clearance_settings(present, (self.flank_clearance or anywhere, self.radial_clearance or anywhere))
+        require_settings(place, known, clearances)
+        if not clearances:
+            return replace(self, torque=torque)
+        flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
+        modification = Modification.from_clearances(flank, radial, stage)
+        return replace(self, torque=torque, reducer=replace(self.reducer, modification=modification))
+
+    def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
+        """Return the model at the sources of a drawing; nothing is solved.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A source or torque that is not allowed, or a column of the model that nobody gives.
+        """
+        from tolalloc.reducers.model import ReducerModel
+
+        kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
+        flank, radial = (
+            (own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None
+            for own in (self.flank_clearance, self.radial_clearance)
+        )
+        return ReducerModel(
+            kernel=kernel,
+            flank=flank,
+            radial=radial,
+            identified=self.identified,
+            unit=self.unit,
+            left_out=assumptions,
+            mismatches=_other_sizes(errors, self.reducer),
+        )
+
+
+def reducer(
+    name: str | Path,
+    *,
+    stiffness: str | Path = "",
+    torque: float | None = None,
+    flank_clearance: tuple[float, float] | None = None,
+    radial_clearance: tuple[float, float] | None = None,
+    neglected: tuple[str, ...] = NEGLECTED,
+    unit: str | Path = "",
+) -> ReducerChoice:
+    """Return a reducer for a study, from a preset or a TOML file.
+
+    Parameters
+    ----------
+    name
+        Preset, such as ``rv20e``, or path of a reducer file.
+    stiffness
+        Identified stiffnesses that replace its own, by shipped name or path.
+    torque
+        Torque on the carrier, negative where it resists the rotation; the reducer's test torque unless given [N·m].
+    flank_clearance, radial_clearance
+        Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
+        as they are unless given [µm].
+    neglected
+        Sources that a drawing may leave out, taken as zero; ``*`` stands for anything.
+    unit
+        Built unit whose curve is shown, by shipped name or path.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, field and value that are not allowed.
+
+    Examples
+    --------
+    >>> reducer("rv20e_liu2020", stiffness="rv20e_table6").reducer.crank_count
+    2
+    """
+    for field, own in (("flank_clearance", flank_clearance), ("radial_clearance", radial_clearance)):
+        if own is not None and not (
+            isinstance(own, Sequence)
+            and len(own) == 2
+            and all(map(is_number, own))
+            and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
+        ):
+            raise InputError.at(f"reducer {name}", field, own, "two numbers from -50 to 50 µm, the smaller one first")
+    if isinstance(neglected, str) or not (
+        isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
+    ):
+        allowed = "a list of names in quotation marks, such as ['disc*.tilt']"
+        raise InputError.at(f"reducer {name}", "neglected", neglected, allowed)
+    chosen = load_reducer(name)
+    if torque is not None:
+        chosen.torque_on_carrier(torque, f"reducer {name}")
+    identified = load_identified_stiffness(stiffness) if stiffness else None
+    return ReducerChoice(
+        reducer=with_stiffness(chosen, identified) if identified else chosen,
+        identified=identified,
+        torque=torque,
+        flank_clearance=flank_clearance,
+        radial_clearance=radial_clearance,
+        neglected=tuple(neglected),
+        unit=load_unit(unit) if unit else None,
+    )

@@ -1,0 +1,200 @@
+"""Exact distance of pins from tooth profiles, many designs at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tolalloc.running.compiled import in_threads, jit
+
+# Fields of a design, `tolalloc.reducers.cycloid.clearance` fills them.
+CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
+
+_GRID = 384  # points of the scan over a tooth and a part of its neighbours
+_NEAR = 0.3  # distance from the path over its radius, and slip along it [rad], up to which the nearest point is plain
+_AT_ONCE = 16  # designs that a thread takes together
+_BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
+
+
+@jit
+def _point(design, t):
+    """Return x and y of the profile at parameter t, before its flanks are turned."""
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+    ratio = design[GROUND_PIN] / np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    # In the frame that turns with the pin, then in the disc's.
+    u = design[GROUND_CIRCLE] - design[ECCENTRICITY] * c + ratio * (shortening * c - 1.0)
+    v = design[ECCENTRICITY] * s - ratio * shortening * s
+    return u * np.cos(small) + v * np.sin(small), v * np.cos(small) - u * np.sin(small)
+
+
+@jit
+def _scan(design, x, y):
+    """Fill points of the profile on equally spaced parameters; return the first one and their distance."""
+    first, step = -np.pi - _BEYOND, 2.0 * (np.pi + _BEYOND) / (_GRID - 1)
+    for i in range(_GRID):
+        x[i], y[i] = _point(design, first + i * step)
+    return first, step
+
+
+@jit
+def _slope(design, t, px, py):
+    """Return f = (P − w)·w′ and its derivative at parameter t, w the path of the grinding pin's centre.
+
+    f vanishes where P lies on the normal of the path, which is the profile's normal too.
+    """
+    teeth, circle, eccentricity = design[TEETH], design[GROUND_CIRCLE], design[ECCENTRICITY]
+    small, c, s = t / teeth, np.cos(t), np.sin(t)
+    cs, ss = np.cos(small), np.sin(small)
+    # P in the frame that turns with the pin, then minus the path.
+    u = px * cs - py * ss - (circle - eccentricity * c)
+    v = px * ss + py * cs - eccentricity * s
+    turns = (teeth + 1.0) / teeth
+    du, dv = eccentricity * turns * s, eccentricity * turns * c - circle / teeth
+    ddu, ddv = eccentricity * turns * turns * c - circle / (teeth * teeth), -eccentricity * turns * turns * s
+    return u * du + v * dv, u * ddu + v * ddv - du * du - dv * dv
+
+
+@jit
+def _foot(design, low, high, px, py):
+    """Return the parameter between low and high where f falls through zero: Newton's method kept in its bracket."""
+    t = 0.5 * (low + high)
+    for _ in range(60):
+        f, slope = _slope(design, t, px, py)
+        if f > 0.0:
+            low = t
+        else:
+            high = t
+        new = t - f / slope if slope < 0.0 else 0.5 * (low + high)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        change, t = abs(new - t), new
+        if change <= 1e-15 * (1.0 + abs(t)):
+            break
+    return t
+
+
+@jit
+def _distance(design, t, px, py):
+    """Return the distance of P from the profile along the normal at t, negative inside the disc."""
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+    cs, ss = np.cos(small), np.sin(small)
+    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
+    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    # The normal into the disc in the same frame.
+    nu, nv = (shortening * c - 1.0) / root, -shortening * s / root
+    return design[GROUND_PIN] - (u * nu + v * nv)
+
+
+@jit
+def _nearest(design, x, y, first, step, px, py):
+    """Return the smallest distance of P from the whole profile, or from the flank between its edges if it is turned."""
+    best, before, here, turned = np.inf, -1.0, np.inf, design[ROTATION] > 0.0
+    for i in range(_GRID):
+        dx, dy = px - x[i], py - y[i]
+        after = dx * dx + dy * dy
+        if here <= before and here <= after:  # the scan's ends are never a place of nearest approach
+            t = _foot(design, first + (i - 2) * step, first + i * step, px, py)
+            if not turned or design[ROOT] <= t <= design[TIP]:
+                best = min(best, _distance(design, t, px, py))
+        before, here = here, after
+    if turned:
+        for edge in range(2):
+            ex, ey = _point(design, design[ROOT + edge])
+            best = min(best, np.sqrt((px - ex) * (px - ex) + (py - ey) * (py - ey)))
+    return best
+
+
+@jit
+def _largest_bend(design, angle, convex):
+    """Return the largest curvature of the grinding pin's path from an angle away from the root [1/m].
+
+    The path bends most at the root and less and less up to the inflection; beyond, ``convex`` is its largest.
+    """
+    pins = design[TEETH] + 1.0
+    shortening = design[ECCENTRICITY] * pins / design[GROUND_CIRCLE]
+    c = np.cos(angle)
+    s = 1.0 + shortening * shortening - 2.0 * shortening * c
+    bend = shortening * (1.0 + pins) * c - 1.0 - pins * shortening * shortening
+    return max(bend / (design[GROUND_CIRCLE] * s * np.sqrt(s)), convex)
+
+
+@jit
+def _near(design, convex, angle, px, py):
+    """Return the distance of P from the profile next to an angle; nan where another place could be as near.
+
+    Around P, which is off the path by much less than the path's radius, the path has one nearest point. Newton's method
+    finds it; a step below a microradian leaves an error that the distance does not feel.
+    """
+    small, c, s = angle / design[TEETH], np.cos(angle), np.sin(angle)
+    cs, ss = np.cos(small), np.sin(small)
+    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
+    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    off = np.sqrt(u * u + v * v)
+    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    slip = off * design[TEETH] / (design[GROUND_CIRCLE] * root)
+    inner = max(abs(angle) - 2.0 * slip, 0.0)
+    if slip > _NEAR or off * _largest_bend(design, inner, convex) > _NEAR:
+        return np.nan
+    t = angle
+    for _ in range(12):
+        f, slope = _slope(design, t, px, py)
+        change = f / slope
+        t -= change
+        if abs(change) < 1e-6:
+            return _distance(design, t, px, py)
+    return np.nan
+
+
+@jit
+def design_clearances(design, pin_angle, turned, clearance):
+    """Fill the clearances [m] of pins at exact places on a turned disc, [pin].
+
+    ``turned`` are the rotations of the disc, one for each pin. Flanks turned by a positive rotation modification leave
+    what both positions of the profile have in common: nearest is a flank, its mirror image across the root or across
+    the tooth, or an edge between them. A negative one leaves all that either position has.
+    """
+    x, y = np.empty(_GRID), np.empty(_GRID)
+    first, step, scanned = 0.0, 0.0, False
+    teeth, turns, rotation = design[TEETH], (design[TEETH] + 1.0) / design[TEETH], design[ROTATION]
+    c, s = np.cos(rotation), np.sin(rotation)
+    whole_c, whole_s = np.cos(rotation - 2.0 * np.pi / teeth), np.sin(rotation - 2.0 * np.pi / teeth)
+    for k in range(pin_angle.size):
+        a = pin_angle[k]
+        px = design[CIRCLE] * np.cos(a / teeth + turned[k]) - design[ECCENTRICITY] * np.cos(a * turns + turned[k])
+        py = design[ECCENTRICITY] * np.sin(a * turns + turned[k]) - design[CIRCLE] * np.sin(a / teeth + turned[k])
+        own = np.nan
+        if rotation == 0.0:
+            own = _near(design, design[BEND], a, px, py)
+            if own == own:
+                clearance[k] = own - design[PIN]
+                continue
+        if not scanned:
+            first, step = _scan(design, x, y)
+            scanned = True
+        own = _nearest(design, x, y, first, step, px * c - py * s, px * s + py * c)
+        if rotation != 0.0:
+            own = min(own, _nearest(design, x, y, first, step, px * c + py * s, px * s - py * c))
+        if rotation > 0.0:
+            qx, qy = px * whole_c + py * whole_s, px * whole_s - py * whole_c
+            own = min(own, _nearest(design, x, y, first, step, qx, qy))
+        clearance[k] = own - design[PIN]
+
+
+@jit
+def _clearances(designs, pin_angle, turned, clearance):
+    for d in range(designs.shape[0]):
+        design_clearances(designs[d], pin_angle, turned[d], clearance[d])
+
+
+def pin_clearances(designs: Any, pin_angle: Any, turned: Any, clearance: Any) -> None:
+    """Fill the clearances [m] of pins on the discs of many designs, [design, pin]; ``designs`` are [design, FIELDS]."""
+
+    def fill(part: slice) -> None:
+        _clearances(designs[part], pin_angle, turned[part], clearance[part])
+
+    in_threads(fill, designs.shape[0], _AT_ONCE)

@@ -1,0 +1,201 @@
+"""The tooth profile of a disc as a parametric curve, exact or modified, and as points dense where it bends most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import acos, pi
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.mesh import Angles, normals, path_curvature
+from tolalloc.reducers.reducer.design import CycloidStage, Modification
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToothProfile:
+    """Profile ground by a pin of radius r_rp + Δr_rp on the circle Rp + Δr_p, turned by the rotation modification.
+
+    The frame is the disc's: its centre, and the middle of a root at angle 0. The parameter φ is the angle of the pin
+    that grinds the point: 0 at the root, π at the tip. Theory page equation (34).
+    """
+
+    stage: CycloidStage  # Cycloid stage
+    # Tooth modification; none unless given
+    modification: Modification = field(default_factory=lambda: Modification(equidistant=0.0, shift=0.0))
+
+    @cached_property
+    def ground(self) -> CycloidStage:
+        """The stage with the pin radius and pin circle of the grinding."""
+        return replace(
+            self.stage,
+            pin_circle_radius=self.stage.pin_circle_radius + self.modification.shift,
+            pin_radius=self.stage.pin_radius + self.modification.equidistant,
+        )
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius r_ac of the tip circle [m]."""
+        return self.ground.pin_circle_radius + self.ground.eccentricity - self.ground.pin_radius
+
+    @property
+    def root_radius(self) -> float:
+        """Radius r_fc of the root circle [m]."""
+        return self.ground.pin_circle_radius - self.ground.eccentricity - self.ground.pin_radius
+
+    @property
+    def inflection_angle(self) -> float:
+        """φ where the flank turns from concave to convex, 0 where it is convex all over [rad]."""
+        pins, shortening = self.ground.pin_count, self.ground.shortening
+        return acos(min((1 + pins * shortening**2) / (shortening * (1 + pins)), 1.0))
+
+    @cached_property
+    def edges(self) -> tuple[float, float]:
+        """φ where a flank meets its mirror image at root and at tip: 0 and π unless a rotation turns it [rad]."""
+        if self.modification.rotation == 0.0:
+            return 0.0, pi
+        from scipy.optimize import brentq
+
+        def beyond(angle: float, middle: float) -> float:
+            x, y = self.points(np.array([angle]))[0]
+            return float(np.arctan2(y, x)) + middle
+
+        half_tooth = pi / self.stage.disc_teeth
+        if not abs(self.modification.rotation) < half_tooth / 4:
+            raise InputError.at(
+                "modification", "rotation", self.modification.rotation, f"below {half_tooth / 4:.3g} rad"
+            )
+        return brentq(beyond, -pi / 2, pi / 2, args=(0.0,)), brentq(beyond, pi / 2, 3 * pi / 2, args=(half_tooth,))
+
+    def points(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
+        """Return x and y of the flank of 0 ≤ φ ≤ π [m]; the other flank is its mirror image about y = 0."""
+        ground, direction = self.ground, normals(self.ground.shortening, angle)
+        pin = ground.pin_circle_radius * np.exp(-1j * angle / ground.disc_teeth)
+        into = direction.towards_crank + 1j * direction.towards_tangent
+        contact = (ground.pin_radius * into - ground.eccentricity) * np.exp(-1j * angle * self._turns)
+        point = (pin + contact) * np.exp(-1j * self.modification.rotation)
+        return np.stack([point.real, point.imag], axis=-1)
+
+    @property
+    def _turns(self) -> float:
+        """Turns of the crank direction on the disc per turn of φ [-]."""
+        return self.stage.pin_count / self.stage.disc_teeth
+
+    def normals(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
+        """Return the unit normals into the disc [-]."""
+        direction = normals(self.ground.shortening, angle)
+        turned = angle * self._turns + self.modification.rotation
+        into = (direction.towards_crank + 1j * direction.towards_tangent) * np.exp(-1j * turned)
+        return np.stack([into.real, into.imag], axis=-1)
+
+    def curvature(self, angle: Angles) -> Float[np.ndarray, "*angles"]:
+        """Return the curvature of the profile, convex positive [1/m]."""
+        path = path_curvature(self.ground, angle)
+        return np.asarray(-path / (1 + self.ground.pin_radius * path))
+
+
+def require_sound(profile: ToothProfile, place: str) -> None:
+    """Raise unless the profile can be ground and mounted.
+
+    Raises
+    ------
+    InputError
+        K1 is not below 1, the grinding pin undercuts the tooth, or tip and root or flank interfere with the pins.
+    """
+    ground = profile.ground
+    if not 0 < ground.shortening < 1:
+        raise InputError.at(place, "K1 = eccentricity·pin_count/pin_circle_radius", ground.shortening, "below 1")
+    if not 0 < ground.pin_radius < ground.smallest_convex_radius:
+        limit = ground.smallest_convex_radius / MILLIMETRE
+        raise InputError(
+            f"{place}: the grinding pin of radius {ground.pin_radius / MILLIMETRE:.4g} mm undercuts the teeth; "
+            f"allowed is a radius above 0 and below {limit:.4g} mm."
+        )
+    stage, amounts = profile.stage, profile.modification
+    radial, flank = amounts.radial_clearance / MICROMETRE, amounts.flank_clearance(stage) / MICROMETRE
+    for value, where, formula in (
+        (radial, "tip and root", "Δr_rp − Δr_p"),
+        (flank, "the flank", f"Δr_rp − {stage.flank_ratio:.3f}·Δr_p"),
+    ):
+        if value < 0:
+            raise InputError(
+                f"{place}: the modification is an interference of {-value:.3g} µm at {where}; allowed is {formula} of "
+                "0 or more, in the convention r_rp + Δr_rp, Rp + Δr_p (xi2015 and li2018 write Rp − Δr_p; "
+                'say so by convention = "minus").'
+            )
+
+
+FEWEST, MOST = 8, 20_000
+
+_DENSE = 20_001  # angles of the dense tabulation that the points are chosen from
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfilePoints:
+    """Points around a whole disc, clockwise, the first one not repeated."""
+
+    per_tooth: int  # Points of one tooth [-]
+    place: Float[np.ndarray, "point 2"]  # x and y [m]
+    # φ at each point, negative on the flank at the counter-clockwise side of its root [rad]
+    angle: Float[np.ndarray, " point"]
+    chord_error: float  # Largest distance of the profile from the straight line between neighbouring points [m]
+
+
+def _flank_angles(profile: ToothProfile, count: int) -> Float[np.ndarray, " point"]:
+    """Return φ from root to tip such that all chords are about equally wrong [rad]."""
+    dense = np.linspace(*profile.edges, _DENSE)
+    place = profile.points(dense)
+    length = np.hypot(*np.diff(place, axis=0).T)
+    bend = np.sqrt(np.abs(profile.curvature((dense[1:] + dense[:-1]) / 2)))
+    # A chord's error is curvature·length²/8; a fifth of the mean keeps points on the flat of the flank.
+    weight = np.concatenate([[0.0], np.cumsum((bend + 0.2 * bend.mean()) * length)])
+    return np.interp(np.linspace(0.0, weight[-1], count), weight, dense)
+
+
+def _chord_error(profile: ToothProfile, angle: Float[np.ndarray, " point"]) -> float:
+    """Return the largest distance of the flank from its chords [m]."""
+    between = angle[:-1, np.newaxis] + np.diff(angle)[:, np.newaxis] * np.linspace(0.1, 0.9, 9)
+    start, end, curve = profile.points(angle[:-1]), profile.points(angle[1:]), profile.points(between)
+    along = (end - start) / np.hypot(*(end - start).T)[:, np.newaxis]
+    offset = curve - start[:, np.newaxis]
+    return float(np.abs(offset[..., 0] * along[:, 1:] - offset[..., 1] * along[:, :1]).max())
+
+
+def require_points(per_tooth: int) -> None:
+    """Raise unless a drawing can use so many points per tooth.
+
+    Raises
+    ------
+    InputError
+        Too few, too many, or an odd number.
+    """
+    if not FEWEST <= per_tooth <= MOST or per_tooth % 2:
+        raise InputError.at("profile", "points per tooth", per_tooth, f"an even number from {FEWEST} to {MOST}")
+
+
+def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
+    """Return the points of a whole disc with a sound profile, an even number of them per tooth.
+
+    Raises
+    ------
+    InputError
+        A number of points that no drawing can use.
+    """
+    require_points(per_tooth)
+    angle = _flank_angles(profile, per_tooth // 2 + 1)
+    flank = profile.points(angle)
+    mirrored = flank[::-1] * (1.0, -1.0)
+    # Root and tip belong to two flanks each; the tip is the next space's first point.
+    space = np.concatenate([mirrored, flank[1:]])[:-1]
+    angles = np.concatenate([-angle[::-1], angle[1:]])[:-1]
+    turned = np.exp(-2j * pi * np.arange(profile.stage.disc_teeth) / profile.stage.disc_teeth)
+    points = (turned[:, np.newaxis] * (space[:, 0] + 1j * space[:, 1])).ravel()
+    return ProfilePoints(
+        per_tooth=space.shape[0],
+        place=np.stack([points.real, points.imag], axis=1),
+        angle=np.tile(angles, profile.stage.disc_teeth),
+        chord_error=_chord_error(profile, angle),
+    )

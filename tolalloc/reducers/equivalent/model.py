@@ -1,0 +1,316 @@
+"""The equivalent model of a reducer: errors in, equilibria and transmission error out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from math import pi
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.exceptions import InputError
+from tolalloc.reducers.equivalent.answers import Derivatives, Equilibria, Extremes
+from tolalloc.reducers.equivalent.columns import Columns
+from tolalloc.reducers.equivalent.condensation import CondensedAngles, condense, error_columns
+from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.solvers.records import (
+    CONVERGED,
+    OUT_OF_RANGE,
+    AngleSearch,
+    SolvedDerivatives,
+    SolvedExtremes,
+    SolverDesign,
+    design_of,
+)
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.series import at_torque
+
+_FEW_ANGLES = 256
+"""Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
+
+
+@dataclass(frozen=True)
+class EquivalentModel:
+    """Equivalent spring model of one reducer, liu2020 equations (1)–(14).
+
+    The tables of a model take about 30 kB per node for an RV-20E and are made when first needed. The compiled solvers
+    are imported where they solve, because many commands only ask for the names of the columns.
+
+    Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
+    rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
+
+    Raises
+    ------
+    InputError
+        The reducer's teeth have a rotation modification, which no column of the model can stand for.
+    """
+
+    reducer: Reducer  # Nominal design, stiffness and load
+    search: AngleSearch = field(default_factory=AngleSearch)  # At which angles the extremes are looked for
+    # Orders of the harmonic deviations of pitch and run-out, per turn of their part [-]
+    orders: tuple[int, ...] = HARMONICS
+
+    def __post_init__(self) -> None:
+        if self.reducer.modification.rotation != 0.0:
+            raise InputError.at(
+                self.reducer.name, "rotation modification", self.reducer.modification.rotation, "0 in this model"
+            )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to another process without tables; there, every chunk of work finds the same model again."""
+        return remembered_model, (self.reducer, self.search, self.orders)
+
+    def at_torque(self, torque: float) -> EquivalentModel:
+        """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
+        return replace(self, reducer=at_torque(self.reducer, torque)) if self.reducer.parts else self
+
+    @cached_property
+    def error_columns(self) -> Columns:
+        """The error columns and the values that they move."""
+        return error_columns(self.reducer, self.orders)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the error columns, the order of the errors that every method takes."""
+        return self.error_columns.names
+
+    @property
+    def design(self) -> SolverDesign:
+        """The reducer as the solvers take it."""
+        return design_of(self.reducer)
+
+    @property
+    def _discs(self) -> tuple[int, ...]:
+        return (0,) * self.reducer.disc_count
+
+    @cached_property
+    def _tables(self) -> CondensedAngles:
+        return self.tables_at(self.search.node_angle)
+
+    @cached_property
+    def _turn(self) -> tuple[Float[np.ndarray, " angle"], CondensedAngles]:
+        """The coarse angles and their tables."""
+        angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
+        return angle, self.tables_at(angle)
+
+    def put_away(self) -> None:
+        """Let go of the tables; they are made again when they are needed."""
+        for name in ("_tables", "_turn"):
+            vars(self).pop(name, None)
+
+    def _given(
+        self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]
+    ) -> tuple[Any, Any, Any, Any, Any]:
+        """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
+        columns = self.error_columns
+        return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
+
+    def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+        """Return the condensed tables at the carrier angles [rad], those of few angles made once."""
+        if carrier_angle.size > _FEW_ANGLES:
+            return condense(self.reducer, self.orders, carrier_angle)
+        return _tables_at_few(self.reducer, self.orders, carrier_angle.tobytes())
+
+    def equilibria(
+        self,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float,
+        carrier_angle: Float[np.ndarray, " angle"] | None = None,
+    ) -> Equilibria:
+        """Return the equilibrium of every sample at the carrier angles."""
+        if carrier_angle is not None:
+            return self.equilibria_of(self.tables_at(carrier_angle), errors, torque, carrier_angle)
+        angle, tables = self._turn
+        turn_of_crank = self.search.turn_of_crank(self.reducer.cycloid_stage.disc_teeth)
+        return self.equilibria_of(tables, errors, torque, angle, turn_of_crank)
+
+    def equilibria_of(
+        self,
+        tables: CondensedAngles,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float,
+        angle: Float[np.ndarray, " angle"],
+        turn_of_crank: int = 0,
+    ) -> Equilibria:
+        """Return the equilibrium of every sample at the carrier angles, whose tables are there already.
+
+        A crank turns once in so many of them, if they are equally far apart; what is known of that saves time only.
+        """
+        from tolalloc.reducers.equivalent.solvers.turn import make_turn, solve_curves
+
+        turn = make_turn(errors.shape[0], angle.size, tables.load.shape[2])
+        solve_curves(self._discs, turn_of_crank, tables, *self._given(errors, torque), turn)
+        self._mark_out_of_range(turn.rotation, turn.status)
+        turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
+        return Equilibria(
+            reducer=self.reducer,
+            columns=self.error_columns,
+            tables=tables,
+            errors=errors,
+            torque=torque,
+            carrier_angle=angle,
+            transmission_error=turn.rotation,
+            retained=turn.retained,
+            status=turn.status,
+            residual=turn.residual,
+            pins_in_contact=turn.touching,
+        )
+
+    def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
+        """Return the refined extremes of every sample over one output turn."""
+        return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
+
+    def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Extremes:
+        """Return the extremes of one unit, solved again at their angles with tables of just these angles.
+
+        The search interpolates its tables; what that changed of either extreme is added to what finer angles may add.
+        """
+        found = self.extremes(errors, torque)
+        exact = self.equilibria(errors, torque, found.carrier_angle[0])
+        largest, smallest = exact.transmission_error[:, 0], exact.transmission_error[:, 1]
+        changed = np.abs(largest - found.largest) + np.abs(smallest - found.smallest)
+        return replace(
+            found,
+            largest=largest,
+            smallest=smallest,
+            remaining=found.remaining + changed,
+            status=np.maximum(found.status, exact.status.max(axis=1)),
+            residual=np.maximum(found.residual, exact.residual.max(axis=1)),
+        )
+
+    def extremes_and_curve(
+        self, errors: Float[np.ndarray, "sample column"], torque: float
+    ) -> tuple[Extremes, Float[np.ndarray, "sample angle"]]:
+        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad]."""
+        curve = np.empty((errors.shape[0], self.search.coarse))
+        return self._searched(errors, torque, curve), curve
+
+    def _searched(
+        self, errors: Float[np.ndarray, "sample column"], torque: float, curve: Float[np.ndarray, "sample angle"]
+    ) -> Extremes:
+        """Return the extremes, the curve filled as far as there is room."""
+        from tolalloc.reducers.equivalent.solvers.extremes import solve_extremes
+
+        samples, search = errors.shape[0], self.search
+        found = SolvedExtremes(
+            np.empty((samples, 2)),
+            np.empty((samples, 2)),
+            np.empty(samples),
+            np.empty(samples, np.int64),
+            np.empty(samples, np.uint8),
+            np.empty(samples),
+            curve,
+        )
+        given = self._given(errors, torque)
+        solve_extremes(self._discs, self._tables, *given, search, found)
+        self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
+        found.extreme[found.status != CONVERGED] = np.nan
+        return Extremes(
+            largest=found.extreme[:, 0],
+            smallest=found.extreme[:, 1],
+            carrier_angle=(found.position - search.first) * search.node_step,
+            remaining=found.left_over,
+            solves=found.solves,
+            status=found.status,
+            residual=found.residual,
+        )
+
+    def peak_to_peak_derivatives(
+        self, errors: Float[np.ndarray, "sample column"], torque: float
+    ) -> tuple[Extremes, Derivatives]:
+        """Return the extremes and the exact derivatives of the peak-to-peak.
+
+        Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
+        is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
+        """
+        from tolalloc.reducers.equivalent.solvers.adjoint import solve_peak_to_peak_derivatives
+
+        extremes, search = self.extremes(errors, torque), self.search
+        derivative = self._derivative(errors.shape[0])
+        derivative.status[:] = extremes.status
+        position, step = extremes.carrier_angle / search.node_step + search.first, 0.5**search.levels
+        given = self._given(errors, torque)
+        solve_peak_to_peak_derivatives(self._tables, *given, position, search.nodes_per_coarse * step, derivative)
+        np.maximum(extremes.status, derivative.status, out=extremes.status)
+        return extremes, self._derivatives(derivative)
+
+    def rotation_derivatives(
+        self,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float | Float[np.ndarray, " sample"],
+        carrier_angle: Float[np.ndarray, " angle"] | None = None,
+    ) -> tuple[Float[np.ndarray, "sample angle"], Derivatives]:
+        """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
+
+        The torque is one for all samples or one for each.
+
+        They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
+        """
+        from tolalloc.reducers.equivalent.solvers.adjoint import solve_rotation_derivatives
+
+        if carrier_angle is None:
+            search, tables = self.search, self._tables
+            position = search.first + search.nodes_per_coarse * np.arange(float(search.coarse))
+        else:
+            tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
+        samples = errors.shape[0]
+        derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
+        solve_rotation_derivatives(tables, *self._given(errors, np.ascontiguousarray(torques)), position, derivative)
+        self._mark_out_of_range(derivative.rotation, derivative.status)
+        derivative.rotation[derivative.status != CONVERGED] = np.nan
+        return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
+
+    @property
+    def largest_rotation(self) -> float:
+        """Output error up to which displacements count as small, a tenth of the pin pitch; an assumption [rad].
+
+        Normals and levers are those of the nominal place; there, the next flank is a tenth of the way to the next pin.
+        """
+        return 0.1 * 2 * pi / self.reducer.cycloid_stage.pin_count
+
+    def _mark_out_of_range(self, rotation: Float[np.ndarray, "..."], status: UInt8[np.ndarray, "..."]) -> None:
+        """Put a status where an equilibrium was found that the model cannot mean."""
+        status[(status == CONVERGED) & (np.abs(rotation) > self.largest_rotation)] = OUT_OF_RANGE
+
+    def _padded(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+        """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""
+        return self.tables_at(carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)])
+
+    def _derivative(self, items: int) -> SolvedDerivatives:
+        rows = max(rows.stop for rows in self.error_columns.rows_of_stiffness.values())
+        return SolvedDerivatives(
+            np.empty(items),
+            np.empty((items, self.error_columns.layout.end)),
+            np.empty((items, rows)),
+            np.empty(items),
+            np.empty(items, np.uint8),
+        )
+
+    def _derivatives(self, derivative: SolvedDerivatives) -> Derivatives:
+        """Return the derivatives by columns and by named stiffnesses."""
+        columns = self.error_columns
+        stiffness = self.reducer.stiffness
+        by_stiffness = {
+            name: getattr(stiffness, name) * derivative.by_row[:, rows].sum(axis=1)
+            for name, rows in columns.rows_of_stiffness.items()
+        }
+        return Derivatives(
+            by_error=np.asarray((columns.matrix.T @ derivative.by_value.T).T),
+            by_torque=derivative.by_value[:, columns.layout.torque],
+            by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
+            status=derivative.status,
+        )
+
+
+@lru_cache(maxsize=8)  # a loop is read at six torques, each with its own stiffness
+def _tables_at_few(reducer: Reducer, orders: tuple[int, ...], carrier_angle: bytes) -> CondensedAngles:
+    """Return the tables that this process has made before, chunk after chunk of units, or new ones."""
+    return condense(reducer, orders, np.frombuffer(carrier_angle))
+
+
+@lru_cache(maxsize=2)
+def remembered_model(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
+    """Return the model of one reducer that this process has made before, with its tables, or a new one."""
+    return EquivalentModel(reducer, search, orders)

@@ -1,0 +1,245 @@
+"""Exact derivatives of the transmission error by every value and every stiffness, at the converged contact set.
+
+At equilibrium the carrier rotation is w·q + t·v with the energy's gradient zero: one solve of its tangent for the
+adjoint λ gives the derivative by everything that moves the gradient.
+
+An extreme of the curve is a kink, where a branch A that rises with the angle meets a branch B that falls. Its value
+follows from A(θ, ε) = B(θ, ε), so its derivative is the mean of both branches' derivatives, each weighted by the
+other's slope. Where the extreme is smooth both slopes vanish alike and the mean is as good as either.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.equivalent.solvers.contact_solver import solve_tangent
+from tolalloc.reducers.equivalent.solvers.energy import assemble, compress, play_force
+from tolalloc.reducers.equivalent.solvers.interpolation import interpolation, make_memory, solve_between
+from tolalloc.reducers.equivalent.solvers.problem import values_of
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE
+from tolalloc.running.compiled import in_threads, jit, jit_in_place
+
+_AT_ONCE = 32  # samples that a thread takes together
+
+
+@jit
+def _adjoint(problem, work, carrier_by_retained, q, adjoint):
+    """Solve tangent·λ = carrier row at the equilibrium q; the compressions stay in the work space."""
+    compress(problem, q, work.compression, work.play)
+    assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
+    solve_tangent(work.tangent, -carrier_by_retained, adjoint)
+
+
+@jit_in_place
+def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
+    """Set −λ·∂gradient/∂compression of every pin and its derivative by half the tilt; return the derivative by ln C."""
+    by_stiffness = 0.0
+    pins = problem.by_disc.shape[2]
+    for c in range(weight_of_pin.size):
+        d, k = c // pins, c % pins
+        force, slope = pin_force(
+            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
+        )
+        lever = 0.0
+        for i in range(3):
+            lever += problem.by_disc[d, i, k] * adjoint[3 * d + i]
+        weight_of_pin[c] = -slope * lever
+        tilt_by_pin[c] = 0.0
+        half = problem.half_tilt[c]
+        if abs(work.compression[c]) < half:
+            tilt_by_pin[c] = -lever * (slope - force / half)  # ∂F/∂half of equation (31) at constant compression
+        by_stiffness -= lever * force  # under every law the force grows in proportion to C
+    return by_stiffness
+
+
+@jit_in_place
+def _add_pins(at, weight, tables, layout, weight_of_pin, out):
+    """Add the derivative by all values that act on the pins at one node."""
+    pins, table = layout.pins, tables.contact_by_error[at]
+    for d in range(table.shape[0]):
+        for k in range(pins):
+            own = weight * weight_of_pin[d * pins + k]
+            if own == 0.0:
+                continue
+            out[layout.pin + k] += own * table[d, 0, k]
+            out[layout.pin + pins + k] += own * table[d, 1, k]
+            out[layout.pin + 2 * pins + k] += own
+            for m in range(layout.waves):
+                out[layout.wave + d * layout.waves + m] += own * table[d, 2 + m, k]
+            for kind in range(2):
+                tooth = layout.tooth + (2 * d + kind) * layout.teeth + tables.tooth[at, d, k]
+                out[tooth] += own * table[d, 2 + layout.waves + kind, k]
+
+
+@jit_in_place
+def _add_tilt(problem, turn, face_width, layout, values, tilt_by_pin, factor, out):
+    """Add the derivative by the tilts of the discs."""
+    pins = layout.pins
+    for d in range(problem.by_disc.shape[0]):
+        x, y = values[layout.tilt + 2 * d], values[layout.tilt + 2 * d + 1]
+        tilt_x, tilt_y = turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y
+        for k in range(pins):
+            nx, ny = problem.by_disc[d, 0, k], problem.by_disc[d, 1, k]
+            side = 1.0 if tilt_y * nx - tilt_x * ny > 0.0 else -1.0
+            own = factor * 0.5 * face_width * side * tilt_by_pin[d * pins + k]
+            out[layout.tilt + 2 * d] += own * (turn[1] * nx - turn[0] * ny)
+            out[layout.tilt + 2 * d + 1] += own * (turn[0] * nx + turn[1] * ny)
+
+
+@jit_in_place
+def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_play, out, by_row):
+    """Add the derivative by the spring rows' values and by all their stiffnesses at one node."""
+    rows, elements = tables.row_stiffness.shape[1], tables.play_stiffness.shape[1]
+    for m in range(layout.torque + 1):
+        value = tables.carrier_by_load[at, m]
+        for i in range(q.size):
+            value += tables.load[at, m, i] * adjoint[i]
+        for e in range(elements):
+            value += play_pull[e, 0] * tables.play_by_load[at, e, 0, m]
+            value += play_pull[e, 1] * tables.play_by_load[at, e, 1, m]
+        out[m] += weight * value
+    for r in range(rows):
+        # A row's adjoint compression: through the retained coordinates and, at the torque's place, through the others.
+        compression, lever = 0.0, tables.row_by_load[at, r, layout.torque]
+        for m in range(layout.torque + 1):
+            compression += tables.row_by_load[at, r, m] * values[m]
+        for i in range(q.size):
+            compression += tables.row_by_retained[at, r, i] * q[i]
+            lever += tables.row_by_retained[at, r, i] * adjoint[i]
+        by_row[r] -= weight * lever * compression
+    for e in range(elements):
+        by_row[rows + e] += weight * own_play[e]
+
+
+@jit
+def _add_derivative(position, factor, tables, layout, design, values, memory, derivative, s):
+    """Add factor times the derivatives of the carrier rotation at one position; return the equilibrium's status."""
+    problem, work, _, carrier_by_retained = memory
+    q, adjoint = np.zeros(work.step.size), np.empty(work.step.size)
+    rotation, status, _, _ = solve_between(position, tables, layout, design.face_width, values, q, memory)
+    if status != CONVERGED:
+        return status
+    derivative.rotation[s] += factor * rotation
+    _adjoint(problem, work, carrier_by_retained, q, adjoint)
+    weight_of_pin, tilt_by_pin = np.empty(problem.contact.size), np.empty(problem.contact.size)
+    derivative.by_pin[s] += factor * _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin)
+    elements = problem.clearance.size
+    play_pull, own_play = np.zeros((elements, 2)), np.zeros(elements)
+    for e in range(elements):
+        x, y, stiffness, free = work.play[e, 0], work.play[e, 1], problem.play_stiffness[e], problem.clearance[e]
+        ax, ay = 0.0, 0.0
+        for i in range(q.size):
+            ax += problem.play_by_retained[e, 0, i] * adjoint[i]
+            ay += problem.play_by_retained[e, 1, i] * adjoint[i]
+        fx, fy, xx, xy, yy = play_force(stiffness, free, x, y)
+        play_pull[e, 0], play_pull[e, 1] = -(xx * ax + xy * ay), -(xy * ax + yy * ay)
+        own_play[e] = -(fx * ax + fy * ay) / stiffness
+        if fx * fx + fy * fy > 0.0 and values[layout.clearance + e] > 0.0:
+            reach = np.sqrt(x * x + y * y)
+            derivative.by_value[s, layout.clearance + e] += factor * stiffness * (x * ax + y * ay) / reach
+    first, weights = interpolation(position)
+    turn = np.zeros(2)
+    for node in range(4):
+        at, weight = first + node, factor * weights[node]
+        turn += weights[node] * tables.turn[at]
+        _add_pins(at, weight, tables, layout, weight_of_pin, derivative.by_value[s])
+        _add_rows(
+            at, weight, tables, layout, values, q, adjoint, play_pull, own_play,
+            derivative.by_value[s], derivative.by_row[s],
+        )  # fmt: skip
+    _add_tilt(problem, turn, design.face_width, layout, values, tilt_by_pin, factor, derivative.by_value[s])
+    return status
+
+
+@jit
+def _slope(position, step, tables, layout, design, values, memory, q):
+    """Return the change of the carrier rotation over one step of the position, from half before to half behind."""
+    rotation = np.empty(2)
+    for side in range(2):
+        q[:] = 0.0
+        rotation[side] = solve_between(
+            position + (side - 0.5) * step, tables, layout, design.face_width, values, q, memory
+        )[0]
+    return rotation[1] - rotation[0]
+
+
+@jit
+def _clear(derivative, s, value):
+    derivative.rotation[s], derivative.by_pin[s] = value, value
+    derivative.by_value[s], derivative.by_row[s] = value, value
+
+
+@jit
+def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, position, step, derivative):
+    memory = make_memory(design.law, tables)
+    values, q = np.empty((1, layout.end)), np.empty(tables.load.shape[2])
+    for s in range(first, last):
+        if not np.isfinite(position[s]).all():
+            _clear(derivative, s, np.nan)
+            continue
+        _clear(derivative, s, 0.0)
+        values_of(errors[s : s + 1], torque, layout, mapped, values)
+        memory[2].first[:] = -1
+        for extreme in range(2):
+            sign = 1.0 - 2.0 * extreme
+            before, behind = position[s, extreme] - 2.0 * step, position[s, extreme] + 2.0 * step
+            rise = max(sign * _slope(before, step, tables, layout, design, values[0], memory, q), 0.0)
+            fall = max(-sign * _slope(behind, step, tables, layout, design, values[0], memory, q), 0.0)
+            share = rise / (rise + fall) if rise + fall > 0.0 else 0.5
+            for at, factor in ((before, sign * (1.0 - share)), (behind, sign * share)):
+                outcome = _add_derivative(at, factor, tables, layout, design, values[0], memory, derivative, s)
+                derivative.status[s] = max(derivative.status[s], outcome)
+
+
+@jit
+def _rotations(first, last, tables, layout, mapped, design, errors, torque, position, derivative):
+    memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
+    for s in range(first, last):
+        sample, angle = s // position.size, s % position.size
+        _clear(derivative, s, 0.0)
+        derivative.status[s] = NOT_FINITE
+        if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
+            memory[2].first[:] = -1
+            at = position[angle]
+            derivative.status[s] = _add_derivative(at, 1.0, tables, layout, design, values[0], memory, derivative, s)
+
+
+def solve_peak_to_peak_derivatives(
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    position: Any,
+    step: Any,
+    derivative: Any,
+) -> None:
+    """Fill the derivatives of the peak-to-peak from the positions of its two extremes, [sample, 2].
+
+    ``step`` is the distance in nodes within which the extremes were found.
+    """
+
+    def solve(part: slice) -> None:
+        given = (tables, layout, mapped, design, errors, torque)
+        _peak_to_peaks(part.start, part.stop, *given, position, step, derivative)
+
+    in_threads(solve, errors.shape[0], _AT_ONCE)
+
+
+def solve_rotation_derivatives(
+    tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, position: Any, derivative: Any
+) -> None:
+    """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
+
+    The derivatives stand in one row, sample by sample, and position by position within a sample.
+    """
+
+    def solve(part: slice) -> None:
+        given = (tables, layout, mapped, design, errors, torque)
+        _rotations(part.start, part.stop, *given, position, derivative)
+
+    in_threads(solve, errors.shape[0] * position.size, _AT_ONCE)

@@ -1,0 +1,221 @@
+"""All samples over a turn: tiles of samples in parallel, each from its own last angle's equilibrium; their forces.
+
+Samples without play go side by side in registers; whatever needs more care goes one by one. Which way
+a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.equivalent.solvers.energy import compress, play_force
+from tolalloc.reducers.equivalent.solvers.guesses import guess_next, make_history
+from tolalloc.reducers.equivalent.solvers.interpolation import make_memory
+from tolalloc.reducers.equivalent.solvers.lane_solver import solve_tile_at
+from tolalloc.reducers.equivalent.solvers.problem import problem_at_node, solve_at_node, values_of
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
+from tolalloc.reducers.equivalent.solvers.tile import FOUR, ROW, TILE, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.running.compiled import in_threads, jit, jit_in_place, thread_count
+
+
+def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
+    """Return an empty turn."""
+    return SolvedTurn(
+        np.empty((samples, angles)),
+        np.empty((samples, angles, retained)),
+        np.empty((samples, angles), np.uint8),
+        np.empty((samples, angles)),
+        np.empty((samples, angles), np.uint16),
+    )
+
+
+@jit
+def _give_up(turn, s):
+    turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
+    turn.retained[s] = np.nan
+
+
+@jit
+def _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn):
+    """Solve some samples at every ``stride``-th node, one after another."""
+    values = np.empty((errors.shape[0], layout.end))
+    finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
+    for s in range(values.shape[0]):
+        if not finite[s]:
+            _give_up(turn, s)
+            continue
+        guess = np.zeros(turn.retained.shape[2])
+        for angle in range(turn.rotation.shape[1]):
+            _alone(s, angle, first + angle * stride, tables, layout, design, values, guess, memory, turn)
+
+
+@jit
+def _alone(s, angle, at, tables, layout, design, values, guess, memory, turn):
+    """Solve one sample at one node from the guess, which becomes the next one: the equilibrium, or zero without one."""
+    rotation, status, ratio, touching = solve_at_node(
+        at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+    )
+    turn.rotation[s, angle], turn.status[s, angle] = rotation, status
+    turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
+    turn.retained[s, angle] = guess
+    if status != CONVERGED:
+        guess[:] = 0.0
+
+
+def tile_size(samples: int) -> int:
+    """Return how many samples go into a tile so that every thread has one: whole fours of registers, `TILE` at most."""
+    share = FOUR * thread_count()
+    return int(min(FOUR * max((samples + share - 1) // share, 1), TILE))
+
+
+@jit
+def _fill_tile(layout, values, finite, used, tile, tilted):
+    """Set the values of a tile, its last sample filling the room that is left; set which samples have tilted discs."""
+    for s in range(used):
+        own = min(s, values.shape[0] - 1)
+        for m in range(layout.end):
+            tile.values[m, s] = values[own, m] if finite[own] else 0.0
+        tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
+
+
+@jit_in_place
+def _take_over(samples, angle, tile, turn):
+    """Put a tile's equilibria at an angle into the turn."""
+    for s in range(samples):
+        turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
+        turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
+        for i in range(tile.q.shape[0]):
+            turn.retained[s, angle, i] = tile.q[i, s]
+
+
+@jit
+def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn):
+    """Solve up to a tile of samples at every ``stride``-th node, side by side."""
+    values = np.empty((errors.shape[0], layout.end))
+    finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
+    samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
+    used = (samples + FOUR - 1) // FOUR * FOUR
+    tile, careful, tilted = make_tile(layout, size, contacts, ROW), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
+    _fill_tile(layout, values, finite, used, tile, tilted)
+    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
+    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
+    guess, history = np.empty(size), make_history(turn_of_crank, size)
+    for angle in range(turn.rotation.shape[1]):
+        at = first + angle * stride
+        solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, tile, careful)
+        _take_over(samples, angle, tile, turn)
+        for s in range(samples):
+            if finite[s] and (careful[s] or tilted[s]):
+                guess[:] = history[(angle - 1) % history.shape[0], :, s]
+                _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
+                tile.q[:, s] = guess
+        guess_next(angle, turn_of_crank, used, tile.q, history)
+    for s in range(samples):
+        if not finite[s]:
+            _give_up(turn, s)
+
+
+def solve_tile(
+    discs: Any,
+    first: Any,
+    stride: Any,
+    turn_of_crank: Any,
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    turn: Any,
+) -> None:
+    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on.
+
+    A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
+    apart.
+    """
+    if tables.play_stiffness.shape[1] == 0:
+        _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn)
+    else:
+        _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn)
+
+
+def solve_curves(
+    discs: Any,
+    turn_of_crank: Any,
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    turn: Any,
+) -> None:
+    """Fill the equilibria of every sample at every node of the tables, of which a crank's turn has so many.
+
+    ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
+    """
+
+    def solve(part: slice) -> None:
+        own = SolvedTurn(*(values[part] for values in turn))
+        solve_tile(discs, 0, 1, turn_of_crank, tables, layout, mapped, design, errors[part], torque, own)
+
+    in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))
+
+
+@jit
+def _forces_of_sample(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
+    own = np.empty((1, layout.end))
+    values_of(errors, torque, layout, mapped, own)
+    values = own[0]
+    memory = make_memory(design.law, tables)
+    problem_memory, work = memory[0], memory[1]
+    discs, count = pins.shape[1:]
+    for at in range(status.size):
+        if status[at] != CONVERGED:
+            pins[at], rows[at], elements[at] = np.nan, np.nan, np.nan
+            continue
+        _, problem = problem_at_node(at, tables, layout, design.face_width, values, problem_memory)
+        compress(problem, retained[at], work.compression, work.play)
+        for d in range(discs):
+            for k in range(count):
+                c = d * count + k
+                pins[at, d, k], _ = pin_force(
+                    problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
+                )
+        for e in range(elements.shape[1]):
+            elements[at, e, 0], elements[at, e, 1], _, _, _ = play_force(
+                problem.play_stiffness[e], problem.clearance[e], work.play[e, 0], work.play[e, 1]
+            )
+        for row in range(rows.shape[1]):
+            compression = 0.0
+            for i in range(retained.shape[1]):
+                compression += tables.row_by_retained[at, row, i] * retained[at, i]
+            for m in range(layout.torque + 1):
+                compression += tables.row_by_load[at, row, m] * values[m]
+            rows[at, row] = tables.row_stiffness[at, row] * compression
+
+
+def solve_forces(
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    status: Any,
+    retained: Any,
+    pins: Any,
+    rows: Any,
+    elements: Any,
+) -> None:
+    """Fill the `Forces` of all samples at all nodes of the tables."""
+
+    def fill(part: slice) -> None:
+        s = part.start
+        own = (status[s], retained[s], pins[s], rows[s], elements[s])
+        _forces_of_sample(tables, layout, mapped, design, errors[part], torque, *own)
+
+    in_threads(fill, errors.shape[0], 1)

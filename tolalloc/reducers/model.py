@@ -1,0 +1,409 @@
+"""The equivalent model of a reducer as a `tolalloc.models.model.Model`: what every question asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawings.correlation import CorrelatedSource
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.models.model import Examination, Model, Observer, Response, SettingDerivatives, Units
+from tolalloc.models.settings import DrawnAmounts, Setting
+from tolalloc.reading.units import ARCMINUTE, MICROMETRE
+from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD, TORQUE
+from tolalloc.reducers.cycloid.clearance import linear_model_warnings
+from tolalloc.reducers.equivalent.answers import OUTCOMES, Equilibria
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.loop_derivatives import DIFFERENTIABLE, loop_derivatives
+from tolalloc.reducers.response.outputs import (
+    WITH_FRICTION,
+    OutputsResponse,
+    limited_outputs,
+    readings_of,
+    wave_outputs,
+    with_orders,
+)
+from tolalloc.reducers.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
+from tolalloc.reducers.rigidity import against_catalogue, rated_pin_force
+from tolalloc.reducers.settings import FLANK, RADIAL, clearance_settings, torque_condition
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure
+from tolalloc.running.chunks import Mapper
+
+_MULTIPLES = 4
+"""Multiples of pins and teeth whose waves are told apart [-]."""
+_ANGLES = (468, 936)
+"""Angles at which the contact is solved without a search between them [-]."""
+_MOST_COLUMNS = 100
+"""Columns beyond which all products of two are more than the samples can tell apart [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducerModel(Model):
+    """The equivalent model of a reducer at the sources of a drawing."""
+
+    kernel: KernelResponse  # Its peak-to-peak at the modification in force
+    # Smallest and largest clearance that the modification may leave on the flank and at tip and root; none locks it [m]
+    flank: tuple[float, float] | None = None
+    radial: tuple[float, float] | None = None
+    identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
+    # Values of the settings in force; those of the reducer's own modification unless given [µm]
+    clearances: tuple[float, float] | None = None
+    unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
+    left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
+    mismatches: tuple[str, ...] = ()  # Where sizes of the drawing are not those of the reducer, in sentences
+
+    @property
+    def reducer(self) -> Reducer:
+        """The reducer with the stiffness in use."""
+        return self.kernel.model.reducer
+
+    @property
+    def reducer_in_force(self) -> Reducer:
+        """The same with the modification that leaves the clearances in force."""
+        if self.clearances is None:
+            return self.reducer
+        return replace(self.reducer, modification=self.modification(np.array(self.clearances)))
+
+    @property
+    def name(self) -> str:
+        """The reducer's."""
+        return self.reducer.name
+
+    @property
+    def kind(self) -> str:
+        """A reducer."""
+        return "reducer"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns [m, angles rad]."""
+        return self.kernel.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All that requirements may limit, the peak-to-peak first."""
+        return limited_outputs(self.reducer)
+
+    @property
+    def ranked(self) -> tuple[str, ...]:
+        """All but those with friction, which ask for more than twice the equilibria of the other outputs of a loop."""
+        return tuple(name for name in self.outputs if name not in WITH_FRICTION)
+
+    def reading(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of these outputs, waves of `spectra` among them if need be.
+
+        Raises
+        ------
+        UnknownNameError
+            An output that the model does not have.
+        """
+        if outputs == (PEAK_TO_PEAK,):
+            return self.kernel
+        waves = {name: order for order, names in self.spectra.items() for name in names}
+        for name in outputs:
+            if name not in self.outputs and name not in waves:
+                raise UnknownNameError.among(self.name, "output", name, self.outputs)
+        orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
+        readings = with_orders(readings_of(outputs), orders) if orders else readings_of(outputs)
+        response = OutputsResponse(kernel=self.kernel, readings=readings)
+        return response if response.outputs == outputs else replace(response, chosen=outputs)
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """Flank and radial clearance."""
+        bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in (self.flank, self.radial))
+        return clearance_settings(self.present_clearances, bounds)
+
+    @property
+    def present_clearances(self) -> tuple[float, float]:
+        """Flank and radial clearance in force [µm]."""
+        own, stage = self.reducer.modification, self.reducer.cycloid_stage
+        return self.clearances or (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+
+    def at(self, values: Float[np.ndarray, " setting"]) -> ReducerModel:
+        """Return the model whose modification leaves other clearances [µm]."""
+        kernel = self.kernel.with_modification(self.modification(values))
+        return replace(self, kernel=kernel, clearances=(float(values[0]), float(values[1])))
+
+    def modification(self, values: Float[np.ndarray, " setting"]) -> Modification:
+        """Return the amounts that leave the clearances [µm]."""
+        stage = self.reducer.cycloid_stage
+        return Modification.from_clearances(float(values[0]) * MICROMETRE, float(values[1]) * MICROMETRE, stage)
+
+    @cached_property
+    def _modification_by_clearance(self) -> Float[np.ndarray, "2 2"]:
+        """Change of equidistant and shift amount (rows) with flank and radial clearance (columns) [-]."""
+        stage = self.reducer.cycloid_stage
+        columns = [Modification.from_clearances(*clearances, stage) for clearances in ((1.0, 0.0), (0.0, 1.0))]
+        return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
+
+    @property
+    def settings_word(self) -> str:
+        """Both clearances are those of the tooth modification."""
+        return "modification"
+
+    @property
+    def exact(self) -> tuple[str, ...]:
+        """The peak-to-peak alone."""
+        return (PEAK_TO_PEAK,)
+
+    @property
+    def differentiable(self) -> tuple[str, ...]:
+        """What is read off torque against twist."""
+        return DIFFERENTIABLE
+
+    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the peak-to-peak, or what is read off torque against twist, of every sample with its derivatives."""
+        if output in self.differentiable:
+            return self._loop_derivatives(output, x)
+        if output not in self.exact:
+            known = (*self.exact, *self.differentiable)
+            raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, known)
+        found = self.kernel.with_derivatives(x)
+        return SettingDerivatives(
+            evaluation=found.evaluation,
+            by_column=found.by_column,
+            by_setting=found.by_modification @ self._modification_by_clearance * MICROMETRE,
+        )
+
+    def _loop_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        evaluation, slopes = loop_derivatives(self.kernel, output, x)
+        columns = self.kernel.model.columns
+        varied, amounts = (
+            [columns.index(name) for name in names] for names in (self.columns, self.reducer.modification.deviations)
+        )
+        return SettingDerivatives(
+            evaluation=evaluation,
+            by_column=slopes[:, varied],
+            by_setting=slopes[:, amounts] @ self._modification_by_clearance * MICROMETRE,
+        )
+
+    def observed(self, observe: Observer) -> ReducerModel:
+        """Return the model whose kernel tells someone the statuses of each chunk."""
+        return replace(self, kernel=replace(self.kernel, observe=observe))
+
+    def mapped(self, mapper: Mapper) -> ReducerModel:
+        """Return the model whose kernel has its chunks solved by a mapper."""
+        return replace(self, kernel=replace(self.kernel, mapper=mapper))
+
+    def put_away(self) -> None:
+        """Let go of the kernel's tables."""
+        self.kernel.put_away()
+
+    @property
+    def outcomes(self) -> Mapping[int, str]:
+        """Status → outcome of an equilibrium in words."""
+        return OUTCOMES
+
+    @property
+    def conditions(self) -> Mapping[str, float | str]:
+        """Torque on the carrier."""
+        return {TORQUE: self.kernel.torque}
+
+    @property
+    def operating_conditions(self) -> tuple[Setting, ...]:
+        """The torque."""
+        return (torque_condition(self.kernel.torque, self.reducer.load.rated_torque),)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Those of the reducer, of the built unit and of what the drawing leaves out."""
+        clearances = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
+        without = (f"without clearance: {', '.join(clearances).replace('_', ' ')}",) if clearances else ()
+        return (
+            *self.reducer.assumptions,
+            *(self.unit.assumptions if self.unit else ()),
+            *self.left_out,
+            *without,
+        )
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
+        stiffness = self._perfect_loop.torsional_stiffness[0] * ARCMINUTE
+        return {"torsional stiffness of the perfect reducer [N·m/arcmin]": float(stiffness)}
+
+    @cached_property
+    def _perfect_loop(self) -> HysteresisLoop:
+        """Torque against twist of the reducer without any error."""
+        return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), TURN_ANGLES)
+
+    @cached_property
+    def _exact_loop(self) -> HysteresisLoop:
+        """Torque against twist of the unit whose parts are exact and whose teeth have the modification in force."""
+        return exact_loop(self.reducer_in_force)
+
+    @property
+    def drawn_amounts(self) -> DrawnAmounts:
+        """Equidistant and shift amount of the modification, in steps of half a micrometre."""
+        names = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
+        return DrawnAmounts(
+            names=names,
+            by_setting=self._modification_by_clearance,
+            steps=(0.5, 0.5),
+            convention=MODIFICATION_CONVENTION,
+        )
+
+    def illustrated(self, units: Units) -> tuple[Section, ...]:
+        """Return curves and orders of units, and how exact teeth carry the rated torque."""
+        from tolalloc.reducers.illustration import illustrated
+
+        return illustrated(self, units)
+
+    @cached_property
+    def built_curve(self) -> Equilibria | None:
+        """Equilibria of the built unit over one output turn, if there is such a unit."""
+        if self.unit is None:
+            return None
+        own = self.unit.errors(self.kernel.model.columns, self.reducer.modification.deviations)
+        return self.kernel.model.equilibria(own, self.kernel.torque)
+
+    def pictured(self, units: Units) -> tuple[Figure, ...]:
+        """Return curves and orders of units."""
+        from tolalloc.reducers.illustration import pictured
+
+        return pictured(self, units)
+
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],
+        x: Float[np.ndarray, " column"],
+        unit: str,
+        sources: tuple[str, ...],
+    ) -> dict[str, Any]:
+        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once."""
+        from tolalloc.reducers.scene.section import scene_at
+
+        return scene_at(self.at(settings), x, unit, sources).record(coarse=True)
+
+    def moving(
+        self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
+    ) -> tuple[Section, ...]:
+        """Return the moving picture of a unit; nothing of one that has no equilibrium at some angle."""
+        from tolalloc.reducers.scene.section import moving
+
+        return moving(self, errors, x, shares, unit)
+
+    @property
+    def content(self) -> Any:
+        """Reducer, identified stiffnesses and torque."""
+        return (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
+
+    @property
+    def uncertain(self) -> tuple[CorrelatedSource, ...]:
+        """What is not known of identified stiffnesses."""
+        return (stiffness_source(self.identified, self.reducer),) if self.identified else ()
+
+    @property
+    def uncertain_name(self) -> str:
+        """Identified stiffness."""
+        return "identified stiffness"
+
+    def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of the outputs with the stiffnesses as further columns, to first order in ln K."""
+        if self.identified is None:
+            return self.reading(outputs)
+        peak = self._peak_with_stiffness
+        if outputs == peak.outputs:
+            return peak
+        deviations = np.sqrt(np.diag(self.identified.covariance))
+        return OutputsWithStiffness(
+            peak=peak, outputs=outputs, reading=self._reading_on, steps=tuple(deviations.tolist())
+        )
+
+    def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> ReducerModel:
+        """Return the model of the reducer whose identified stiffnesses are changed, by ln K/K0 [-]."""
+        return replace(self, kernel=self._peak_with_stiffness.changed(change))
+
+    @property
+    def accuracy(self) -> Mapping[str, float]:
+        """That of the peak-to-peak, from the angles of its search [arcsec]."""
+        return {PEAK_TO_PEAK: SEEN}
+
+    @property
+    def _peak_with_stiffness(self) -> StiffnessResponse:
+        stiffnesses = tuple(self.identified.values) if self.identified else ()
+        return StiffnessResponse(kernel=self.kernel, stiffnesses=stiffnesses)
+
+    def _reading_on(self, kernel: KernelResponse, outputs: tuple[str, ...]) -> Response:
+        """Return the response of the outputs on a kernel with other stiffnesses."""
+        return replace(self, kernel=kernel).reading(outputs)
+
+    @cached_property
+    def spectra(self) -> Mapping[int, tuple[str, str]]:
+        """Waves of the output turn: orders 1 and 2, and the multiples of teeth and pins."""
+        stage = self.reducer.cycloid_stage
+        multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
+        return {order: wave_outputs(order) for order in sorted({1, 2, *multiples})}
+
+    @property
+    def spectra_note(self) -> str:
+        """Which errors show at multiples of teeth or pins."""
+        stage = self.reducer.cycloid_stage
+        return (
+            f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
+            f"disc or carrier at multiples of {stage.pin_count}"
+        )
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output; there is one peak-to-peak."""
+        return super().spoken(output).removesuffix(" transmission error")
+
+    def stand_ins(self) -> tuple[Any, ...]:
+        """Return the contact at fewer angles and, for few columns, a regression of the curve."""
+        from tolalloc.reducers.stand_ins import ContactCandidate, CurveCandidate
+
+        contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
+        return contact if len(self.columns) > _MOST_COLUMNS else (*contact, CurveCandidate(kernel=self.kernel))
+
+    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
+        """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
+        modification = self.modification(values)
+        return {
+            "equidistant Δr_rp [µm]": modification.equidistant / MICROMETRE,
+            "shift Δr_p [µm]": modification.shift / MICROMETRE,
+            FLANK: float(values[0]),
+            RADIAL: float(values[1]),
+        }
+
+    @cached_property
+    def own_limits(self) -> Mapping[str, float]:
+        """No pin may press harder without torque than the rated torque makes it: such a unit is preloaded.
+
+        Only where bearings are stated by their dimensions: with printed stiffnesses, far too large, nearly all are.
+        """
+        return {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
+
+    @cached_property
+    def rated_pin_force(self) -> float:
+        """Largest pin force of the perfect reducer under its rated torque [N]."""
+        return rated_pin_force(self.reducer)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Rigidity and lost motion beside the catalogue's."""
+        sentence, _ = against_catalogue(self.reducer, self._exact_loop)
+        return (sentence,) if sentence else ()
+
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:
+        """Return nominal clearances, how many random units are preloaded, and what is said of the catalogue."""
+        from tolalloc.reducers.examination import examined
+
+        return examined(self, x)
+
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
+        """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
+        _, far = against_catalogue(self.reducer, self.at(values)._exact_loop)
+        return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)

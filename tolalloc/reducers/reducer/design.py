@@ -1,0 +1,235 @@
+"""The nominal design of an RV reducer: what the drawing would say if nothing had an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import cos, sqrt
+from typing import Annotated
+
+from pydantic import Field
+
+from tolalloc.exceptions import InputError
+from tolalloc.reading.files import times
+from tolalloc.reading.named_fields import is_number
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.reducer.friction import Friction, FrictionDimensions
+from tolalloc.reducers.reducer.parts import Part
+from tolalloc.reducers.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
+
+Teeth = Annotated[int, Field(ge=5, le=1000)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstStage:
+    """Sun gear and planet gears, an involute pair; table ``[first_stage]`` of a reducer file."""
+
+    # Numbers of teeth Z1 and Z2 [-]
+    sun_teeth: Teeth
+    planet_teeth: Teeth
+    # Module m and pressure angle α [m, rad]
+    module: Annotated[float, Field(alias="module_mm", ge=0.1, le=20), times(MILLIMETRE)]
+    pressure_angle: Annotated[float, Field(alias="pressure_angle_deg", ge=5, le=45), times(DEGREE)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycloidStage:
+    """Cycloid discs against the ring of pins; table ``[cycloid_stage]``."""
+
+    pin_count: Teeth  # Number zp [-]
+    disc_teeth: Teeth  # Number zc = zp − 1 [-]
+    # Radius Rp of the circle of pin centres, and r_rp of a pin [m]
+    pin_circle_radius: Annotated[float, Field(alias="pin_circle_radius_mm", ge=5, le=1000), times(MILLIMETRE)]
+    pin_radius: Annotated[float, Field(alias="pin_radius_mm", ge=0.1, le=50), times(MILLIMETRE)]
+    # Crank eccentricity e [m]
+    eccentricity: Annotated[float, Field(alias="eccentricity_mm", ge=0.05, le=10), times(MILLIMETRE)]
+    # Loaded width b of a disc, and distance between the middle planes of neighbouring discs, in a file b unless given
+    # [m]
+    face_width: Annotated[float, Field(alias="face_width_mm", ge=0.5, le=200), times(MILLIMETRE)]
+    disc_spacing: Annotated[float, Field(alias="disc_spacing_mm", ge=0, le=500), times(MILLIMETRE)] = 0.0
+
+    @property
+    def shortening(self) -> float:
+        """Ratio K1 = e·zp/Rp [-]."""
+        return self.eccentricity * self.pin_count / self.pin_circle_radius
+
+    @property
+    def disc_pitch_radius(self) -> float:
+        """Lever r_d = e·zc of the pin forces about the disc centre [m]."""
+        return self.eccentricity * self.disc_teeth
+
+    @property
+    def flank_ratio(self) -> float:
+        """Q = √(1 − K1²), part of a shift that is felt on the flank where cos φ = K1 [-]."""
+        return sqrt(1 - self.shortening**2)
+
+    @property
+    def smallest_convex_radius(self) -> float:
+        """Smallest convex radius of the pin centre's path on the disc [m]; a larger pin undercuts the teeth.
+
+        It stands where the derivative of the curvature, theory page equation (33), vanishes, or else at the tip.
+        """
+        pins, shortening = self.pin_count, self.shortening
+        cosine = max((2 - pins + shortening**2 * (2 * pins - 1)) / (shortening * (1 + pins)), -1.0)
+        bend = 1 + pins * shortening**2 - shortening * (1 + pins) * cosine
+        return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
+
+
+SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
+"""Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
+(li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
+
+
+MODIFICATION_CONVENTION = (
+    "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
+    "equidistant amount and a negative shift remove material"
+)
+"""What the signs of the two amounts mean on a drawing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modification:
+    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34)."""
+
+    equidistant: float  # Δr_rp: the grinding pin radius is r_rp + Δr_rp [m]
+    shift: float  # Δr_p: the pin circle radius at grinding is Rp + Δr_p [m]
+    rotation: float = 0.0  # δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad]
+
+    @classmethod
+    def from_convention(cls, convention: str, equidistant: float, shift: float) -> Modification:
+        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m].
+
+        Raises
+        ------
+        KeyError
+            Another convention.
+        """
+        return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift)
+
+    def flank_clearance(self, stage: CycloidStage) -> float:
+        """Return the nominal gap on the flank where cos φ = K1: Δr_rp − Δr_p·√(1−K1²) + δ·r_d [m].
+
+        It is the smallest gap unless the shift is positive.
+        """
+        return self.equidistant - self.shift * stage.flank_ratio + self.rotation * stage.disc_pitch_radius
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The two amounts as error columns of the model, the equidistant first [m]."""
+        return {"modification.equidistant": self.equidistant, "modification.shift": self.shift}
+
+    @property
+    def radial_clearance(self) -> float:
+        """The nominal gap at tooth tip and root, Δr_rp − Δr_p [m]."""
+        return self.equidistant - self.shift
+
+    @classmethod
+    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage) -> Modification:
+        """Return the two amounts that give a flank and a radial clearance [m]."""
+        shift = (flank - radial) / (1 - stage.flank_ratio)
+        return cls(equidistant=radial + shift, shift=shift)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clearances:
+    """Nominal clearance, half the play, of the bilateral interfaces, 0 where there is none; table ``[clearances]``."""
+
+    # Half the normal backlash of a sun–planet mesh [m]
+    gear_mesh: Annotated[float, Field(alias="gear_mesh_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+    # Radial clearance of a bearing, half its diametral one [m]
+    crank_disc_bearing: Annotated[float, Field(alias="crank_disc_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+    crank_carrier_bearing: Annotated[
+        float, Field(alias="crank_carrier_bearing_um", ge=0, le=200), times(MICROMETRE)
+    ] = 0.0
+    carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """Torques on the carrier [N·m]; negative resists the positive direction of rotation. Table ``[load]``."""
+
+    test_torque: Annotated[float, Field(alias="test_torque_nm", ge=-1e5, le=1e5)]
+    rated_torque: Annotated[float, Field(alias="rated_torque_nm", gt=0, le=1e5)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Catalogue:
+    """What a maker's catalogue states of the size, to hold the model against; table ``[catalogue]``."""
+
+    torsional_rigidity: Annotated[
+        float, Field(alias="torsional_rigidity_nm_per_arcmin", ge=0.1, le=1e5), times(1 / ARCMINUTE)
+    ]  # Torque over twist between 3 % and 100 % of the rated torque [N·m/rad]
+    # Largest twist between both directions of 3 % of the rated torque, and largest error over a turn [rad]
+    lost_motion: Annotated[float, Field(alias="lost_motion_arcmin", ge=0.05, le=10), times(ARCMINUTE)]
+    transmission_error: Annotated[float, Field(alias="transmission_error_arcsec", ge=5, le=600), times(ARCSECOND)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reducer:
+    """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
+
+    name: str
+    source: str
+    crank_count: int
+    disc_count: int
+    first_stage: FirstStage
+    cycloid_stage: CycloidStage
+    disc_material: Material
+    pin_material: Material
+    stiffness: Stiffness
+    modification: Modification
+    load: Load
+    clearances: Clearances = field(default_factory=Clearances)
+    # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
+    parts: tuple[Part, ...] = ()
+    friction: Friction = field(default_factory=Friction)
+    friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
+    catalogue: Catalogue | None = None
+    assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def crank_circle_radius(self) -> float:
+        """Radius a_sp of the circle of crank axes, m(Z1+Z2)/2 [m]."""
+        return self.first_stage.module * (self.first_stage.sun_teeth + self.first_stage.planet_teeth) / 2
+
+    @property
+    def planet_base_radius(self) -> float:
+        """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
+        return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of pins and discs [Pa]."""
+        return contact_modulus(self.disc_material, self.pin_material)
+
+    def with_face_width(self, width: float) -> Reducer:
+        """Return the reducer with discs of another loaded width [m]; the pin contact becomes that of Table 2."""
+        return replace(
+            self,
+            cycloid_stage=replace(self.cycloid_stage, face_width=width),
+            stiffness=replace(self.stiffness, pin_contact=line_contact(width, self.contact_modulus)),
+        )
+
+    def with_pin_span(self, span: float) -> Reducer:
+        """Return the reducer with pins that bend between two supports at a distance [m]."""
+        diameter, modulus = 2 * self.cycloid_stage.pin_radius, self.pin_material.elastic_modulus
+        return replace(self, stiffness=replace(self.stiffness, pin_bending=pin_bending(diameter, span, modulus)))
+
+    def torque_on_carrier(self, asked: float | None, place: str) -> float:
+        """Return the torque to use, the test torque unless one is asked for; negative resists the rotation [N·m].
+
+        Commands and files take torques with this sign only, nomenclature page.
+
+        Raises
+        ------
+        InputError
+            Zero, where the play leaves the equilibrium undetermined, or beyond ten times the rated torque.
+        """
+        torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
+        if not (is_number(torque) and 0 < abs(torque) <= largest):
+            raise InputError.of_argument(place, "torque", torque, f"-{largest:g} to {largest:g} N·m, but not 0")
+        return torque
+
+    @property
+    def ratio(self) -> float:
+        """Sun turns per carrier turn, 1 + (Z2/Z1)·zp, with the pin housing fixed [-]."""
+        return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count

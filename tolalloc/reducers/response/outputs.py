@@ -1,0 +1,227 @@
+"""The equivalent model as a response with several outputs: all that requirements limit, and the waves of its orders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from tolalloc.models.model import Evaluation
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers import (
+    BACKLASH,
+    EFFICIENCY,
+    FRICTION_TORQUE,
+    HYSTERESIS_LOSS,
+    LOST_MOTION,
+    LOST_MOTION_WITH_FRICTION,
+    PEAK_TO_PEAK,
+    PRELOAD,
+    RADIAL_CLEARANCE,
+    TORSIONAL_STIFFNESS,
+)
+from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.equivalent.friction_loop import friction_loop
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reducers.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, radial_clearance, waves
+from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.running.chunks import map_chunks
+
+Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One solve and the outputs that are read off it."""
+
+    outputs: tuple[str, ...]  # Names of the outputs with their units
+    # From model, errors in the order of its columns, and test torque, the outputs and the status of every sample
+    read: Callable[[EquivalentModel, Float[np.ndarray, "chunk column"], float], Answer]
+
+
+def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    found = model.extremes(errors, torque)
+    return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
+
+
+def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    return _found(_read_off(hysteresis_loop(model, errors, TURN_ANGLES)))
+
+
+def _friction_loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    loop = friction_loop(model, errors, TURN_ANGLES)
+    own = [100.0 * loop.rated.efficiency, loop.lost_motion / ARCMINUTE, loop.hysteresis_loss / ARCMINUTE]
+    return _found([*_read_off(loop.plain), *own])
+
+
+def _read_off(loop: HysteresisLoop) -> list[Float[np.ndarray, " chunk"]]:
+    """Return lost motion, backlash [arcmin] and torsional stiffness [N·m/arcmin]."""
+    return [loop.lost_motion / ARCMINUTE, loop.backlash / ARCMINUTE, loop.torsional_stiffness * ARCMINUTE]
+
+
+def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
+    values = np.stack(columns, axis=1)
+    # A loop keeps no statuses: an angle without an equilibrium is not a number in it.
+    status = np.where(np.isfinite(values).all(axis=1), Status.CONVERGED, Status.NOT_CONVERGED)
+    return values, status.astype(np.uint8)
+
+
+def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+    rated = float(np.copysign(model.reducer.load.rated_torque, torque))
+    solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, TURN_ANGLES))
+    own = [OUTPUTS[name][1](solved) for name in _FORCES]
+    values = np.stack([*own, *_pin_stress(solved)], axis=1)
+    return values, np.asarray(solved.equilibria.status.max(axis=1))
+
+
+def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
+    """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
+
+    Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
+    """
+    line_load = peak_line_load(solved.equilibria, solved.forces)
+    pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
+    return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+
+
+def _preload(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
+    found = preload(model, errors)
+    return np.stack([found.pin_force, found.friction_torque], axis=1), found.status
+
+
+def _radial_clearance(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "chunk column"],
+    torque: float,  # noqa: ARG001
+) -> Answer:
+    clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
+    status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
+    return clearance, status.astype(np.uint8)
+
+
+_FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
+
+_PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
+_LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
+WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
+"""Outputs of the loop with friction."""
+_FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
+
+REQUIREMENTS = (
+    _PEAK_TO_PEAK,
+    _LOOP,
+    Reading(
+        outputs=(
+            *(f"{name}, rated torque [{OUTPUTS[name][0]}]" for name in _FORCES),
+            "largest line load, rated torque [N/mm]",
+            "peak pressure, rated torque [MPa]",
+        ),
+        read=_rated_load,
+    ),
+    Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
+    Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
+)
+"""What a requirement may limit: transmission error, torque against twist, rated load, preload, gap at tip and root."""
+
+
+def limited_outputs(reducer: Reducer) -> tuple[str, ...]:
+    """Return what a requirement may limit; what friction decides only where the reducer's file says enough for it."""
+    own = tuple(name for reading in REQUIREMENTS for name in reading.outputs)
+    return own if reducer.friction_dimensions.unknown else (*own, *WITH_FRICTION)
+
+
+def readings_of(outputs: tuple[str, ...]) -> tuple[Reading, ...]:
+    """Return the readings that give the outputs; one with friction gives the loop without it too."""
+    loop = _LOOP if {*WITH_FRICTION}.isdisjoint(outputs) else _FRICTION_LOOP
+    every = (loop if own is _LOOP else own for own in REQUIREMENTS)
+    return tuple(own for own in every if not {*own.outputs}.isdisjoint(outputs))
+
+
+def wave_outputs(order: int) -> tuple[str, str]:
+    """Return the names of the outputs that hold the cosine and the sine of an order of the output turn."""
+    return (f"order {order} cosine [arcsec]", f"order {order} sine [arcsec]")
+
+
+def _waves(
+    orders: tuple[int, ...], transmission_error: Float[np.ndarray, "chunk angle"]
+) -> Float[np.ndarray, "chunk output"]:
+    """Return cosine and sine of every order [arcsec]."""
+    # An unconverged angle is NaN and would spread over all waves; the status keeps the sample out.
+    wave = waves(np.nan_to_num(transmission_error))[:, np.array(orders) - 1] / ARCSECOND
+    return np.stack([wave.real, -wave.imag], axis=2).reshape(wave.shape[0], -1)
+
+
+def orders_reading(orders: tuple[int, ...]) -> Reading:
+    """Return the reading of the waves of the transmission error, cosine and sine of every order."""
+
+    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+        found = model.equilibria(errors, torque)
+        return _waves(orders, found.transmission_error), found.status.max(axis=1)
+
+    return Reading(outputs=tuple(name for order in orders for name in wave_outputs(order)), read=read)
+
+
+def with_orders(readings: tuple[Reading, ...], orders: tuple[int, ...]) -> tuple[Reading, ...]:
+    """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on."""
+
+    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
+        found, curve = model.extremes_and_curve(errors, torque)
+        return np.hstack([found.peak_to_peak[:, np.newaxis] / ARCSECOND, _waves(orders, curve)]), found.status
+
+    apart = orders_reading(orders)
+    if _PEAK_TO_PEAK not in readings:
+        return (*readings, apart)
+    others = tuple(own for own in readings if own is not _PEAK_TO_PEAK)
+    return (Reading(outputs=(PEAK_TO_PEAK, *apart.outputs), read=read), *others)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputsResponse:
+    """All outputs of several readings, one row per sample."""
+
+    kernel: KernelResponse  # Model, torque, columns, and who observes
+    readings: tuple[Reading, ...] = REQUIREMENTS  # What is read
+    chosen: tuple[str, ...] = ()  # Outputs of the readings that are answered, all of them if empty
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The kernel's columns."""
+        return self.kernel.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs with their units."""
+        return self.chosen or self._read
+
+    @property
+    def _read(self) -> tuple[str, ...]:
+        return tuple(name for reading in self.readings for name in reading.outputs)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample; a sample fails where one of its readings does."""
+        values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
+        for rows, (answer, worst) in map_chunks(self.alone.read, x, self.kernel.mapper):
+            values[rows], status[rows] = answer, worst
+            self.kernel.observe(worst)
+        if self.chosen:
+            values = values[:, [self._read.index(name) for name in self.chosen]]
+        return Evaluation(values=values, status=status)
+
+    @property
+    def alone(self) -> OutputsResponse:
+        """The response without what must stay in this process."""
+        return replace(self, kernel=self.kernel.alone)
+
+    def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
+        """Return the outputs of one chunk and the worst status of every sample."""
+        errors = self.kernel.errors(x)
+        answers = [reading.read(self.kernel.model, errors, self.kernel.torque) for reading in self.readings]
+        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
+            np.max([status for _, status in answers], axis=0)
+        )

@@ -1,0 +1,79 @@
+"""A tooth profile as a file: CSV for a measuring machine, DXF for a drawing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from ezdxf import units
+from ezdxf.filemanagement import new
+
+from tolalloc.exceptions import InputError
+from tolalloc.reading.files import require_new
+from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import linear_clearance
+from tolalloc.reducers.cycloid.tooth_profile import ProfilePoints, ToothProfile, profile_points, require_points
+
+
+def points_frame(profile: ToothProfile, points: ProfilePoints) -> pd.DataFrame:
+    """Return the points with angle, curvature and material removed."""
+    angle = points.angle
+    return pd.DataFrame(
+        {
+            "x [mm]": points.place[:, 0] / MILLIMETRE,
+            "y [mm]": points.place[:, 1] / MILLIMETRE,
+            "angle [deg]": angle / DEGREE,
+            "curvature, convex positive [1/mm]": profile.curvature(np.abs(angle)) * MILLIMETRE,
+            "removed along the normal [µm]": linear_clearance(profile.stage, profile.modification, angle) / MICROMETRE,
+        }
+    )
+
+
+def _write_csv(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:
+    points_frame(profile, points).to_csv(path, index=False, float_format="%.9g")
+
+
+def _write_dxf(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:
+    drawing = new("R2010", units=units.MM)
+    space = drawing.modelspace()
+    for name, colour in (("TOOTH_PROFILE", 7), ("TIP_AND_ROOT", 8)):
+        drawing.layers.add(name, color=colour)
+    space.add_lwpolyline(points.place / MILLIMETRE, close=True, dxfattribs={"layer": "TOOTH_PROFILE"})
+    for radius in (profile.tip_radius, profile.root_radius):
+        space.add_circle((0.0, 0.0), radius / MILLIMETRE, dxfattribs={"layer": "TIP_AND_ROOT"})
+    drawing.saveas(path)
+
+
+WRITERS = {".csv": _write_csv, ".dxf": _write_dxf}
+
+
+def require_profile_file(path: Path, per_tooth: int) -> None:
+    """Raise unless a profile of so many points per tooth can be written to a new ``.csv`` or ``.dxf`` file.
+
+    Raises
+    ------
+    InputError
+        An unknown kind of file, one that exists, or a number of points that no drawing can use.
+    """
+    require_points(per_tooth)
+    if path.suffix.lower() not in WRITERS:
+        raise InputError.at("profile file", "ending", path.name, " or ".join(WRITERS))
+    require_new(path)
+
+
+def write_profile(profile: ToothProfile, per_tooth: int, path: Path) -> ProfilePoints:
+    """Write the sound profile of a whole disc in millimetres and return its points.
+
+    Raises
+    ------
+    InputError
+        An unknown kind of file, one that exists or cannot be written, or a number of points that no drawing can use.
+    """
+    require_profile_file(path, per_tooth)
+    points = profile_points(profile, per_tooth)
+    try:
+        WRITERS[path.suffix.lower()](profile, points, path)
+    except OSError as error:
+        raise InputError(f"{path}: the profile cannot be written ({error.strerror}); name another file.") from None
+    return points

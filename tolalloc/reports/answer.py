@@ -1,0 +1,190 @@
+"""What every answer is: a header, sentences, sections and a summary, said once; everything else is drawn from it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.reports.currency import in_currency
+from tolalloc.reports.document import Document, Section, tables_of
+from tolalloc.reports.header import Header
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure as Canvas
+
+    from tolalloc.reports.figure import Figure, HeatMap
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer(ABC):
+    """The answer to one question.
+
+    Parameters
+    ----------
+    header
+        What every answer says of its run.
+
+    Notes
+    -----
+    Everything is made once, when it is first asked for. A notebook shows the first sentence, table and figure.
+    """
+
+    header: Header
+    kind: ClassVar[str]
+    """Word for the question, such as ``ranking``."""
+    shown: ClassVar[tuple[str, ...]] = ()
+    """Columns of the first table that a terminal shows; the first six unless an answer says otherwise."""
+
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Answer.__repr__  # type: ignore[method-assign]  # else a dataclass would print all its numbers
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """What the answer is about."""
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        return ", ".join(f"{name} {value:g}" for name, value in self.header.conditions.items() if name != "unit")
+
+    @property
+    @abstractmethod
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return ()
+
+    @property
+    @abstractmethod
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their paragraphs, figures and tables."""
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        return self.header.assumptions
+
+    @property
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units of measurement in the names."""
+
+    def add_files(self, folder: Path) -> None:  # noqa: B027 (most answers add nothing)
+        """Add files of its own to a written report; nothing unless an answer says otherwise."""
+
+    @cached_property
+    def document(self) -> Document:
+        """The report on this answer alone."""
+        made = Document(
+            title=self.title,
+            subtitle=self.subtitle,
+            answer=self.sentences,
+            warnings=self.warnings,
+            sections=self.sections,
+            assumptions=self.assumptions,
+            summary=self.summary,
+            seed=self.header.seed,
+            manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
+        )
+        return in_currency(made, self.header.currency)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The answer in a few sentences, costs in the user's currency."""
+        return in_currency(self.sentences, self.header.currency)
+
+    @property
+    def warned(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it, costs in the user's currency."""
+        return in_currency(self.warnings, self.header.currency)
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All tables by name, units in the headers, costs in the user's currency."""
+        return tables_of(in_currency(self.sections, self.header.currency))
+
+    @property
+    def figures(self) -> dict[str, Figure | HeatMap]:
+        """All figures by name."""
+        return self.document.figures
+
+    def to_frame(self, name: str = "") -> pd.DataFrame:
+        """Return a table by name, the first one unless named.
+
+        Raises
+        ------
+        UnknownNameError
+            The answer has no such table.
+        """
+        return _picked(self.tables, name, f"the answer's tables ({self.kind})")
+
+    def plot(self, name: str = "") -> Canvas:
+        """Return a figure by name as a picture of matplotlib, the first one unless named.
+
+        Raises
+        ------
+        UnknownNameError
+            The answer has no such figure.
+        """
+        from tolalloc.reports.plots import drawn
+
+        return drawn(_picked(self.figures, name, f"the answer's figures ({self.kind})"))
+
+    def save(self, folder: str | Path) -> Path:
+        """Write report, workbook, tables, pictures and summary into a new or empty folder, and return it.
+
+        Raises
+        ------
+        RunFolderError
+            Something is in the way.
+        """
+        from tolalloc.reports.folder import claimed
+        from tolalloc.reports.writer import write_document
+
+        path = Path(folder)
+        with claimed(path) as beside:
+            self.add_files(beside)
+            write_document(self.document, beside)
+        return path
+
+    def __repr__(self) -> str:
+        """Return kind, study and model; the numbers behind an answer fill pages."""
+        return f"<{self.kind} answer: {self.header.name}, {self.header.model}>"
+
+    def __str__(self) -> str:
+        """Return title, sentences and warnings."""
+        return "\n".join([self.title, *self.told, *self.warned])
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # noqa: ARG002
+        """Show a terminal session what a person reads, not the numbers behind it."""
+        printer.text(str(self))
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the first two sentences, the first table, one figure."""
+        from tolalloc.reports.html_table import html_table
+        from tolalloc.reports.writer import inline_png
+
+        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.told[:2])]
+        shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]
+        shown += [inline_png(figure) for figure in list(self.figures.values())[:1]]
+        return "\n".join(shown)
+
+
+def _picked(known: Mapping[str, Item], name: str, place: str) -> Item:
+    """Return what has the name, the first one unless named."""
+    asked = name or next(iter(known), "")
+    if asked not in known:
+        raise UnknownNameError.among(place, "name", asked, known)
+    return known[asked]

@@ -1,0 +1,354 @@
+// Charts of a report and of the live page: SVG that prints, tells its values under the pointer, and needs no library.
+
+const SVG = "http://www.w3.org/2000/svg";
+const COLOURS = ["#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b", "#6a4fc3"];
+const LETTER = 6.6; // width of a letter at 12 px, on average
+const NARROW = 520; // below, the names of bars stand above them
+
+export const colour = (number) => `var(--series-${number % COLOURS.length}, ${COLOURS[number % COLOURS.length]})`;
+
+export function node(name, attributes = {}, text = null) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== null) made.textContent = text;
+  return made;
+}
+
+// A number as the reports write it: five significant digits at most.
+export function number(value) {
+  if (value === null || !Number.isFinite(value)) return "–";
+  if (Math.abs(value) >= 1e4) return value.toFixed(0);
+  return String(Number(value.toPrecision(5)));
+}
+
+function range(values) {
+  let low = Infinity, high = -Infinity;
+  for (const value of values) {
+    if (value === null || !Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  if (low > high) return [0, 1];
+  return low === high ? [low - 0.5 || -0.5, high + 0.5] : [low, high];
+}
+
+// An axis: where a value stands, and its ticks.
+class Axis {
+  constructor(low, high, from, to, logarithmic = false) {
+    Object.assign(this, { low, high, from, to, logarithmic });
+  }
+  at(value) {
+    const of = this.logarithmic ? (v) => Math.log10(Math.max(v, 1e-300)) : (v) => v;
+    const share = (of(value) - of(this.low)) / (of(this.high) - of(this.low));
+    return this.from + share * (this.to - this.from);
+  }
+  value(place) {
+    const share = (place - this.from) / (this.to - this.from);
+    if (!this.logarithmic) return this.low + share * (this.high - this.low);
+    return this.low * (this.high / this.low) ** share;
+  }
+  ticks(most) {
+    if (this.logarithmic) {
+      const found = [], steps = Math.log10(this.high / this.low) > 2 ? [1] : [1, 2, 5];
+      for (let power = Math.floor(Math.log10(this.low)); power <= Math.ceil(Math.log10(this.high)); power++)
+        for (const step of steps) {
+          const value = step * 10 ** power;
+          if (value >= this.low * 0.999 && value <= this.high * 1.001) found.push(value);
+        }
+      return found;
+    }
+    const rough = (this.high - this.low) / Math.max(most, 2);
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = [1, 2, 5, 10].map((s) => s * power).find((s) => s >= rough);
+    const found = [];
+    for (let k = Math.ceil(this.low / step - 1e-9); k * step <= this.high + 1e-9 * step; k++)
+      found.push(Math.abs(k) < 1e-12 ? 0 : Number((k * step).toPrecision(12)));
+    return found;
+  }
+}
+
+// Values of all series on an axis, and those that are marked on it.
+function extent(figure, axis) {
+  const marks = (axis === "x" ? figure.vertical : figure.horizontal) ?? [];
+  const found = marks.map(([value]) => value);
+  for (const item of figure.series) {
+    const own = axis === "x" ? item.x : [...item.y, ...(item.low ?? []), ...(item.high ?? [])];
+    found.push(...own);
+    if (axis === "x" && item.kind === "histogram") found.push(item.x[item.x.length - 1] + item.width);
+    if (axis === "y" && ["stems", "histogram"].includes(item.kind)) found.push(0);
+  }
+  return found;
+}
+
+function padded([low, high], share, logarithmic) {
+  if (logarithmic) {
+    const factor = (high / low) ** share;
+    return [low / factor, high * factor];
+  }
+  const pad = share * (high - low);
+  return [low === 0 ? 0 : low - pad, high === 0 ? 0 : high + pad];
+}
+
+export class Chart {
+  // The figure is a record of `tolalloc.reports.charts.chart`.
+  constructor(element, figure) {
+    this.element = element;
+    element.classList.add("chart");
+    this.zoom = null;
+    this.tip = document.createElement("div");
+    this.tip.className = "tip";
+    this.tip.hidden = true;
+    this.update(figure);
+    new ResizeObserver(() => {
+      if (Math.abs(element.clientWidth - this.width) > 2) this.draw();
+    }).observe(element);
+  }
+
+  update(figure) {
+    this.figure = figure;
+    this.draw();
+  }
+
+  draw() {
+    this.width = Math.max(this.element.clientWidth || 720, 240);
+    const bars = this.figure.series?.some((item) => item.kind === "bars");
+    const drawn = this.figure.values ? this.heat() : bars ? this.bars() : this.plane();
+    drawn.setAttribute("role", "img");
+    drawn.setAttribute("aria-label", this.figure.title);
+    this.element.replaceChildren(this.legend(), drawn, this.tip);
+  }
+
+  legend() {
+    const list = document.createElement("div");
+    list.className = "legend";
+    const series = this.figure.series ?? [];
+    if (series.length > 1 || (this.figure.vertical ?? []).length || (this.figure.horizontal ?? []).length)
+      series.forEach((item, place) => {
+        const entry = document.createElement("span");
+        const box = document.createElement("i");
+        box.style.background = item.colour ?? colour(place);
+        entry.append(box, item.label);
+        list.append(entry);
+      });
+    return list;
+  }
+
+  canvas(height, width = this.width) {
+    return node("svg", { viewBox: `0 0 ${width} ${height}`, width, height });
+  }
+
+  plane() {
+    const { figure } = this, height = figure.height ?? Math.max(220, Math.min(380, 0.55 * this.width));
+    const svg = this.canvas(height);
+    let [xl, xh] = this.zoom ?? padded(range(extent(figure, "x")), 0.02, figure.logarithmic_x);
+    const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);
+    let [yl, yh] = padded(range(positive(extent(figure, "y"), figure.logarithmic)), 0.05, figure.logarithmic);
+    const left = LETTER * Math.max(...new Axis(yl, yh, 1, 0, figure.logarithmic).ticks(5).map((v) => number(v).length), 3) + 16;
+    const right = 12, top = 24, bottom = 44;
+    if (figure.equal) {
+      const per = Math.max((xh - xl) / (this.width - left - right), (yh - yl) / (height - top - bottom));
+      const wide = (per * (this.width - left - right) - (xh - xl)) / 2, tall = (per * (height - top - bottom) - (yh - yl)) / 2;
+      [xl, xh, yl, yh] = [xl - wide, xh + wide, yl - tall, yh + tall];
+    }
+    const x = new Axis(xl, xh, left, this.width - right, figure.logarithmic_x);
+    const y = new Axis(yl, yh, height - bottom, top, figure.logarithmic);
+    this.frame(svg, x, y, { left, right, top, bottom, height });
+    const clip = `clip-${(Chart.count = (Chart.count ?? 0) + 1)}`;
+    const area = node("clipPath", { id: clip });
+    area.append(node("rect", { x: left, y: top, width: this.width - left - right, height: height - top - bottom }));
+    const inside = node("g", { "clip-path": `url(#${clip})` });
+    svg.append(area, inside);
+    figure.series.forEach((item, place) => this.series(inside, item, place, x, y));
+    this.marks(svg, x, y, { left, right, top, bottom, height });
+    if (figure.series.some((item) => item.kind === "line")) this.zooming(svg, x, top, height - bottom);
+    svg.addEventListener("pointermove", (event) => this.point(event, svg, x, y));
+    svg.addEventListener("pointerleave", () => (this.tip.hidden = true));
+    return svg;
+  }
+
+  frame(svg, x, y, { left, right, top, bottom, height }) {
+    const { figure } = this;
+    for (const value of y.ticks(5)) {
+      svg.append(node("line", { class: "grid", x1: left, x2: this.width - right, y1: y.at(value), y2: y.at(value) }));
+      svg.append(node("text", { class: "tick", x: left - 6, y: y.at(value) + 4, "text-anchor": "end" }, number(value)));
+    }
+    for (const value of x.ticks(Math.max(3, this.width / 110))) {
+      svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - bottom }));
+      svg.append(node("text", { class: "tick", x: x.at(value), y: height - bottom + 16, "text-anchor": "middle" }, number(value)));
+    }
+    svg.append(node("text", { class: "label", x: (left + this.width - right) / 2, y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    svg.append(node("text", { class: "label", x: 4, y: 12 }, figure.y_label ?? "")); // above its axis, where it is read without turning
+  }
+
+  series(inside, item, place, x, y) {
+    const paint = item.colour ?? colour(place), zero = y.at(Math.max(0, y.low));
+    const path = (xs, ys) => {
+      let text = "", open = false;
+      xs.forEach((value, k) => {
+        const known = ys[k] !== null && Number.isFinite(ys[k]);
+        if (known) text += `${open ? "L" : "M"}${x.at(value).toFixed(2)} ${y.at(ys[k]).toFixed(2)}`;
+        open = known;
+      });
+      return text;
+    };
+    if (item.kind === "line") {
+      if (item.low?.length)
+        inside.append(node("path", {
+          d: `${path(item.x, item.high)}${path([...item.x].reverse(), [...item.low].reverse()).replace("M", "L")}Z`,
+          fill: paint, opacity: 0.18,
+        }));
+      inside.append(node("path", { d: path(item.x, item.y), fill: "none", stroke: paint, "stroke-width": item.ghost ? 1 : 1.6, opacity: item.ghost ? 0.6 : 1 }));
+    } else if (item.kind === "points") {
+      item.x.forEach((value, k) => {
+        const dot = node("circle", { cx: x.at(value), cy: y.at(item.y[k]), r: 4.5, fill: paint });
+        inside.append(dot);
+      });
+    } else {
+      const count = this.figure.series.length, histogram = item.kind === "histogram";
+      const wide = histogram ? Math.max(x.at(item.x[0] + item.width) - x.at(item.x[0]) - 0.6, 0.6) : Math.max(2, Math.min(10, 0.28 * (x.at(1) - x.at(0))));
+      item.x.forEach((value, k) => {
+        const tall = zero - y.at(item.y[k]);
+        const shift = histogram ? 0 : (place - (count - 1) / 2) * wide - wide / 2;
+        if (tall > 0) inside.append(node("rect", { x: x.at(value) + shift, y: zero - tall, width: wide, height: tall, fill: paint, opacity: histogram ? 0.55 : 1 }));
+      });
+    }
+  }
+
+  marks(svg, x, y, { left, right, top, bottom, height }) {
+    (this.figure.vertical ?? []).forEach(([value, name], row) => {
+      if (value < x.low || value > x.high) return;
+      const at = x.at(value), end = at > 0.7 * this.width;
+      svg.append(node("line", { class: "mark", x1: at, x2: at, y1: top, y2: height - bottom }));
+      svg.append(node("text", { class: "mark", x: at + (end ? -5 : 5), y: top + 12 + 15 * row, "text-anchor": end ? "end" : "start" }, name));
+    });
+    (this.figure.horizontal ?? []).forEach(([value, name]) => {
+      if (value < y.low || value > y.high) return;
+      svg.append(node("line", { class: "mark", x1: left, x2: this.width - right, y1: y.at(value), y2: y.at(value) }));
+      svg.append(node("text", { class: "mark", x: this.width - right - 4, y: y.at(value) - 5, "text-anchor": "end" }, name));
+    });
+  }
+
+  bars() {
+    const { figure } = this, items = figure.series.filter((item) => item.kind === "bars");
+    const names = items[0].x, narrow = this.width < NARROW;
+    const longest = Math.max(...names.map((name) => String(name).length), 4);
+    const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16, top = 8;
+    const row = (narrow ? 16 : 4) + 14 * items.length + 4, height = top + row * names.length + 44;
+    const svg = this.canvas(height);
+    const values = items.flatMap((item) => [0, ...item.y, ...(item.low ?? []), ...(item.high ?? [])]);
+    const marked = (figure.vertical ?? []).map(([value]) => value);
+    const positive = figure.logarithmic_x ? values.filter((value) => value > 0) : [...values, ...marked];
+    const [low, high] = padded(range(positive), 0.03, figure.logarithmic_x);
+    const x = new Axis(low, high, left, this.width - right, figure.logarithmic_x);
+    for (const value of x.ticks(Math.max(3, (this.width - left) / 110))) {
+      svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - 44 }));
+      svg.append(node("text", { class: "tick", x: x.at(value), y: height - 28, "text-anchor": "middle" }, number(value)));
+    }
+    svg.append(node("text", { class: "label", x: (left + this.width - right) / 2, y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    const zero = x.at(figure.logarithmic_x ? low : Math.max(low, Math.min(0, high)));
+    names.forEach((name, place) => {
+      const from = top + row * place + (narrow ? 16 : 2);
+      svg.append(node("text", narrow ? { class: "tick", x: left, y: from - 4 } : { class: "tick", x: left - 6, y: from + 7 * items.length + 4, "text-anchor": "end" }, name));
+      items.forEach((item, set) => {
+        const end = x.at(item.y[place]), at = from + 14 * set;
+        const bar = node("rect", { x: Math.min(zero, end), y: at + 1, width: Math.max(Math.abs(end - zero), 0.5), height: 12, fill: item.colour ?? colour(figure.series.indexOf(item)) });
+        const text = `${name}, ${item.label}: ${number(item.y[place])}` + (item.low?.length ? ` (${number(item.low[place])}…${number(item.high[place])})` : "");
+        this.tell(bar, text);
+        svg.append(bar);
+        if (item.low?.length) svg.append(node("path", { class: "interval", d: `M${x.at(item.low[place])} ${at + 7}H${x.at(item.high[place])}M${x.at(item.low[place])} ${at + 4}v6M${x.at(item.high[place])} ${at + 4}v6` }));
+      });
+    });
+    this.marks(svg, x, new Axis(0, 1, height, 0), { left, right, top, bottom: 44, height });
+    return svg;
+  }
+
+  heat() {
+    const { figure } = this, longest = Math.max(...figure.rows.map((name) => name.length), 4);
+    const left = 14 + LETTER * longest, cell = Math.max(38, Math.min(80, (this.width - left - 10) / figure.columns.length));
+    const lines = figure.columns.map((name) => String(name).split("\n")), words = lines.flat().map((text) => text.length);
+    const slanted = LETTER * Math.max(...words) > cell - 4; // names that are wider than their column
+    const deep = slanted ? 0.72 * LETTER * Math.max(...figure.columns.map((name) => name.length)) + 8 : 18 * Math.max(...lines.map((own) => own.length));
+    const width = left + cell * figure.columns.length + 10, tall = 22, height = tall * figure.rows.length + deep + 30;
+    const svg = this.canvas(height, width), top = Math.max(...figure.values.flat().filter((value) => value !== null), 0) || 1;
+    figure.rows.forEach((name, row) => {
+      svg.append(node("text", { class: "tick", x: left - 6, y: tall * row + 15, "text-anchor": "end" }, name));
+      figure.columns.forEach((column, place) => {
+        const value = figure.values[row][place], share = Math.max(0, Math.min(1, (value ?? 0) / top));
+        const box = node("rect", { class: "cell", x: left + cell * place, y: tall * row, width: cell - 1, height: tall - 1, "fill-opacity": share.toFixed(3) });
+        this.tell(box, `${name}, ${figure.x_label} ${String(column).replace("\n", " ")}: ${number(value)} ${figure.label}`);
+        svg.append(box);
+        svg.append(node("text", { class: share > 0.55 ? "cell strong" : "cell", x: left + cell * (place + 0.5), y: tall * row + 15, "text-anchor": "middle" }, figure.texts[row][place]));
+      });
+    });
+    const below = tall * figure.rows.length + 15;
+    lines.forEach((own, place) => {
+      const at = left + cell * (place + 0.5);
+      if (slanted) svg.append(node("text", { class: "tick", x: at + 4, y: below - 4, "text-anchor": "end", transform: `rotate(-45 ${at + 4} ${below - 4})` }, own.join(" ")));
+      else own.forEach((text, line) => svg.append(node("text", { class: "tick", x: at, y: below + 16 * line, "text-anchor": "middle" }, text)));
+    });
+    svg.append(node("text", { class: "label", x: left + (width - left) / 2, y: height - 6, "text-anchor": "middle" }, [figure.x_label, figure.label].filter(Boolean).join(" · ")));
+    return svg;
+  }
+
+  tell(shape, text) {
+    shape.append(node("title", {}, text));
+  }
+
+  point(event, svg, x, y) {
+    const box = svg.getBoundingClientRect(), scale = this.width / box.width;
+    const at = (event.clientX - box.left) * scale;
+    if (at < x.from || at > x.to) return void (this.tip.hidden = true);
+    const rows = [], names = [];
+    this.figure.series.forEach((item) => {
+      if (!item.x.length) return;
+      let nearest = 0;
+      const middle = item.kind === "histogram" ? item.width / 2 : 0;
+      item.x.forEach((value, k) => {
+        if (Math.abs(x.at(value + middle) - at) < Math.abs(x.at(item.x[nearest] + middle) - at)) nearest = k;
+      });
+      const value = item.x[nearest];
+      names.push(item.kind === "histogram" ? `${number(value)}…${number(value + item.width)}` : number(value));
+      rows.push(`${item.label}: ${number(item.y[nearest])}` + (item.low?.length ? ` (${number(item.low[nearest])}…${number(item.high[nearest])})` : ""));
+    });
+    this.tip.textContent = [`${this.figure.x_label}: ${names[0]}`, ...rows].join("\n");
+    this.tip.hidden = false;
+    const place = (at / scale), over = place > box.width / 2;
+    this.tip.style.left = over ? "" : `${place + 14}px`;
+    this.tip.style.right = over ? `${box.width - place + 14}px` : "";
+  }
+
+  // Drag over a part of a curve to see it large; a double click shows all again.
+  zooming(svg, x, top, bottom) {
+    let start = null, band = null;
+    const place = (event) => {
+      const box = svg.getBoundingClientRect();
+      return Math.max(x.from, Math.min(x.to, ((event.clientX - box.left) * this.width) / box.width));
+    };
+    svg.addEventListener("pointerdown", (event) => {
+      start = place(event);
+      band = node("rect", { class: "band", x: start, y: top, width: 0, height: bottom - top });
+      svg.append(band);
+    });
+    svg.addEventListener("pointermove", (event) => {
+      if (start === null) return;
+      const now = place(event);
+      band.setAttribute("x", Math.min(start, now));
+      band.setAttribute("width", Math.abs(now - start));
+    });
+    svg.addEventListener("pointerup", (event) => {
+      if (start === null) return;
+      const ends = [x.value(Math.min(start, place(event))), x.value(Math.max(start, place(event)))];
+      const wide = Math.abs(place(event) - start) > 8;
+      band.remove();
+      start = null;
+      if (wide) {
+        this.zoom = ends;
+        this.draw();
+      }
+    });
+    svg.addEventListener("dblclick", () => {
+      this.zoom = null;
+      this.draw();
+    });
+  }
+}

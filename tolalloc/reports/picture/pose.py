@@ -1,0 +1,138 @@
+"""Where a scene puts everything at one carrier angle, as numbers for a drawing that stands still."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from tolalloc.reports.picture.blocks import values_of
+
+_TOOTH = ("exact", "normal")
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Everything at one carrier angle as complex numbers in the housing's plane, errors magnified [mm]."""
+
+    record: Mapping[str, Any]  # The scene
+    carrier_angle: float  # θc [rad]
+    direction: str = "forward"  # Which equilibria are shown, ``forward`` or ``backward``
+
+    def at(self, part: str) -> Float[np.ndarray, " number"]:
+        """Return where the parts of a kind stand [rad]."""
+        return np.asarray(np.array(self.record["start"][part]) + self.record["turns"][part] * self.carrier_angle)
+
+    @cached_property
+    def outline(self) -> Mapping[str, Any]:
+        """Radii and counts."""
+        found: Mapping[str, Any] = self.record["outline"]
+        return found
+
+    def state(self, name: str) -> Float[np.ndarray, "..."]:
+        """Return a quantity of the equilibria, straight between their angles."""
+        values = values_of(self.record[self.direction][name])
+        place = (self.carrier_angle / (2 * np.pi)) % 1.0 * values.shape[0]
+        low = int(place) % values.shape[0]
+        share = place - int(place)
+        return np.asarray(values[low] * (1 - share) + values[(low + 1) % values.shape[0]] * share)
+
+    @cached_property
+    def displacement(self) -> Float[np.ndarray, " coordinate"]:
+        """All coordinates, magnified [mm, rad]."""
+        lengths = self.record["magnification"] * self.state("displacement")
+        return np.asarray(lengths)
+
+    def shift(self, part: str, number: int = 0) -> complex:
+        """Return how far a part is displaced, magnified [mm]."""
+        first = self.record["coordinates"][part][number]
+        return 1e3 * complex(self.displacement[first], self.displacement[first + 1])
+
+    def rotation(self, part: str, number: int = 0) -> float:
+        """Return how far a part is rotated, magnified [rad]."""
+        return float(self.displacement[self.record["coordinates"][part][number] + 2])
+
+    def offset(self, place: str, angle: float) -> complex:
+        """Return how far the axis of a feature is off its place, magnified, its part turned by an angle [mm]."""
+        own = self.record["offsets"].get(place, (0.0, 0.0))
+        return complex(self.record["magnification"] * complex(*own) * np.exp(1j * angle))
+
+    @cached_property
+    def cranks(self) -> Complex[np.ndarray, " crank"]:
+        """Nominal axes of the crankshafts."""
+        return np.asarray(self.outline["crank_circle_radius"] * np.exp(1j * self.at("carrier")))
+
+    @cached_property
+    def discs(self) -> Complex[np.ndarray, " disc"]:
+        """Nominal centres of the discs."""
+        return np.asarray(self.outline["eccentricity"] * np.exp(1j * self.at("crank")))
+
+    def crank(self, crank: int) -> complex:
+        """Return the axis of a crankshaft."""
+        return complex(self.cranks[crank] + self.shift("planet", crank))
+
+    def journal(self, crank: int, disc: int) -> complex:
+        """Return the axis of a journal."""
+        turned = 1j * self.rotation("planet", crank) * self.discs[disc]
+        own = self.offset(f"crank{crank + 1}.journal{disc + 1}", float(self.at("crank")[0]))
+        return complex(self.crank(crank) + self.discs[disc] + turned + own)
+
+    def bore(self, crank: int, disc: int) -> complex:
+        """Return the axis of a disc's bore."""
+        turned = 1j * self.rotation("disc", disc) * self.cranks[crank]
+        own = self.offset(f"disc{disc + 1}.bore{crank + 1}", self.carrier_angle)
+        return complex(self.discs[disc] + self.cranks[crank] + self.shift("disc", disc) + turned + own)
+
+    def carrier_bore(self, crank: int) -> complex:
+        """Return the axis of a carrier's bore."""
+        turned = 1j * self.rotation("carrier") * self.cranks[crank]
+        return complex(
+            self.cranks[crank]
+            + self.shift("carrier")
+            + turned
+            + self.offset(f"carrier.bore{crank + 1}", self.carrier_angle)
+        )
+
+    @cached_property
+    def pins(self) -> Complex[np.ndarray, " pin"]:
+        """Centres of the pins."""
+        return np.asarray(self.outline["pin_circle_radius"] * np.exp(1j * self.at("pin")))
+
+    def contact(self, disc: int) -> tuple[Complex[np.ndarray, " pin"], Complex[np.ndarray, " pin"]]:
+        """Return where the pins touch a disc, and their normals into it.
+
+        The common normal passes through the point about which disc and housing roll.
+        """
+        rolling = self.discs[disc] * self.outline["pin_count"]
+        normal = (rolling - self.pins) / np.abs(rolling - self.pins)
+        return self.pins + self.outline["pin_radius"] * normal, normal
+
+    def teeth(self, disc: int) -> Complex[np.ndarray, " point"]:
+        """Return the outline of a disc whose distance from every pin is the gap, magnified.
+
+        Without modification and errors every tooth touches its pin; from there it is moved along its normal.
+        """
+        tooth, teeth = self.record["tooth"], self.outline["disc_teeth"]
+        turn = np.exp(2j * np.pi * np.arange(teeth) / teeth)
+        exact, normal = (np.multiply.outer(turn, np.asarray(tooth[name]) @ (1.0, 1j)).ravel() for name in _TOOTH)
+        rotated, (point, _) = np.exp(1j * self.at("disc")[disc]), self.contact(disc)
+        seen = np.angle((point - self.discs[disc]) / rotated)
+        gap = 1e3 * self.record["magnification"] * self.state("gap")[disc]
+        away = np.interp(np.angle(exact), seen, gap, period=2 * np.pi)
+        return np.asarray((exact + away * normal) * rotated + self.discs[disc])
+
+
+def gear(teeth: int, module: float, pressure_angle: float) -> Complex[np.ndarray, " point"]:
+    """Return the outline of an involute spur gear about the origin, its first tooth on the x axis [mm]."""
+    pitch = module * teeth / 2
+    base, root = pitch * np.cos(pressure_angle), pitch - 1.25 * module
+    radius = np.array([root, *np.linspace(max(base, root), pitch + module, 6)])
+    rolled = np.arccos(np.minimum(base / np.maximum(radius, base), 1.0))
+    half = 0.98 * np.pi / (2 * teeth) + np.tan(pressure_angle) - pressure_angle - (np.tan(rolled) - rolled)
+    flank = radius * np.exp(-1j * np.maximum(half, 0.0))
+    tooth = np.concatenate([flank, flank.conj()[::-1]])
+    return np.asarray(np.multiply.outer(np.exp(2j * np.pi * np.arange(teeth) / teeth), tooth).ravel())

@@ -1,0 +1,208 @@
+"""The picture of a reducer drawn by matplotlib, from the scene that the module of the page draws too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Complex, Float
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PatchCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Circle, Polygon
+from matplotlib.transforms import Affine2D
+
+from tolalloc.reports.picture.blocks import values_of
+from tolalloc.reports.picture.pose import Pose, gear
+
+_INK, _LINE, _ACCENT, _FORCE = "#1c2733", "#5b6876", "#d9822b", "#b00020"
+_GROOVE, _HOUSING, _STEEL, _DISC, _GEAR, _PAPER = "#c8cbce", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#ffffff"
+_LONGEST = 0.3
+"""Length of the arrow of the largest force over the radius of the pin circle [-]."""
+
+
+def mixed(colour: str, other: str, share: float) -> tuple[float, ...]:
+    """Return red, green and blue of a colour with a share of another one [-]."""
+    return tuple((1 - share) * own + share * more for own, more in zip(to_rgb(colour), to_rgb(other), strict=True))
+
+
+def _points(values: Complex[np.ndarray, " point"]) -> Float[np.ndarray, "point 2"]:
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+class _Pen:
+    """Draws into one view, turned as a whole; places by their share."""
+
+    def __init__(self, axes: Axes, shares: Mapping[str, float], turned: float):
+        self.axes, self.shares = axes, shares
+        self.transform = Affine2D().rotate(turned) + axes.transData
+
+    def colour(self, place: str, colour: str) -> tuple[float, ...]:
+        return mixed(colour, _ACCENT, min(max(self.shares.get(place, 0.0), 0.0), 1.0))
+
+    def circle(self, centre: complex, radius: float, place: str, colour: str, **style: Any) -> None:
+        given = {"facecolor": self.colour(place, colour), "edgecolor": _LINE, "linewidth": 0.7, **style}
+        self.axes.add_patch(Circle((centre.real, centre.imag), radius, transform=self.transform, **given))
+
+    def ring(self, centre: complex, radius: float, place: str, width: float = 1.4, **style: Any) -> None:
+        wide = width * (1.0 + self.shares.get(place, 0.0))
+        edge = self.colour(place, _LINE)
+        self.circle(centre, radius, place, _PAPER, fill=False, edgecolor=edge, linewidth=wide, **style)
+
+    def polygon(self, points: Complex[np.ndarray, " point"], face: Any, edge: Any, width: float) -> None:
+        style = {"facecolor": face, "edgecolor": edge, "linewidth": width, "joinstyle": "round"}
+        self.axes.add_patch(Polygon(_points(points), closed=True, transform=self.transform, **style))
+
+    def lines(self, ends: Complex[np.ndarray, "line 2"], colour: str, width: float) -> None:
+        drawn = LineCollection(
+            list(np.stack([ends.real, ends.imag], axis=-1)), colors=colour, linewidths=width, transform=self.transform
+        )
+        self.axes.add_collection(drawn)
+
+    def output(self, pose: Pose) -> None:
+        """Draw where the output stands, turned further by the magnified transmission error."""
+        outline = pose.outline
+        end, inner = outline["housing_radius"], outline["pin_circle_radius"] + 1.6 * outline["pin_radius"]
+        further = pose.record["magnification"] * float(pose.state("transmission_error"))
+        triangle = np.array([0.995 * end, inner + 0.035j * end, inner - 0.035j * end])
+        self.polygon(triangle * np.exp(1j * (pose.at("carrier")[0] + further)), _INK, _INK, 0.5)
+
+
+def _draw_pins(pen: _Pen, pose: Pose) -> None:
+    """Draw the housing with the pins in their grooves; the disc comes between the two."""
+    outline = pose.outline
+    pen.circle(0j, outline["housing_radius"], "housing.pins", _HOUSING)
+    for place, colour, edge, factor, level in (
+        ("housing.grooves", _GROOVE, "none", 1.45, 1.0),
+        ("pins", _STEEL, _LINE, 1.0, 1.5),
+    ):
+        drawn = PatchCollection(
+            [Circle((at.real, at.imag), factor * outline["pin_radius"]) for at in pose.pins],
+            facecolor=pen.colour(place, colour),
+            edgecolor=edge,
+            linewidth=0.7,
+            transform=pen.transform,
+        )
+        drawn.set_zorder(level)
+        pen.axes.add_collection(drawn)
+    pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
+
+
+def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
+    """Draw a disc with its cranks against the pins."""
+    outline, number = pose.outline, disc + 1
+    _draw_pins(pen, pose)
+    teeth = pose.teeth(disc)
+    edge_colour = pen.colour(f"disc{number}.teeth", _INK)
+    wide = 1.2 * (1.0 + pen.shares.get(f"disc{number}.teeth", 0.0))
+    pen.polygon(teeth, pen.colour(f"disc{number}", _DISC), edge_colour, wide)
+    pen.circle(complex(pose.discs[disc]), outline["disc_hole_radius"], "", _PAPER)
+    centre = complex(pose.discs[disc] + pose.shift("disc", disc))
+    pen.ring(centre, outline["crank_circle_radius"], f"disc{number}.bores", 0.8, linestyle="--")
+    for crank in range(outline["crank_count"]):
+        bore, journal, axis = pose.bore(crank, disc), pose.journal(crank, disc), pose.crank(crank)
+        pen.circle(bore, outline["bore_radius"], "", _PAPER, edgecolor="none")
+        pen.ring(bore, outline["bore_radius"], f"disc{number}.bore{crank + 1}")
+        for other in range(outline["disc_count"]):
+            if other != disc:
+                pen.circle(pose.journal(crank, other), outline["journal_radius"], "", _PAPER, fill=False, alpha=0.4)
+        pen.circle(journal, outline["journal_radius"], f"crank{crank + 1}.journal{number}", "#d5d7d9")
+        pen.circle(axis, 0.45 * outline["journal_radius"], f"crank{crank + 1}", _STEEL)
+        pen.lines(np.array([[axis, journal]]), _INK, 1.4)
+    _draw_forces(pen, pose, disc, largest)
+    pen.output(pose)
+
+
+def _draw_forces(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
+    """Draw the forces of the pins on a disc as arrows."""
+    point, normal = pose.contact(disc)
+    length = _LONGEST * pose.outline["pin_circle_radius"] * pose.state("force")[disc] / largest
+    shown = length > 0.004 * pose.outline["pin_circle_radius"]
+    point, normal, length = point[shown], normal[shown], length[shown]
+    tip, head = point + length * normal, np.minimum(0.35 * length, 0.028 * pose.outline["pin_circle_radius"])
+    pen.lines(np.stack([point, tip], axis=-1), _FORCE, 1.2)
+    barbs = np.stack([tip, tip - head * normal * (1 - 0.5j), tip - head * normal * (1 + 0.5j)], axis=-1)
+    corners = list(np.stack([barbs.real, barbs.imag], axis=-1))
+    pen.axes.add_collection(PolyCollection(corners, facecolor=_FORCE, edgecolor="none", transform=pen.transform))
+
+
+def _draw_first_stage(pen: _Pen, pose: Pose) -> None:
+    """Draw carrier, planets and sun."""
+    outline = pose.outline
+    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
+    pen.circle(pose.shift("carrier"), outline["carrier_radius"], "carrier", _HOUSING)
+
+    def draw_gear(name: str, teeth: int, centre: complex, angle: float) -> None:
+        module = outline["module"]
+        shape = gear(teeth, module, outline["pressure_angle"]) * np.exp(1j * angle) + centre
+        web = max(module * teeth / 2 - 2 * module, 0.35 * module * teeth)
+        pen.polygon(shape, pen.colour(f"{name}.teeth", _GEAR), _LINE, 0.7)
+        pen.circle(centre, web, name, _GEAR)
+        pen.lines(np.array([[centre + share * web * np.exp(1j * angle) for share in (0.65, 0.95)]]), _INK, 1.4)
+
+    for crank in range(outline["crank_count"]):
+        place = f"planet{crank + 1}"
+        centre = pose.crank(crank) + pose.offset(place, float(pose.at("crank")[0]))
+        draw_gear(place, outline["planet_teeth"], centre, float(pose.at("planet")[crank]))
+        pen.ring(pose.carrier_bore(crank), outline["carrier_bore_radius"], f"carrier.bore{crank + 1}")
+        pen.circle(pose.crank(crank), outline["shaft_radius"], f"crank{crank + 1}", _STEEL)
+    sun = float(pose.at("sun")[0])
+    draw_gear("sun", outline["sun_teeth"], pose.shift("sun") + pose.offset("sun", sun), sun)
+    for crank, direction in enumerate(pose.at("carrier")):
+        if pen.shares.get(f"mesh{crank + 1}", 0.0) > 0:
+            at = complex(outline["module"] * outline["sun_teeth"] / 2 * np.exp(1j * direction))
+            pen.ring(at, 1.1 * outline["module"], f"mesh{crank + 1}")
+    pen.output(pose)
+
+
+def longest_arrow(record: Mapping[str, Any]) -> float:
+    """Return the force to which the longest arrow belongs, the largest of the turn either way round [N]."""
+    largest = max(float(values_of(record[direction]["force"]).max()) for direction in ("forward", "backward"))
+    return max(largest, 1e-12)
+
+
+def draw_still(
+    record: Mapping[str, Any],
+    shares: Mapping[str, float],
+    carrier_angle: float = 0.0,
+    *,
+    title: str = "",
+    turned: float = 0.0,
+    discs: Sequence[int] = (),
+    largest: float | None = None,
+) -> Canvas:
+    """Return the picture of a scene.
+
+    Parameters
+    ----------
+    record, shares
+        The scene, and how strongly each place is coloured [-].
+    carrier_angle
+        θc [rad].
+    title
+        What stands above it.
+    turned
+        Angle by which the eye sees all of it turned [rad].
+    discs
+        Numbers of the discs that are shown, from 0; all unless given [-].
+    largest
+        Force of the longest arrow, the largest of the turn unless given [N].
+    """
+    pose, shown = Pose(record, carrier_angle), (*discs,) or (*range(record["outline"]["disc_count"]),)
+    largest = largest or longest_arrow(record)
+    canvas = Canvas(figsize=(3.6 * (len(shown) + 1), 4.2), layout="constrained")
+    views = np.atleast_1d(canvas.subplots(1, len(shown) + 1))
+    reach = 1.02 * record["outline"]["housing_radius"]
+    for axes in views:
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+        axes.axis("off")
+    for disc, axes in zip(shown, views, strict=False):
+        _draw_disc(_Pen(axes, shares, turned), pose, disc, largest)
+        axes.set_title(f"disc {disc + 1} on the pins", fontsize=10, color=_INK)
+    _draw_first_stage(_Pen(views[-1], shares, turned), pose)
+    views[-1].set_title("carrier, planets and sun", fontsize=10, color=_INK)
+    stated = f"errors and gaps {record['magnification']:g} times larger, longest arrow {largest:,.0f} N"
+    canvas.suptitle(f"{title}: {stated}" if title else stated, fontsize=10, color=_INK)
+    return canvas

@@ -1,0 +1,110 @@
+"""What tells people of a result: one teller for each kind of result, a module of `tolalloc.reports.tellers`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+from tolalloc.reports.document import Document, Section
+from tolalloc.reports.header import Header
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Result = TypeVar("Result")
+
+
+class Teller(ABC, Generic[Result]):
+    """What is said and shown of a result.
+
+    Parameters
+    ----------
+    result
+        The numbers.
+    header
+        What every answer says of its run.
+    """
+
+    shown: ClassVar[tuple[str, ...]] = ()
+    """Columns of the first table that a terminal shows; the first six unless a teller says otherwise."""
+
+    def __init__(self, result: Result, header: Header) -> None:
+        self.result, self.header = result, header
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """What the answer is about."""
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        return ", ".join(f"{name} {value:g}" for name, value in self.header.conditions.items() if name != "unit")
+
+    @property
+    @abstractmethod
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return ()
+
+    @property
+    @abstractmethod
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their paragraphs, figures and tables."""
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        return self.header.assumptions
+
+    @property
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units of measurement in the names."""
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """Tables that a command prints above the sentences, each with its title."""
+        return ()
+
+    def add_files(self, folder: Path) -> None:
+        """Add files of its own to a written report; nothing unless a teller says otherwise."""
+
+    @cached_property
+    def document(self) -> Document:
+        """The report on this answer alone."""
+        return Document(
+            title=self.title,
+            subtitle=self.subtitle,
+            answer=self.sentences,
+            warnings=self.warnings,
+            sections=self.sections,
+            assumptions=self.assumptions,
+            summary=self.summary,
+            seed=self.header.seed,
+            manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
+        )
+
+
+_OWN: dict[str, type[Teller[Any]]] = {}
+
+
+def register(kind: str, teller: type[Teller[Any]]) -> None:
+    """Let a teller tell of results of a kind that this package does not know, or instead of its own teller."""
+    _OWN[kind] = teller
+
+
+def teller_of(kind: str, result: Any, header: Header) -> Teller[Any]:
+    """Return what tells of a result: the registered teller, or ``TELLER`` of the module of that kind."""
+    if kind in _OWN:
+        return _OWN[kind](result, header)
+    module = import_module(f"tolalloc.reports.tellers.{kind.replace(' ', '_')}")
+    made: Teller[Any] = module.TELLER(result, header)
+    return made

@@ -1,0 +1,1 @@
+"""One teller for each kind of result: its tables, figures and sentences."""

@@ -1,0 +1,33 @@
+"""The sentences of reports: texts with named gaps in TOML files, which are mended without reading Python.
+
+A gap is written as Python's ``str.format`` has it, ``{share:.2%}``; which sentence is said, and what fills its gaps,
+is the teller's.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+
+@lru_cache(maxsize=64)
+def _texts(name: str) -> dict[str, str]:
+    text = files("tolalloc.reports").joinpath("sentences", f"{name}.toml").read_text(encoding="utf-8")
+    return {key: " ".join(value.split()) for key, value in tomllib.loads(text).items()}
+
+
+class Sentences:
+    """The sentences of one teller, ``tolalloc/reports/sentences/NAME.toml``.
+
+    >>> Sentences("costs")("assumption")
+    'the error of a cost is relative, and the same at all zones'
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __call__(self, key: str, /, **gaps: Any) -> str:
+        """Return a sentence with its gaps filled; a key or gap that is missing is the teller's fault, a KeyError."""
+        return _texts(self._name)[key].format(**gaps)

@@ -1,0 +1,169 @@
+"""Page, workbook, tables and pictures of a report: one folder that works offline."""
+
+from __future__ import annotations
+
+import json
+import platform
+from base64 import b64encode
+from datetime import date
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup, escape
+
+from tolalloc.reading.files import no_formula
+from tolalloc.reports.charts import chart
+from tolalloc.reports.document import Document
+from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.figure import Figure, HeatMap
+from tolalloc.reports.glossary import words_in
+from tolalloc.reports.html_table import html_table
+from tolalloc.reports.page import as_json, scripts, style
+from tolalloc.running.compiled import processor, thread_count
+
+_LARGE = (24, 15)
+"""Rows and columns beyond which a table is folded [-]."""
+_SENTENCES = 4
+"""Sentences of each answer on a first page that shows more than one answer [-]."""
+_MOVING = "moving"
+_LISTED = 6
+"""Sections beyond which a page begins with a list of them [-]."""
+_LIBRARIES = (
+    *("numpy", "scipy", "numba", "cvxpy", "clarabel", "highspy"),
+    *("pymoo", "SALib", "pandas", "scikit-learn"),
+)
+
+
+def _is_large(frame: pd.DataFrame) -> bool:
+    """Return whether a page shows a table only when it is asked for."""
+    return len(frame) > _LARGE[0] or frame.shape[1] > _LARGE[1]
+
+
+def inline_png(figure: Figure | HeatMap) -> str:
+    """Return a figure as an image that stands in the page itself."""
+    from tolalloc.reports.plots import drawn
+
+    buffer = BytesIO()
+    drawn(figure).savefig(buffer, dpi=80, format="png")
+    return f'<img alt="{escape(figure.title)}" src="data:image/png;base64,{b64encode(buffer.getvalue()).decode()}">'
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that computes."""
+    own = {"tolalloc": version("tolalloc"), "python": platform.python_version()}
+    return own | {name: version(name) for name in _LIBRARIES}
+
+
+def write_document(document: Document, folder: Path) -> None:
+    """Write ``report.html``, ``results.xlsx``, ``summary.json``, tables, figures and, last, ``manifest.json``.
+
+    The folder has no such files yet. What draws is imported here: many ask this module for a table alone.
+    """
+    from tolalloc.reports.plots import save_png
+
+    figures = folder / "figures"
+    figures.mkdir(parents=True)
+    _write_page(document, folder / "report.html")
+    (folder / "tables").mkdir()
+    for name, frame in document.tables.items():
+        write_csv(frame, folder / "tables" / f"{name}.csv")
+    assumptions = pd.DataFrame({"assumption": document.assumptions})
+    write_sheets({**document.tables, "assumptions": assumptions}, folder / "results.xlsx")
+    for name, figure in document.figures.items():
+        save_png(figure, figures / f"{name}.png")
+    write_json(document.summary, folder / "summary.json")
+    known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
+    machine = {"processor": processor(), "threads": thread_count(), "versions": versions()}
+    write_json({**known, **machine}, folder / "manifest.json")
+
+
+def write_csv(frame: pd.DataFrame, path: Path) -> None:
+    """Write a table in which no text becomes a formula of a spreadsheet."""
+    frame.rename(columns=no_formula).map(no_formula).to_csv(path, index=False, encoding="utf-8")
+
+
+def _answers(document: Document) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return title and sentences of every answer; a report alone has no title beside its own."""
+    return document.answers or (("", document.answer),)
+
+
+def _is_shortened(document: Document) -> bool:
+    """Return whether the first page has only the first sentences, as a drawing or another answer stands there too."""
+    return bool(document.answers) or any(section.first for section in document.sections)
+
+
+def _told(document: Document) -> list[tuple[str, tuple[str, ...]]]:
+    """Return what the box of the first page says."""
+    most = _SENTENCES if _is_shortened(document) else None
+    return [(title, sentences[:most]) for title, sentences in _answers(document)]
+
+
+def _block(document: Document) -> list[tuple[str, str]]:
+    """Return the title block: what is not known stays empty, to be filled in by hand."""
+    known = {"study": str((document.manifest or {}).get("study", document.title)), **document.title_block}
+    labels = ("study", "drawing number", "revision", "author")
+    return [*((label, known.get(label, "")) for label in labels), ("date", date.today().isoformat())]
+
+
+def _in_full(document: Document) -> list[dict[str, Any]]:
+    """Return the answers in full where the first page has only their first sentences."""
+    return [
+        {"part": title, "heading": "The answer in full", "paragraphs": sentences, "figures": (), "tables": ()}
+        for title, sentences in _answers(document)
+        if _is_shortened(document) and len(sentences) > _SENTENCES
+    ]
+
+
+def _drawn_by(record: dict[str, Any]) -> tuple[str, str, Markup]:
+    """Return the title of a figure, what kind of script draws it, and the record that it is drawn from."""
+    return record["title"], _MOVING if "scene" in record else "figure", as_json(record)
+
+
+def _write_page(document: Document, path: Path) -> None:
+    """Write the page, all that it shows inside."""
+    sections: list[dict[str, Any]] = [
+        {
+            "part": section.part,
+            "heading": section.heading,
+            "first": section.first,
+            "paragraphs": section.paragraphs,
+            "figures": [_drawn_by(chart(figure)) for figure in section.figures],
+            "tables": [
+                (name, len(frame), _is_large(frame) and not section.unfolded, html_table(frame))
+                for name, frame in section.tables
+            ],
+        }
+        for section in document.sections
+    ]
+    for full in reversed(_in_full(document)):
+        sections.insert(next((at for at, own in enumerate(sections) if own["part"] == full["part"]), 0), full)
+    for number, section in enumerate(sections, start=1):
+        section["number"] = number
+    page = Environment(
+        loader=PackageLoader("tolalloc.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    ).get_template("document.html.j2")
+    headers = [str(header) for frame in document.tables.values() for header in frame.columns]
+    texts = [*document.answer, *document.warnings, *(own.heading for own in document.sections), *headers]
+    texts += [paragraph for own in document.sections for paragraph in own.paragraphs]
+    moving = any(kind == _MOVING for own in sections for _, kind, _ in own["figures"])
+    content = page.render(
+        document=document,
+        style=style(moving=moving),
+        scripts=scripts(moving=moving),
+        answers=_told(document),
+        block=_block(document),
+        footer=document.title.replace("\\", "").replace('"', "”"),
+        sections=sections,
+        is_long=len(sections) > _LISTED,
+        glossary=words_in(texts) if len(sections) > _LISTED else (),
+    )
+    path.write_text(content, encoding="utf-8")
+
+
+def write_json(content: dict[str, Any], path: Path) -> None:
+    """Write a JSON file."""
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,243 @@
+"""Surrogates: Chebyshev polynomials in a box, and regressions that earn their place by Q² on answers not seen."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.polynomial import chebyshev
+from scipy.stats import qmc
+
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models.model import Evaluation
+
+HELD_OUT = 0.2
+"""Answers that the fit does not see, over those that it sees [-]."""
+
+_RUNS_PER_TERM = 2.5
+
+Answers = Callable[[Float[np.ndarray, "sample variable"]], Float[np.ndarray, "sample output"]]
+"""What is stood in for: outputs of every row of variables."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxPolynomial:
+    """A fitted stand-in for a function with many outputs."""
+
+    # The box [variable]
+    lower: Float[np.ndarray, " variable"]
+    upper: Float[np.ndarray, " variable"]
+    degrees: Int[np.ndarray, "term variable"]  # Degree of each term in each variable [-]
+    coefficients: Float[np.ndarray, "term output"]  # Coefficient of each term for each output [output]
+    # Root-mean-square and largest error on held-out answers, over all outputs [output]
+    rms_error: float
+    largest_error: float
+    # Numbers of answers [-]
+    trained: int
+    held_out: int
+
+    def __call__(self, x: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample output"]:
+        """Return the outputs of every sample."""
+        return np.asarray(terms(self._scaled(x), self.degrees) @ self.coefficients)
+
+    def derivatives(self, x: Float[np.ndarray, " variable"]) -> Float[np.ndarray, "output variable"]:
+        """Return the derivatives of the outputs at one point by the variables [output/variable]."""
+        by_variable = [
+            self._slopes @ factor for factor in chebyshev.chebvander(self._scaled(x[np.newaxis])[0], self._top)
+        ]
+        values = chebyshev.chebvander(self._scaled(x[np.newaxis])[0], self._top)
+        columns = []
+        for own in range(x.size):
+            factors = [
+                (by_variable if variable == own else values)[variable][self.degrees[:, variable]]
+                for variable in range(x.size)
+            ]
+            slope = np.prod(factors, axis=0) @ self.coefficients
+            columns.append(slope * 2.0 / (self.upper[own] - self.lower[own]))
+        return np.stack(columns, axis=1)
+
+    @property
+    def _top(self) -> int:
+        return int(self.degrees.max())
+
+    @cached_property
+    def _slopes(self) -> Float[np.ndarray, "degree degree"]:
+        """Derivative of each Chebyshev polynomial in terms of the others."""
+        size = self._top + 1
+        slopes = np.zeros((size, size))
+        for degree in range(1, size):
+            own = chebyshev.chebder(np.eye(size)[degree])
+            slopes[degree, : own.size] = own
+        return slopes
+
+    def _scaled(self, x: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
+        """Return the variables on −1…1."""
+        return np.asarray((2.0 * x - self.lower - self.upper) / (self.upper - self.lower))
+
+
+def terms(
+    x: Float[np.ndarray, "sample variable"], degrees: Int[np.ndarray, "term variable"]
+) -> Float[np.ndarray, "sample term"]:
+    """Return the products of Chebyshev polynomials of every sample.
+
+    Parameters
+    ----------
+    x
+        Variables on −1…1 [-].
+    degrees
+        Degree of each term in each variable [-].
+    """
+    values = np.moveaxis(chebyshev.chebvander(x, int(degrees.max())), 1, 0)
+    return np.asarray(np.prod([values[own][:, degrees[:, own]] for own in range(x.shape[1])], axis=0))
+
+
+def total_degrees(variables: int, degree: int) -> Int[np.ndarray, "term variable"]:
+    """Return all terms whose degrees add up to no more than ``degree`` [-]."""
+    return np.array([row for row in product(range(degree + 1), repeat=variables) if sum(row) <= degree])
+
+
+def fit_box_polynomial(
+    answers: Answers,
+    lower: Float[np.ndarray, " variable"],
+    upper: Float[np.ndarray, " variable"],
+    degree: int,
+    seeds: SeedTree,
+) -> BoxPolynomial:
+    """Return the polynomial of least squares through answers at evenly scattered points of the box.
+
+    Parameters
+    ----------
+    answers
+        What is stood in for; it must answer everywhere in the box.
+    lower, upper
+        The box [variable].
+    degree
+        Largest total degree of a term [-].
+    seeds
+        Node of the seed tree.
+    """
+    degrees = total_degrees(lower.size, degree)
+    trained = int(np.ceil(_RUNS_PER_TERM * len(degrees)))
+    held_out = int(np.ceil(HELD_OUT * trained))
+    runs = trained + held_out
+    scattered = qmc.Sobol(lower.size, rng=seeds.generator()).random_base2((runs - 1).bit_length())[:runs]
+    # Denser towards the sides, where a polynomial through even points would be worst.
+    seen = -np.cos(np.pi * scattered[:trained])
+    x = np.concatenate([seen, 2.0 * scattered[trained:] - 1.0])
+    y = answers(lower + (x + 1.0) / 2.0 * (upper - lower))
+    coefficients = np.linalg.lstsq(terms(x[:trained], degrees), y[:trained], rcond=None)[0]
+    error = terms(x[trained:], degrees) @ coefficients - y[trained:]
+    return BoxPolynomial(
+        lower=lower,
+        upper=upper,
+        degrees=degrees,
+        coefficients=coefficients,
+        rms_error=float(np.sqrt((error**2).mean())),
+        largest_error=float(np.abs(error).max()),
+        trained=trained,
+        held_out=held_out,
+    )
+
+
+NEEDED_Q2 = 0.95
+"""A surrogate below this Q² is not used; the response itself runs instead."""
+
+
+Baseline = Callable[[Float[np.ndarray, "sample column"]], Float[np.ndarray, " sample"]]
+
+
+def _no_baseline(x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
+    """Return one for every sample."""
+    return np.ones(x.shape[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regression:
+    """A fitted regression in place of a response with one output."""
+
+    # As in `tolalloc.models.model.Response`
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    estimator: Any  # The fitted scikit-learn estimator of the output over the baseline
+    baseline: Baseline = _no_baseline  # A rough answer that the estimator corrects
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the predictions."""
+        values = np.asarray(self.estimator.predict(x) * self.baseline(x), dtype=float)
+        return Evaluation(values=values.reshape(-1, 1), status=np.zeros(x.shape[0], np.uint8))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegressionCandidate:
+    """A regression that may stand in for a response with one output."""
+
+    name: str  # What a table calls it
+    # As in `tolalloc.models.model.Response`
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...]
+    estimator: Callable[[], Any]  # Makes the unfitted scikit-learn regressor
+    baseline: Baseline = _no_baseline  # A rough positive answer; the regressor learns the ratio to it
+
+    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
+        """Return the regression through answers."""
+        estimator = fitted(self.estimator(), x, y / self.baseline(x))
+        return Regression(columns=self.columns, outputs=self.outputs, estimator=estimator, baseline=self.baseline)
+
+
+def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
+    """Return the fitted estimator."""
+    from sklearn.exceptions import ConvergenceWarning
+
+    with warnings.catch_warnings():
+        # A length or the noise at its bound only says that a column, or noise, does not matter; a path of weights that
+        # ends early is judged by its error like every other.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return estimator.fit(x, y)
+
+
+def on_products_of_two(regressor: Any) -> Any:
+    """Return a linear regressor on the columns and all products of two of them."""
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+    return make_pipeline(StandardScaler(), PolynomialFeatures(2, include_bias=False), StandardScaler(), regressor)
+
+
+def quadratic_regression() -> Any:
+    """Return a ridge regression on all products of two columns."""
+    from sklearn.linear_model import RidgeCV
+
+    return on_products_of_two(RidgeCV(np.logspace(0, 5, 11)))
+
+
+def sparse_quadratic_regression() -> Any:
+    """Return a regression on those products of two columns that the LASSO keeps."""
+    return on_products_of_two(lasso())
+
+
+def lasso() -> Any:
+    """Return a linear regressor that keeps few columns, how few found by cross-validation."""
+    from sklearn.compose import TransformedTargetRegressor
+    from sklearn.linear_model import LassoCV
+    from sklearn.preprocessing import StandardScaler
+
+    return TransformedTargetRegressor(LassoCV(alphas=np.logspace(-2.5, 0, 14), cv=3), transformer=StandardScaler())
+
+
+def gaussian_process(columns: int) -> Any:
+    """Return a Gaussian process of the logarithm of a positive output, one length per column, and noise."""
+    from sklearn.compose import TransformedTargetRegressor
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    kernel = ConstantKernel(10.0) * RBF(np.full(columns, 3.0), (0.3, 1e3)) + WhiteKernel(1e-3, (1e-8, 1.0))
+    process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=1))
+    return TransformedTargetRegressor(process, func=np.log, inverse_func=np.exp)

@@ -1,0 +1,194 @@
+"""The error and the speed of candidates for a surrogate, on answers that none of them has seen.
+
+Folds outside: every unit is predicted by a fit that has not seen it. Whatever a candidate tunes (a weight, the length
+of a Gaussian process), it tunes inside the fold that it is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.models.model import Evaluation, Response
+
+FOLDS = 5
+FEWEST_OF_FOLD = 2
+"""Samples of a fold, without which its error has no scatter [-]."""
+_CLOCKED, _CLOCKED_FOLDS = 256, 2
+"""Samples of some folds on which the candidate and the response are clocked, the shortest time of a fold counts [-]."""
+
+
+@runtime_checkable
+class Candidate(Protocol):
+    """What becomes a surrogate when it is fitted."""
+
+    @property
+    def name(self) -> str:
+        """What a table calls it."""
+        ...
+
+    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Response:
+        """Return the surrogate through the answers."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answers:
+    """Good answers of a response, dealt out to folds."""
+
+    x: Float[np.ndarray, "sample column"]  # Columns of every sample [m, angles rad]
+    y: Float[np.ndarray, " sample"]  # The answers [output]
+    fold: Int[np.ndarray, " sample"]  # Fold of every sample [-]
+    response: Response  # What gave the answers
+    failed: int  # Failed samples, which are left out [-]
+
+    @property
+    def splits(self) -> list[tuple[Bool[np.ndarray, " sample"], Bool[np.ndarray, " sample"]]]:
+        """Samples to fit and samples to predict, fold by fold."""
+        return [(self.fold != own, self.fold == own) for own in range(int(self.fold.max()) + 1)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """What a candidate is worth on held-out answers."""
+
+    name: str  # The candidate
+    q2: float  # Predictivity 1 − Σ(error²)/Σ(deviation from the training mean²) [-]
+    rms_error: float  # Root-mean-square error [output]
+    quantile_error: float  # Quantile of the predictions less that of the answers [output]
+    quantile: float  # Quantile of the answers [output]
+    target: float  # Share of the units below that quantile [-]
+    speed: float  # Predictions in the time of one answer [-]
+    per_second: float  # Predictions per second [1/s]
+    # Answers that each fit saw, at least; answers that were predicted [-]
+    trained: int
+    held_out: int
+    failed: int  # Failed predictions, which the errors leave out [-]
+
+    @property
+    def quantile_share(self) -> float:
+        """Error of the quantile over the quantile [-]."""
+        return self.quantile_error / self.quantile
+
+    @property
+    def quantile_name(self) -> str:
+        """Which quantile is compared."""
+        return f"{100 * self.target:.6g} % quantile"
+
+
+def answers_of(
+    response: Response,
+    x: Float[np.ndarray, "sample column"],
+    seeds: SeedTree,
+    folds: int = FOLDS,
+    largest_failed_share: float = 0.01,
+    evaluation: Evaluation | None = None,
+) -> Answers:
+    """Return the answers of a response in random folds.
+
+    Parameters
+    ----------
+    response
+        What is stood in for; its first output counts.
+    x
+        Columns of every sample [m, angles rad].
+    seeds
+        Node of the seed tree.
+    folds
+        Number of folds [-].
+    largest_failed_share
+        Share of samples that may fail [-].
+    evaluation
+        What the response says of the samples, where that is known.
+
+    Raises
+    ------
+    InputError
+        Fewer than two folds, or fewer than two samples for each.
+    SolveError
+        More samples failed.
+    """
+    if not 2 <= folds <= x.shape[0] // FEWEST_OF_FOLD:
+        raise InputError.at("surrogate", "folds", folds, f"2 to half of the {x.shape[0]} samples")
+    fold = np.empty(x.shape[0], int)
+    fold[seeds.generator().permutation(fold.size)] = np.arange(fold.size) % folds
+    if evaluation is None:
+        evaluation = response(x)
+    good, y = evaluation.good, evaluation.values[:, 0]
+    failed = int((~good).sum())
+    if failed > largest_failed_share * fold.size:
+        raise SolveError(
+            f"Surrogate: {failed} of {fold.size} samples to learn from failed; allowed is {largest_failed_share:.4g} "
+            "of them."
+        )
+    return Answers(x=x[good], y=y[good], fold=fold[good], response=response, failed=failed)
+
+
+def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9973) -> Score:
+    """Return what a candidate is worth where every answer is predicted by a fit to the other folds.
+
+    Parameters
+    ----------
+    candidate
+        What may become the surrogate.
+    answers
+        Answers of what it would stand in for.
+    quantile
+        Share of the units below the quantile that is compared [-].
+
+    Raises
+    ------
+    InputError
+        A quantile outside 0 to 1.
+    SolveError
+        Not one prediction is good.
+
+    Notes
+    -----
+    The clocked speed alone differs from run to run.
+    """
+    if not 0.0 < quantile < 1.0:
+        raise InputError.at("surrogate", "quantile", quantile, "a number between 0 and 1")
+    predicted, mean = np.full(answers.y.size, np.nan), np.empty(answers.y.size)
+    seconds, own_seconds, trained = list[float](), list[float](), list[int]()
+    for seen, unseen in answers.splits:
+        fitted = candidate.fit(answers.x[seen], answers.y[seen])
+        evaluation = fitted(answers.x[unseen])
+        predicted[unseen] = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+        mean[unseen] = answers.y[seen].mean()
+        if len(seconds) < _CLOCKED_FOLDS:  # in turns, so that another program slows both down alike
+            few = answers.x[unseen][:_CLOCKED]
+            seconds.append(_seconds(answers.response, few))
+            own_seconds.append(_seconds(fitted, few))
+        trained.append(int(seen.sum()))
+    good = np.isfinite(predicted)
+    if not good.any():
+        raise SolveError(f"Surrogate: every prediction of {candidate.name} failed.")
+    y, error = answers.y[good], predicted[good] - answers.y[good]
+    limit = float(np.quantile(y, quantile))
+    return Score(
+        name=candidate.name,
+        q2=float(1 - (error**2).sum() / ((y - mean[good]) ** 2).sum()),
+        rms_error=float(np.sqrt((error**2).mean())),
+        quantile_error=float(np.quantile(predicted[good], quantile)) - limit,
+        quantile=limit,
+        target=quantile,
+        speed=min(seconds) / min(own_seconds),
+        per_second=1 / min(own_seconds),
+        trained=min(trained),
+        held_out=answers.y.size,
+        failed=int((~good).sum()),
+    )
+
+
+def _seconds(response: Response, x: Float[np.ndarray, "sample column"]) -> float:
+    """Return the time that a response takes for one sample [s]."""
+    start = perf_counter()
+    response(x)
+    return float((perf_counter() - start) / x.shape[0])

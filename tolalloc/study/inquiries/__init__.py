@@ -1,0 +1,1 @@
+"""Questions that a command asks without a study: one record each."""
