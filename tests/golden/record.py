@@ -71,8 +71,17 @@ def prose_of(page: Path) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def recorded(case: Case, folder: Path) -> tuple[str, dict[str, object]]:
-    """Run a case in an empty folder and return its prose and its numbers."""
+def recorded(case: Case) -> tuple[str, dict[str, object]]:
+    """Run a case in an empty folder and return its prose and its numbers.
+
+    Tables of a terminal are wrapped by the length of the paths in them, so the folder's name has one length everywhere.
+    """
+    place = "/tmp" if Path("/tmp").is_dir() else None
+    with tempfile.TemporaryDirectory(dir=place) as made:
+        return _recorded(case, Path(made))
+
+
+def _recorded(case: Case, folder: Path) -> tuple[str, dict[str, object]]:
     for name, text in case.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     prose, numbers = "", dict[str, object]()
@@ -131,8 +140,7 @@ def main(words: list[str]) -> int:
     names = [word for word in words if word != "--check"] or list(CASES)
     different = 0
     for name in names:
-        with tempfile.TemporaryDirectory() as made:
-            prose, numbers = recorded(CASES[name], Path(made))
+        prose, numbers = recorded(CASES[name])
         text = json.dumps(numbers, ensure_ascii=False, indent=1) + "\n"
         if "--check" in words:
             was = [

@@ -38,8 +38,8 @@ def require_alike(before: str, now: str, relative: float) -> None:
 @pytest.mark.parametrize(
     "name", [name if name in DEFAULT else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
 )
-def test_a_command_says_and_writes_what_it_did(name, tmp_path):
-    prose, numbers = recorded(CASES[name], tmp_path)
+def test_a_command_says_and_writes_what_it_did(name):
+    prose, numbers = recorded(CASES[name])
     before, known = kept(name)
     require_alike(before, prose, 1e-3)
     require_alike(json.dumps(known, indent=1), json.dumps(numbers, indent=1), 1e-6)
