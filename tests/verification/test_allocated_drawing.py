@@ -28,9 +28,9 @@ from tolalloc.allocation.cost.process_costs_file import load_process_costs
 from tolalloc.allocation.cost.sampled import Spline, Tabulated
 from tolalloc.allocation.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
-from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
+from tolalloc.reports.feature_frame import callout
 
 UM = 1e-6
 SEARCH = QUICK_ALLOCATION.search

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawings.callouts import callout, callout_assumptions, written
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -16,7 +15,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation
-from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, svg_of
+from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, callout, callout_assumptions, svg_of, written
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.regrouped import regrouped
 from tolalloc.sensitivity.sobol import sobol_indices

@@ -53,7 +53,6 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
     from tolalloc.drawings.plausibility import doubts
     from tolalloc.reading.units import COST_UNITS
-    from tolalloc.reports.currency import in_currency
 
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
@@ -79,8 +78,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     if "allocation" in kinds:
         cost = float(space.cost(space.uniform(1.0)))
         locked = f", those that are locked {space.locked_cost:.2f} of it" if space.locked_cost else ""
-        said = f"The zones of the table cost {cost:.2f} {COST_UNITS}{locked}."
-        lines.append(in_currency(said, prepared.currency))
+        lines.append(f"The zones of the table cost {cost:.2f} {prepared.currency or COST_UNITS}{locked}.")
         summary |= {"cost of the tolerance table [cost units]": cost}
     neglected = [source.name for source in errors.sources if source.zone == 0.0]
     if neglected:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +24,7 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_r
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file
 from tolalloc.reading.files import found_from_here, write_new
-from tolalloc.reading.units import currency_in
-from tolalloc.reports.currency import in_currency
+from tolalloc.reading.units import COST_UNITS, currency_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -155,7 +155,7 @@ class Drawing:
 
     def to_frame(self) -> pd.DataFrame:
         """Return the tolerance table, units in the headers."""
-        return in_currency(table_frame(self.sources), self.currency)
+        return table_frame(self.sources, cost_unit=self.currency or COST_UNITS)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
@@ -173,9 +173,8 @@ class Drawing:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the name and the table."""
-        from tolalloc.reports.html_table import html_table
-
-        return f"<p><b>{self.name}: {len(self.sources)} sources</b></p>\n{html_table(self.to_frame())}"
+        table = self.to_frame().to_html(index=False, border=0, classes="data", float_format="{:.6g}".format)
+        return f"<p><b>{escape(self.name)}: {len(self.sources)} sources</b></p>\n{table}"
 
 
 def load_drawing(

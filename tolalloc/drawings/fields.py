@@ -407,5 +407,12 @@ COLUMNS = {
 }
 """Field → what a table knows of it."""
 
-HEADERS = {name: f"{name} [{column.unit}]" if column.unit else name for name, column in COLUMNS.items()}
-"""Field → header of its column."""
+
+def headers_in(cost_unit: str) -> dict[str, str]:
+    """Return field → header of its column, in a table whose costs are in cost units or a currency."""
+    units = {name: cost_unit if own.unit == COST_UNITS else own.unit for name, own in COLUMNS.items()}
+    return {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+
+
+HEADERS = headers_in(COST_UNITS)
+"""Field → header of its column, costs in cost units."""

@@ -10,7 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, HEADERS, UNITS, Cell, ToleranceRow
+from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in
 from tolalloc.drawings.process_capability import load_process_capabilities, with_process
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import (
@@ -24,8 +24,7 @@ from tolalloc.drawings.table_file import (
 )
 from tolalloc.exceptions import Faults, InputError
 from tolalloc.reading.files import no_formula, shipped_or_path, validated
-from tolalloc.reading.units import MICROMETRE
-from tolalloc.reports.currency import in_currency
+from tolalloc.reading.units import COST_UNITS, MICROMETRE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -108,7 +107,7 @@ def sources_of_rows(
 
 
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
-    """Return the cells of the sources in the order of `HEADERS`.
+    """Return the cells of the sources in the order of `COLUMNS`.
 
     Files of measured parts are named from the folder that the table is written to; without one in such a way that they
     are found from everywhere.
@@ -127,11 +126,11 @@ def _written(cell: Cell, folder: Path | None) -> str | int | float:
     return str(cell) if isinstance(cell, str) else cell
 
 
-def table_frame(sources: Sequence[Source], folder: Path | None = None) -> pd.DataFrame:
+def table_frame(sources: Sequence[Source], folder: Path | None = None, cost_unit: str = COST_UNITS) -> pd.DataFrame:
     """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
     import pandas as pd
 
-    return pd.DataFrame(table_rows(sources, folder), columns=list(HEADERS.values()))
+    return pd.DataFrame(table_rows(sources, folder), columns=list(headers_in(cost_unit).values()))
 
 
 def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
@@ -160,7 +159,7 @@ def table_text(sources: Sequence[Source], folder: Path | None = None, currency: 
     """Return the sources as the CSV file that `load_tolerance_table` reads, costs in a currency if they are in one."""
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(in_currency(tuple(HEADERS.values()), currency))
+    writer.writerow(headers_in(currency or COST_UNITS).values())
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 

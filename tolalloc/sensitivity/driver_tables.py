@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reports.feature_frame import Frames
+from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol_analysis import SobolIndices

@@ -23,11 +23,10 @@ from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
 from tolalloc.allocation.local_model import Side as LimitedSide
-from tolalloc.drawings.callouts import callout
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.currency import in_currency
 from tolalloc.reports.excel import Formula, keep_values
-from tolalloc.reports.feature_frame import FeatureFrame
+from tolalloc.reports.feature_frame import FeatureFrame, callout
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

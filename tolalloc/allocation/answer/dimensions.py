@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from tolalloc.drawings.callouts import callout
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
-from tolalloc.reports.feature_frame import FeatureFrame, Frames
+from tolalloc.reports.feature_frame import FeatureFrame, Frames, callout
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.wording import short, with_unit
 

@@ -9,8 +9,8 @@ import numpy as np
 from tolalloc.allocation.answer.tables import limit_price
 from tolalloc.allocation.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verification import VerifiedDesign
-from tolalloc.drawings.callouts import callout_assumptions
 from tolalloc.reading.units import unit_of
+from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.wording import QUICK_RUN, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
