@@ -11,9 +11,7 @@ from published.modification_comparison import compared, comparison_document
 import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.modification.problem import reference
-from tolalloc.reducers.modification.request import ModificationRequest
-from tolalloc.reducers.modification.residual_gap import closed_form, residual_gap
+from tolalloc.reducers.modification import ModificationRequest, closed_form, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section
 

@@ -11,7 +11,7 @@ import pandas as pd
 import tolalloc as ta
 from tolalloc.exceptions import SolveError
 from tolalloc.reading.units import ARCSECOND, RPM
-from tolalloc.reducers.dynamics.properties import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
+from tolalloc.reducers.dynamics.motion import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
 from tolalloc.reducers.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer

@@ -17,9 +17,7 @@ from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.assessment import assess
 from tolalloc.reducers.cycloid.mesh import flank_angle
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.modification.problem import reference
-from tolalloc.reducers.modification.request import ModificationRequest
-from tolalloc.reducers.modification.rotated_profile import METRICS, rotated_profile_fit
+from tolalloc.reducers.modification import METRICS, ModificationRequest, reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.teeth.figures import clearance_figure

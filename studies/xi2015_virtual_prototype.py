@@ -14,8 +14,7 @@ import tolalloc as ta
 from tolalloc.cli.progress import shown_progress
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, RPM
-from tolalloc.reducers.multibody.prototype import with_rigid_bearings
-from tolalloc.reducers.multibody.system import engine
+from tolalloc.reducers.dynamics.prototype import engine, with_rigid_bearings
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.simulation.answer import SimulationAnswer

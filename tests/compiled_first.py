@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of
-from tolalloc.reducers.dynamics.properties import Damping, inertia_of, newmark
+from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, inertia_of, motion_of, newmark
 from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces

@@ -29,10 +29,15 @@ from scipy.optimize import brentq
 
 from tests.random_units import random_units
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of, nominal_acceleration
-from tolalloc.reducers.dynamics.properties import Damping, generalised_alpha, inertia_of
-from tolalloc.reducers.dynamics.simulation import simulate
-from tolalloc.reducers.dynamics.tables import Steps
+from tolalloc.reducers.dynamics.motion import (
+    Damping,
+    SpeedProfile,
+    generalised_alpha,
+    inertia_of,
+    motion_of,
+    nominal_acceleration,
+)
+from tolalloc.reducers.dynamics.simulation import Steps, simulate
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel

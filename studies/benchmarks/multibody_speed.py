@@ -24,7 +24,7 @@ from numpy_cores import timed
 
 from tolalloc.cli.progress import shown_progress
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.properties import Damping
+from tolalloc.reducers.dynamics.motion import Damping
 from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
 from tolalloc.reducers.simulation.answer import SimulationAnswer
 from tolalloc.reducers.simulation.request import (

@@ -24,7 +24,7 @@ from pymoo.optimize import minimize
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.modification.problem import Amounts, ModificationProblem
+from tolalloc.reducers.modification import Amounts, ModificationProblem
 
 from .modification_searches import Recorder, SearchResult
 

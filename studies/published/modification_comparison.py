@@ -11,9 +11,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.modification.answer import ModificationAnswer
-from tolalloc.reducers.modification.problem import ModificationProblem
-from tolalloc.reducers.modification.request import ModificationRequest, choose
+from tolalloc.reducers.modification import ModificationAnswer, ModificationProblem, ModificationRequest, choose
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.teeth.answer import span
 from tolalloc.reports.document import Document, Section

@@ -19,7 +19,7 @@ from scipy.optimize import minimize as minimize_downhill
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.modification.problem import (
+from tolalloc.reducers.modification import (
     Amounts,
     BestPoint,
     EvaluatedAmounts,

@@ -29,7 +29,7 @@ DOORS = {
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
     "ezdxf": ("reducers/teeth/", "reports/feature_frame.py"),
-    "exudyn": ("reducers/multibody/",),
+    "exudyn": ("reducers/dynamics/prototype.py",),
     "typer": ("cli/",),
     "rich": ("cli/",),
 }

@@ -12,8 +12,7 @@ from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.reducers.cycloid.mesh import flank_angle
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.modification.problem import reference
-from tolalloc.reducers.modification.residual_gap import closed_form, residual_gap
+from tolalloc.reducers.modification import closed_form, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 
 STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e_liu2020", "rv40e_xi2015", "rv80e")}

@@ -15,8 +15,7 @@ from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.reducers.cycloid.mesh import flank_angle
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.modification.problem import reference
-from tolalloc.reducers.modification.rotated_profile import rotated_profile_fit
+from tolalloc.reducers.modification import reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 STAGE = CycloidStage(

@@ -11,8 +11,7 @@ from scipy.linalg import eigh
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of
-from tolalloc.reducers.dynamics.properties import Damping, generalised_alpha, inertia_of, newmark
+from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, generalised_alpha, inertia_of, motion_of, newmark
 from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.answers import Status

@@ -15,8 +15,18 @@ from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import Motion, SpeedProfile, motion_of, nominal_acceleration
-from tolalloc.reducers.dynamics.properties import Damping, Inertia, Integrator, generalised_alpha, inertia_of, newmark
+from tolalloc.reducers.dynamics.motion import (
+    Damping,
+    Inertia,
+    Integrator,
+    Motion,
+    SpeedProfile,
+    generalised_alpha,
+    inertia_of,
+    motion_of,
+    newmark,
+    nominal_acceleration,
+)
 from tolalloc.reducers.dynamics.simulation import Simulated, simulate
 from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions

@@ -12,7 +12,7 @@ import tolalloc as ta
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE
 from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.model import ReducerModel
-from tolalloc.reducers.modification.request import ModificationRequest, choose
+from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.study.prepared import Prepared
 

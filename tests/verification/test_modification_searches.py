@@ -19,9 +19,7 @@ from studies.published.modification_searches import ALGORITHMS, REACHED, Recorde
 from studies.published.search_history import History
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
-from tolalloc.reducers.modification.problem import EvaluatedAmounts, reference
-from tolalloc.reducers.modification.residual_gap import residual_gap
-from tolalloc.reducers.modification.rotated_profile import rotated_profile_fit
+from tolalloc.reducers.modification import EvaluatedAmounts, reference, residual_gap, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage
 from tolalloc.reducers.reducer.files import load_reducer
 

@@ -16,15 +16,20 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.dynamics.properties import Damping, Inertia
+from tolalloc.reducers.dynamics import prototype as door
+from tolalloc.reducers.dynamics.motion import Damping, Inertia
+from tolalloc.reducers.dynamics.prototype import (
+    RIGID,
+    TimeCourse,
+    TimeSteps,
+    mesh_of,
+    part_errors,
+    simulate_prototype,
+    with_rigid_bearings,
+)
+from tolalloc.reducers.dynamics.solvers.pin_forces import fill_forces, pin_contacts
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
-from tolalloc.reducers.multibody import system as door
-from tolalloc.reducers.multibody.drive import TimeCourse
-from tolalloc.reducers.multibody.part_errors import mesh_of, part_errors
-from tolalloc.reducers.multibody.prototype import RIGID, with_rigid_bearings
-from tolalloc.reducers.multibody.simulation import TimeSteps, simulate_prototype
-from tolalloc.reducers.multibody.solvers.pin_forces import fill_forces, pin_contacts
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 

@@ -12,7 +12,7 @@ from tolalloc.cli.contact import ProfileFile, ProfilePoints, require_writable, w
 from tolalloc.cli.options import RatedTorqueOption, ReducerOption, named_reducer
 
 if TYPE_CHECKING:
-    from tolalloc.reducers.modification.rotated_profile import Metric
+    from tolalloc.reducers.modification import Metric
 
 
 def modify(
@@ -37,7 +37,7 @@ def modify(
     """Choose equidistant and shift amount by a published objective, and say what they deliver."""
     from tolalloc.reading.files import require_new
     from tolalloc.reading.units import MICROMETRE
-    from tolalloc.reducers.modification.request import ModificationRequest, choose
+    from tolalloc.reducers.modification import ModificationRequest, choose
     from tolalloc.reducers.reducer.files import load_reducer, write_modified
 
     request = ModificationRequest(

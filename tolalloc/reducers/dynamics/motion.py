@@ -1,16 +1,19 @@
-"""What drives and loads the reducer over time: profiles of input speed and output torque, and the nominal motion."""
+"""What moves a reducer over time: speed and torque, the nominal motion, masses, damping and the integrator."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from math import pi
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import Polynomial
 
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
+from tolalloc.reducers.equivalent.springs import SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 
 BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
@@ -156,3 +159,172 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
         nominal[:, own + 2] = acceleration
     nominal[:, coordinates.carrier + 2] = acceleration
     return nominal
+
+
+ASSUMPTIONS = (
+    "sun gear and planet gears: solid cylinders of their pitch radius, as wide as a disc; a crankshaft adds nothing to "
+    "its planet gear",
+    "disc: solid cylinder of the radius Rp − r_rp and its own width; bores are not taken out",
+    "carrier: two solid flanges of the radius Rp − r_rp, each as wide as a disc",
+    "all parts of steel of one density; the load's inertia turns with the carrier",
+)
+"""What `inertia_of` supposes, because no source prints a mass."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertia:
+    """Masses and moments of inertia of one part of each kind.
+
+    Raises
+    ------
+    InputError
+        A value that is not positive and finite.
+    """
+
+    # Masses; the planet's with its crankshaft [kg]
+    sun: float
+    planet: float
+    disc: float
+    carrier: float
+    # Moments of inertia about their own axes; the carrier's with all that the output turns [kg·m²]
+    planet_moment: float
+    disc_moment: float
+    carrier_moment: float
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not 0.0 < value < np.inf:
+                raise InputError.at("inertia", name, value, "a positive number")
+
+    def diagonal(self, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
+        """Return the mass or moment of inertia of every coordinate [kg, kg·m²]."""
+        planet, disc = [self.planet, self.planet, self.planet_moment], [self.disc, self.disc, self.disc_moment]
+        carrier = [self.carrier, self.carrier, self.carrier_moment]
+        parts = [self.sun, self.sun, *planet * coordinates.crank_count, *disc * coordinates.disc_count, *carrier]
+        return np.array(parts)
+
+
+def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float = 0.0) -> Inertia:
+    """Return the inertia of a reducer's parts under `ASSUMPTIONS`.
+
+    The density is that of all parts [kg/m³]; the carrier turns the output inertia besides its own [kg·m²].
+
+    Raises
+    ------
+    InputError
+        A density that is not positive, or a negative output inertia.
+    """
+    if not 0.0 <= output_inertia < np.inf:
+        raise InputError.at("inertia", "output_inertia", output_inertia, "0 or a positive number")
+    stage, gears = reducer.cycloid_stage, reducer.first_stage
+
+    def cylinder(radius: float, width: float) -> tuple[float, float]:
+        mass = density * pi * radius**2 * width
+        return mass, mass * radius**2 / 2
+
+    body = stage.pin_circle_radius - stage.pin_radius
+    sun, _ = cylinder(gears.module * gears.sun_teeth / 2, stage.face_width)
+    planet, planet_moment = cylinder(gears.module * gears.planet_teeth / 2, stage.face_width)
+    disc, disc_moment = cylinder(body, stage.face_width)
+    carrier, carrier_moment = cylinder(body, 2 * stage.face_width)
+    return Inertia(
+        sun=sun,
+        planet=planet,
+        disc=disc,
+        carrier=carrier,
+        planet_moment=planet_moment,
+        disc_moment=disc_moment,
+        carrier_moment=carrier_moment + output_inertia,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """Damping in proportion to masses and to stiffness; pin contacts and interfaces with play have none of the latter.
+
+    A mode of angular frequency ω that strains one damped interface alone has the damping ratio
+    mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
+
+    Raises
+    ------
+    InputError
+        A factor that is negative or not finite.
+    """
+
+    mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
+    stiffness_proportional: float = 0.0  # Damping per stiffness of every interface without play [s]
+    # Further damping per stiffness of single interfaces, by their field of
+    # `tolalloc.reducers.reducer.stiffness.Stiffness`
+    # [s]
+    interfaces: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        general = {name: getattr(self, name) for name in ("mass_proportional", "stiffness_proportional")}
+        for name, value in {**general, **self.interfaces}.items():
+            if not 0.0 <= value < np.inf:
+                raise InputError.at("damping", name, value, "0 or a positive number")
+
+    def per_stiffness(self, interface: str) -> float:
+        """Return the damping per stiffness of an interface without play [s]."""
+        return self.stiffness_proportional + self.interfaces.get(interface, 0.0)
+
+    def check(self, groups: list[SpringGroup]) -> None:
+        """Make sure that every interface with damping of its own is there and has no play.
+
+        Raises
+        ------
+        InputError
+            One that is not.
+        """
+        allowed = [group.stiffness_name for group in groups if group.contact == "bilateral"]
+        for name in self.interfaces:
+            if name not in allowed:
+                raise InputError.at("damping", "interface", name, f"one without play: {', '.join(allowed)}")
+
+
+class Integrator(NamedTuple):
+    """Constants of a one-step integrator of second order, in the form of Arnold and Brüls (2007).
+
+    The equations of motion hold exactly at every step:
+    (1 − αm)·a' + αm·a = (1 − αf)·q̈' + αf·q̈, q' = q + h·q̇ + h²((½ − β)·a + β·a'), q̇' = q̇ + h((1 − γ)·a + γ·a').
+
+    References
+    ----------
+    Arnold, M. and Brüls, O. (2007), Multibody System Dynamics 18, 185–202.
+    """
+
+    # Weights of the old step's accelerations, algorithmic and true [-]
+    alpha_m: float
+    alpha_f: float
+    # Newmark's weights of the new acceleration in displacement and in velocity [-]
+    beta: float
+    gamma: float
+
+    def rates(self, step: float) -> tuple[float, float, float]:
+        """Return what a displacement beyond the predicted one adds to a, q̇ and q̈ [1/s², 1/s, 1/s²]."""
+        algorithmic = 1 / (self.beta * step**2)
+        return algorithmic, self.gamma * step * algorithmic, (1 - self.alpha_m) / (1 - self.alpha_f) * algorithmic
+
+
+def newmark() -> Integrator:
+    """Return Newmark's method of the average acceleration, which takes no energy away."""
+    return Integrator(alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5)
+
+
+def generalised_alpha(spectral_radius: float) -> Integrator:
+    """Return the generalised-α method; a step leaves the spectral radius of an oscillation far too fast for it [-].
+
+    Raises
+    ------
+    InputError
+        A spectral radius outside 0 … 1.
+
+    References
+    ----------
+    Chung, J. and Hulbert, G. M. (1993), Journal of Applied Mechanics 60, 371–375.
+    """
+    if not 0.0 <= spectral_radius <= 1.0:
+        raise InputError.at("integrator", "spectral_radius", spectral_radius, "0 to 1")
+    alpha_m, alpha_f = (2 * spectral_radius - 1) / (spectral_radius + 1), spectral_radius / (spectral_radius + 1)
+    gamma = 0.5 + alpha_f - alpha_m
+    return Integrator(alpha_m=alpha_m, alpha_f=alpha_f, beta=(gamma + 0.5) ** 2 / 4, gamma=gamma)

@@ -1,18 +1,183 @@
-"""Simulation of the equivalent model in time."""
+"""Simulation of the equivalent model in time, and the tables of its steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 
-from tolalloc.reducers.dynamics.motion import Motion
-from tolalloc.reducers.dynamics.properties import Damping, Inertia, Integrator
+from tolalloc.reducers.dynamics.motion import Damping, Inertia, Integrator, Motion, nominal_acceleration
 from tolalloc.reducers.dynamics.solvers.stepping import Parts, State, StepRecord, advance
-from tolalloc.reducers.dynamics.tables import Steps
+from tolalloc.reducers.equivalent.condensation import (
+    CondensedAngles,
+    bilateral_groups,
+    condense,
+    retained_coordinates,
+    rotation_scale,
+)
+from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
+
+_STEPS_AT_ONCE = 512
+
+
+class StepTables(NamedTuple):
+    """Tables of some successive steps, beside the condensed ones. All coordinates are lengths, as there."""
+
+    stiffness: Float[np.ndarray, "step coordinate coordinate"]  # Of the interfaces without play [N/m]
+    damping: Float[np.ndarray, "step coordinate coordinate"]  # Of these and the masses [N·s/m]
+    # Change of all coordinates per change of the retained ones [m/m]
+    by_retained: Float[np.ndarray, "step coordinate retained"]
+    # Change of all coordinates per force at fixed retained ones [m/N]
+    flexibility: Float[np.ndarray, "step coordinate coordinate"]
+    # What a displacement beyond the predicted one adds to algorithmic acceleration, velocity and acceleration [1/s²,
+    # 1/s, 1/s²]; zero at the start, which is a static equilibrium
+    rates: Float[np.ndarray, "step 3"]
+    acceleration: Float[np.ndarray, "step coordinate"]  # Nominal acceleration [m/s²]
+    torque: Float[np.ndarray, " step"]  # Torque on the carrier [N·m]
+    # Torque of the meshes without play on the sun, against its rotation, per coordinate, velocity and value [N, N·s, N]
+    drive_by_coordinate: Float[np.ndarray, "step coordinate"]
+    drive_by_velocity: Float[np.ndarray, "step coordinate"]
+    drive_by_load: Float[np.ndarray, "step load"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Everything but the samples of a simulation.
+
+    Raises
+    ------
+    InputError
+        Damping of an interface that is not there or has play.
+    """
+
+    # As in `tolalloc.reducers.dynamics.simulation.simulate`; numbers in SI units [-]
+    model: EquivalentModel
+    motion: Motion
+    inertia: Inertia
+    damping: Damping
+    integrator: Integrator
+
+    def __post_init__(self) -> None:
+        self.damping.check(bilateral_groups(self._positions(slice(0, 1))))
+
+    @property
+    def reducer(self) -> Reducer:
+        """The nominal design."""
+        return self.model.reducer
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The layout of q."""
+        return Coordinates(self.reducer.crank_count, self.reducer.disc_count)
+
+    @cached_property
+    def scale(self) -> Float[np.ndarray, " coordinate"]:
+        """Coordinate of q per length that the tables have instead [m/m, rad/m]."""
+        return np.asarray(rotation_scale(self.reducer, self.coordinates))
+
+    @cached_property
+    def mass(self) -> Float[np.ndarray, " coordinate"]:
+        """Mass of every coordinate taken as a length [kg]."""
+        return np.asarray(self.inertia.diagonal(self.coordinates) * self.scale**2)
+
+    @cached_property
+    def retained(self) -> Int[np.ndarray, " retained"]:
+        """Which coordinates pins and play touch, the discs' first [-]."""
+        return retained_coordinates(self.reducer, self.coordinates, bilateral_groups(self._positions(slice(0, 1))))
+
+    @property
+    def played_meshes(self) -> int:
+        """Number of meshes with play; they are the first elements of all that can have play [-]."""
+        return self.reducer.crank_count if self.reducer.clearances.gear_mesh else 0
+
+    @property
+    def sun_base_radius(self) -> float:
+        """Base radius of the sun gear [m]."""
+        gears = self.reducer.first_stage
+        return self.reducer.planet_base_radius * gears.sun_teeth / gears.planet_teeth
+
+    def parts(self) -> Iterator[tuple[int, CondensedAngles, StepTables]]:
+        """Yield the first step and the tables of each part of the steps; memory holds one part at a time.
+
+        The condensed tables are as the contact solver takes them, with inertia and damping in ``stiffness`` [N/m] and
+        with the ``load`` on all coordinates instead of the retained ones [N/m, last N/(N·m)].
+        """
+        for first in range(0, self.motion.time.size, _STEPS_AT_ONCE):
+            yield first, *self._tables(slice(first, min(first + _STEPS_AT_ONCE, self.motion.time.size)))
+
+    def _positions(self, steps: slice) -> Positions:
+        return Positions(self.reducer, self.motion.carrier_angle[steps], self.model.orders)
+
+    def _springs(
+        self, at: Positions
+    ) -> tuple[dict[str, Float[np.ndarray, "step ..."]], Float[np.ndarray, "step coordinate load"]]:
+        """Return what `StepTables` says of the bilateral springs, and their load on all coordinates."""
+        steps, size = at.carrier_angle.size, self.coordinates.count
+        loads = self.model.error_columns.layout.torque + 1
+        by_coordinate, by_velocity, by_load = np.zeros((steps, size)), np.zeros((steps, size)), np.zeros((steps, loads))
+        stiffness, load = np.zeros((steps, size, size)), np.zeros((steps, size, loads))
+        damping = np.zeros((steps, size, size)) + self.damping.mass_proportional * np.diag(self.mass)
+        first = 0
+        for group in bilateral_groups(at):
+            own = slice(first, first + len(group.columns))
+            first = own.stop
+            if group.contact == "play":
+                continue
+            rows, delay = group.displacement * self.scale, self.damping.per_stiffness(group.stiffness_name)
+            weighted = np.swapaxes(rows * group.stiffness[..., np.newaxis], 1, 2)
+            between = weighted @ rows
+            stiffness += between
+            damping += delay * between
+            load[:, :, own] = -(weighted @ group.error)
+            if group.stiffness_name == "gear_mesh":
+                by_coordinate[:] = self.sun_base_radius * weighted.sum(axis=2)
+                by_velocity[:] = delay * by_coordinate
+                by_load[:, own] = self.sun_base_radius * (group.stiffness[..., np.newaxis] * group.error).sum(axis=1)
+        rotation = self.coordinates.carrier + 2
+        load[:, rotation, -1] = self.scale[rotation]
+        return {
+            "stiffness": stiffness,
+            "damping": damping,
+            "drive_by_coordinate": by_coordinate,
+            "drive_by_velocity": by_velocity,
+            "drive_by_load": by_load,
+        }, load
+
+    def _tables(self, steps: slice) -> tuple[CondensedAngles, StepTables]:
+        at, motion = self._positions(steps), self.motion
+        (springs, load), size, count = self._springs(at), self.coordinates.count, at.carrier_angle.size
+        rates = np.tile(self.integrator.rates(motion.step), (count, 1))
+        if steps.start == 0:
+            rates[0] = 0.0
+        retained, rest = self.retained, np.setdiff1d(np.arange(size), self.retained)
+        stiffness = springs["stiffness"] + rates[:, 1, None, None] * springs["damping"]
+        stiffness += rates[:, 2, None, None] * np.diag(self.mass)
+        by_retained, flexibility = np.zeros((count, size, retained.size)), np.zeros((count, size, size))
+        inverse = np.linalg.inv(stiffness[:, rest[:, np.newaxis], rest])
+        by_retained[:, retained] = np.eye(retained.size)
+        by_retained[:, rest] = -inverse @ stiffness[:, rest[:, np.newaxis], retained]
+        flexibility[:, rest[:, np.newaxis], rest] = inverse
+        condensed = stiffness[:, retained] @ by_retained
+        part = Motion(**{name: values[steps] for name, values in vars(motion).items()})
+        angles = condense(self.reducer, self.model.orders, at.carrier_angle)._replace(
+            stiffness=0.5 * (condensed + np.swapaxes(condensed, 1, 2)),
+            load=np.ascontiguousarray(np.swapaxes(load, 1, 2)),
+        )
+        return angles, StepTables(
+            **springs,
+            by_retained=by_retained,
+            flexibility=flexibility,
+            rates=rates,
+            acceleration=nominal_acceleration(at, part) / self.scale,
+            torque=part.torque,
+        )
+
 
 Progress = Callable[[float], None]
 """Told which share of the time is simulated [-]."""

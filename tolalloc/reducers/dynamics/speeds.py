@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.reducers.dynamics.motion import SpeedProfile, motion_of
-from tolalloc.reducers.dynamics.properties import Damping, Inertia, Integrator
+from tolalloc.reducers.dynamics.motion import Damping, Inertia, Integrator, SpeedProfile, motion_of
 from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.condensation import bilateral_groups

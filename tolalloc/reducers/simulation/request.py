@@ -11,13 +11,19 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import RPM
-from tolalloc.reducers.dynamics.motion import Motion, SpeedProfile, motion_of
-from tolalloc.reducers.dynamics.properties import Inertia, generalised_alpha, inertia_of, newmark
+from tolalloc.reducers.dynamics.motion import (
+    Inertia,
+    Motion,
+    SpeedProfile,
+    generalised_alpha,
+    inertia_of,
+    motion_of,
+    newmark,
+)
+from tolalloc.reducers.dynamics.prototype import RIGID, part_errors
+from tolalloc.reducers.dynamics.prototype import engine as multibody_engine
 from tolalloc.reducers.equivalent.kinematics import HARMONICS
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.multibody.part_errors import part_errors
-from tolalloc.reducers.multibody.prototype import RIGID
-from tolalloc.reducers.multibody.system import engine as multibody_engine
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.series import at_torque

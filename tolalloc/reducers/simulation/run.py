@@ -9,14 +9,12 @@ import numpy as np
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import RPM
-from tolalloc.reducers.dynamics.motion import Motion
-from tolalloc.reducers.dynamics.properties import ASSUMPTIONS, Damping
+from tolalloc.reducers.dynamics.motion import ASSUMPTIONS, Damping, Motion
+from tolalloc.reducers.dynamics.prototype import TimeCourse, TimeSteps, simulate_prototype
 from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
 from tolalloc.reducers.dynamics.speeds import modes
 from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.outputs import forces
-from tolalloc.reducers.multibody.drive import TimeCourse
-from tolalloc.reducers.multibody.simulation import TimeSteps, simulate_prototype
 from tolalloc.reducers.simulation.answer import AtRest, SimulationAnswer, TimeSeries
 from tolalloc.reducers.simulation.request import INTEGRATORS, PROTOTYPE_RADIUS, PreparedSimulation
 from tolalloc.reports.header import Header

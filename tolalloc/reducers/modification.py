@@ -1,0 +1,581 @@
+"""Equidistant and shift amount by a published method: what is minimised and kept, and the optimum without chance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.cycloid.clearance import LARGE, formula_gap
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
+from tolalloc.reducers.teeth.answer import ContactAnswer, contact_answer
+from tolalloc.reports.answer import Answer
+from tolalloc.reports.document import Section
+from tolalloc.reports.header import Header
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Amounts = Float[np.ndarray, "n 2"]
+"""Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
+
+_ROUNDING = 1e-17  # violation that counts as none [m]
+_UNMET = 1.0  # merit from which on a constraint is violated; no objective comes near it [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluatedAmounts:
+    """Points of a problem, evaluated."""
+
+    objective: Float[np.ndarray, " n"]  # What is to be minimised [m]
+    constraints: Float[np.ndarray, "n c"]  # What must not be negative [m]
+
+    @cached_property
+    def violation(self) -> Float[np.ndarray, " n"]:
+        """By how much all constraints together are missed, 0 where they are met [m]."""
+        missed = np.maximum(-self.constraints, 0.0).sum(axis=-1)
+        return np.where(missed > _ROUNDING, missed, 0.0)
+
+    @cached_property
+    def merit(self) -> Float[np.ndarray, " n"]:
+        """One number to sort by: points that meet the constraints by objective, then the others by violation [m]."""
+        return np.where(self.violation > 0, _UNMET + self.violation, self.objective)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModificationProblem:
+    """Find the amounts (Δr_rp, Δr_p) with the smallest objective.
+
+    Notes
+    -----
+    The gap after closing at φ0 is Δr_rp(1 − S) − Δr_p(C − qS) with C = √(1 − K1²S²), so it depends on φ by
+    S ∈ [0, 1] alone (`tolalloc.reducers.cycloid.clearance.formula_gap`). It vanishes at S = 1, where its derivative
+    by S is
+    −Δr_rp + Δr_p/q, as K1² + q² = 1. C is concave in S: for Δr_p ≥ 0 the gap is convex and nowhere negative if and
+    only if that derivative is not positive, q·Δr_rp ≥ Δr_p. For Δr_p < 0 it is concave and nowhere negative if and
+    only if it is not negative at S = 0, Δr_rp ≥ Δr_p, from which q·Δr_rp ≥ Δr_p follows. So together with the radial
+    clearance the one row q·Δr_rp − Δr_p ≥ 0 says gap ≥ 0 at every φ.
+    """
+
+    name: str  # What reports call it
+    description: str  # What the objective measures, in a sentence for reports
+    stage: CycloidStage  # Cycloid stage
+    objective: Callable[[Amounts], Float[np.ndarray, " n"]]  # What is to be minimised [m]
+    # Bounds of the two amounts [m]
+    lower: Float[np.ndarray, " 2"]
+    upper: Float[np.ndarray, " 2"]
+    radial_clearance: float = 0.0  # Smallest clearance j at tip and root, Δr_rp − Δr_p ≥ j [m]
+    require_gap: bool = False  # Whether no pin may interfere once the flank at φ0 is closed
+
+    def constraints(self, amounts: Amounts) -> Float[np.ndarray, "n c"]:
+        """Return what must not be negative: radial clearance beyond j and, if required, q·Δr_rp − Δr_p [m]."""
+        equidistant, shift = amounts.T
+        rows = [equidistant - shift - self.radial_clearance]
+        if self.require_gap:
+            rows.append(self.stage.flank_ratio * equidistant - shift)
+        return np.stack(rows, axis=-1)
+
+    def evaluate(self, amounts: Amounts) -> EvaluatedAmounts:
+        """Return objective and constraints."""
+        return EvaluatedAmounts(objective=self.objective(amounts), constraints=self.constraints(amounts))
+
+
+_FIRST, _POINTS, _LEVELS = 33, 9, 24  # the last points are 32·4²³ times closer than the bounds, which is rounding
+
+Values = Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]]
+"""Values of points on n lines."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum:
+    """The best of all points that were evaluated."""
+
+    amounts: Float[np.ndarray, " 2"]  # Δr_rp and Δr_p [m]
+    objective: float  # Objective there [m]
+    violation: float  # By how much the constraints are missed there [m]
+    evaluations: int  # Points that were evaluated [-]
+
+    @property
+    def modification(self) -> Modification:
+        """The amounts as a tooth modification."""
+        return Modification(equidistant=float(self.amounts[0]), shift=float(self.amounts[1]))
+
+    @property
+    def status(self) -> str:
+        """One sentence: whether the answer can be used."""
+        if self.violation == 0:
+            return f"met every constraint; best of {self.evaluations} points"
+        missed = f"{self.violation / MICROMETRE:.4g} µm"
+        return f"no point of {self.evaluations} met the constraints; the one that misses them least, by {missed}"
+
+
+class BestPoint:
+    """Evaluates points of a problem, counts them and keeps the best.
+
+    Attributes
+    ----------
+    amounts
+        Best amounts up to now [m].
+    objective, violation
+        Objective and missed constraints there [m].
+    evaluations
+        Points that were evaluated [-].
+    """
+
+    def __init__(self, problem: ModificationProblem) -> None:
+        self.problem = problem
+        self.amounts, self.evaluations = np.full(2, np.nan), 0
+        self._merit = self.objective = self.violation = np.inf
+
+    def __call__(self, amounts: Amounts) -> EvaluatedAmounts:
+        """Return points evaluated."""
+        evaluated = self.problem.evaluate(amounts)
+        at = int(evaluated.merit.argmin())
+        if evaluated.merit[at] < self._merit:
+            self.amounts, self._merit = amounts[at].copy(), float(evaluated.merit[at])
+            self.objective, self.violation = float(evaluated.objective[at]), float(evaluated.violation[at])
+        self.evaluations += len(amounts)
+        return evaluated
+
+
+def reference(problem: ModificationProblem) -> Optimum:
+    """Return the optimum of a problem: for each equidistant amount the best shift, and of these the best.
+
+    Notes
+    -----
+    Both searches narrow a grid down around its best point, by comparison alone. So kinks, bounds and corners of the
+    constraints need no care, and an optimum is missed only if it hides between the points of the first grid, 33 × 33.
+    """
+    best = BestPoint(problem)
+
+    def best_by_shift(equidistants: Float[np.ndarray, "1 p"]) -> Float[np.ndarray, "1 p"]:
+        def merit(shifts: Float[np.ndarray, "n p"]) -> Float[np.ndarray, "n p"]:
+            amounts = np.stack(np.broadcast_arrays(equidistants.T, shifts), axis=-1)
+            return best(amounts.reshape(-1, 2)).merit.reshape(shifts.shape)
+
+        bounds = np.repeat([[problem.lower[1]], [problem.upper[1]]], equidistants.size, axis=1)
+        return _smallest(merit, *bounds)[np.newaxis]
+
+    _smallest(best_by_shift, problem.lower[:1], problem.upper[:1])
+    return Optimum(
+        amounts=best.amounts, objective=best.objective, violation=best.violation, evaluations=best.evaluations
+    )
+
+
+def _smallest(
+    values: Values, lower: Float[np.ndarray, " n"], upper: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return the smallest value on each of n lines."""
+    rows = np.arange(lower.size)
+    for points in (_FIRST, *[_POINTS] * (_LEVELS - 1)):
+        share = np.linspace(0, 1, points)
+        places = np.outer(lower, 1 - share) + np.outer(upper, share)
+        found = values(places)
+        at = found.argmin(axis=1)
+        lower, upper = places[rows, np.maximum(at - 1, 0)], places[rows, np.minimum(at + 1, points - 1)]
+    return np.asarray(found[rows, at])
+
+
+def residual_gap(
+    stage: CycloidStage,
+    radial_clearance: float,
+    largest: float = 100 * MICROMETRE,
+    interval: tuple[float, float] = (25 * DEGREE, 100 * DEGREE),
+    intervals: int = 100,
+) -> ModificationProblem:
+    """Return the problem of the least mean gap that is left on the working flank once it is closed at φ0.
+
+    The mean is over n + 1 equally spaced φ of the work interval [rad]. Both amounts are between 0 and a largest one,
+    which is assumed; the default of the work interval is that of song2019, as li2018 prints neither it nor n.
+
+    Notes
+    -----
+    li2018's formulas are lost, and its "difference of two curves", taken literally, is least without any shift; this
+    is a well-posed reading [A]: least mean gap (`rv.cycloid.clearance.formula_gap`) with a radial clearance of j
+    or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`.
+    """
+    angle, (first, last) = np.linspace(*interval, intervals + 1), (end / DEGREE for end in interval)
+    units = (Modification(equidistant=1.0, shift=0.0), Modification(equidistant=0.0, shift=1.0))
+    per_amount = np.array([formula_gap(stage, unit, angle).mean() for unit in units])  # the gap is linear in both
+
+    def mean_gap(amounts: Amounts) -> Float[np.ndarray, " n"]:
+        return np.asarray(amounts @ per_amount)
+
+    return ModificationProblem(
+        name="residual gap",
+        description=f"mean gap after closing at φ0, {intervals + 1} points from φ = {first:g}° to {last:g}°",
+        stage=stage,
+        objective=mean_gap,
+        lower=np.zeros(2),
+        upper=np.full(2, largest),
+        radial_clearance=radial_clearance,
+        require_gap=True,
+    )
+
+
+def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
+    """Return the optimum of `residual_gap` with a radial clearance j, Δr_rp = j/(1 − q) and Δr_p = j·q/(1 − q).
+
+    Notes
+    -----
+    With v = Δr_rp − Δr_p ≥ j and u = q·Δr_rp − Δr_p ≥ 0 the gap at one φ is
+    [v·((1 − S) − q(C − qS)) + u·((C − qS) − (1 − S))]/(1 − q). Both factors are never negative: the first is the gap
+    itself at u = 0, and C is concave from 1 at S = 0 to q at S = 1, so it lies above its chord 1 − (1 − q)S. So both v
+    and u are best at their least, whatever the work interval and the number of its points.
+    """
+    ratio = stage.flank_ratio
+    return Modification(
+        equidistant=radial_clearance / (1 - ratio),
+        shift=radial_clearance * ratio / (1 - ratio),
+    )
+
+
+Metric = Literal["same_angle", "normal", "nearest"]
+
+METRICS: dict[Metric, str] = {
+    "same_angle": "mean distance of the points with the same φ on the two profiles",
+    "normal": "mean distance of the points with the same φ along the modified profile's normal",
+    "nearest": "mean distance of the rotated profile's points from the modified profile",
+}
+
+_REACH = np.pi / 2  # the nearest point of the modified profile is at most that far in φ [rad]
+_CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
+
+
+def rotated_profile_fit(
+    stage: CycloidStage,
+    shift_sign: int = 1,
+    metric: Metric = "same_angle",
+    rotation: float = 0.005,
+    points: int = 180,
+    radial_clearance: float = 0.0,
+    require_gap: bool = False,
+) -> ModificationProblem:
+    """Return the problem of the modified profile that comes closest to the one that is rotated by δ and nothing else.
+
+    Parameters
+    ----------
+    stage
+        Cycloid stage.
+    shift_sign
+        1 for a positive and −1 for a negative shift [-].
+    metric
+        Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``.
+    rotation
+        δ of the profile to come close to [rad].
+    points
+        m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-].
+    radial_clearance, require_gap
+        As in `ModificationProblem` [m].
+
+    Raises
+    ------
+    InputError
+        A rotation that is not above 0 and up to a sixteenth of a tooth pitch.
+
+    Notes
+    -----
+    ``same_angle`` is mostly slip along the profile, which is no error of the profile. ``nearest`` carries the modified
+    profile on beyond root and tip. Δr_rp goes from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm, a box
+    that is assumed. The source prints Δr_rp − |Δr_p| > 0 as its condition of a radial clearance (equation (11)), which
+    for a negative shift is none; here it is Δr_rp − Δr_p ≥ j for both signs.
+
+    References
+    ----------
+    song2019, equation (10).
+    """
+    name = f"rotated profile, {'positive' if shift_sign > 0 else 'negative'} shift, {metric}"
+    largest, shift = np.pi / (8 * stage.disc_teeth), np.array([0.0, np.sign(shift_sign) * MILLIMETRE])
+    if not 0 < rotation <= largest:
+        raise InputError.at(
+            name, "rotation", rotation, f"above 0 and up to a sixteenth of a tooth pitch, {largest:.4g} rad"
+        )
+    angles = np.arange(1, points + 1) * np.pi / points
+    turned = Modification(equidistant=0.0, shift=0.0, rotation=rotation)
+    place = ToothProfile(stage=stage, modification=turned).points(angles)
+    rotated = place[:, 0] + 1j * place[:, 1]
+
+    def mean_distance(amounts: Amounts) -> Float[np.ndarray, " n"]:
+        angle = _nearest(stage, rotated, angles, amounts) if metric == "nearest" else angles
+        path, slope, _ = _path(stage, amounts, angle)
+        normal = -1j * slope / np.abs(slope)
+        difference = rotated - path - (stage.pin_radius + amounts[:, :1]) * normal
+        if metric != "same_angle":
+            # Where the nearest point is, all of the difference is along the normal.
+            difference = (difference * normal.conj()).real
+        return np.asarray(np.abs(difference).mean(axis=-1))
+
+    return ModificationProblem(
+        name=name,
+        description=f"{METRICS[metric]}; δ = {rotation:g} rad, φ = iπ/{points}, i = 1…{points}",
+        stage=stage,
+        objective=mean_distance,
+        lower=np.array([0.0, shift.min()]),
+        upper=np.array([MILLIMETRE, shift.max()]),
+        radial_clearance=radial_clearance,
+        require_gap=require_gap,
+    )
+
+
+def _nearest(
+    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
+) -> Float[np.ndarray, "n point"]:
+    """Return φ of the modified profiles' points that are nearest to points of another with these φ [rad].
+
+    There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals.
+    """
+    angle = np.tile(angles, (len(amounts), 1))
+    low, high = angle - _REACH, angle + _REACH
+    for _ in range(60):
+        path, slope, bend = _path(stage, amounts, angle)
+        offset = (points - path).conj()
+        value, change = (offset * slope).real, (offset * bend - slope * slope.conj()).real
+        low, high = np.where(value > 0, angle, low), np.where(value > 0, high, angle)
+        falls = change < 0
+        new = angle - value / np.where(falls, change, 1.0)
+        new = np.where(falls & (low <= new) & (new <= high), new, (low + high) / 2)
+        step, angle = np.abs(new - angle).max(), new
+        if step < _CLOSE:
+            break
+    return angle
+
+
+def _path(
+    stage: CycloidStage, amounts: Amounts, angle: Float[np.ndarray, "*n point"]
+) -> tuple[Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"]]:
+    """Return the path of the grinding pin's centre on the disc and its first two derivatives by φ, x + iy [m].
+
+    The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
+    at once, where `tolalloc.reducers.cycloid.tooth_profile.ToothProfile` is one.
+    """
+    pin = (stage.pin_circle_radius + amounts[:, 1:]) * np.exp(-1j * angle / stage.disc_teeth)
+    crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
+    slope = 1j / stage.disc_teeth * (stage.pin_count * crank - pin)
+    return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
+
+
+_NONE = 1e-11  # clearance that counts as none [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModificationAnswer(Answer):
+    """A finished choice."""
+
+    kind: ClassVar[str] = "modification"
+    problem: ModificationProblem  # What was minimised, and what had to be kept
+    best: Optimum  # The sure optimum
+    contact: ContactAnswer  # What it does on the reducer
+    cautions: tuple[str, ...] = ()  # What the method itself must warn of
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return f"{self.header.model}: tooth modification by {self.header.name}"
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        return f"{self.problem.name}; contact at {self.contact.torque:g} N·m on the carrier."
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+        equidistant, shift = self.best.amounts / MICROMETRE
+        return (
+            f"Equidistant amount {equidistant:.4f} µm, shift amount {shift:.4f} µm (pin radius and pin circle radius "
+            f"plus these at grinding): the least {self.problem.description}, {self.best.objective / MICROMETRE:.6g} "
+            "µm.",
+            f"In a reducer file: [modification] equidistant_um = {equidistant:.4f}, shift_um = {shift:.4f}, "
+            'convention = "plus".',
+            *self.contact.sentences,
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return (*self.cautions, *self.contact.warnings)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        return (*self.header.assumptions, *self.contact.assumptions)
+
+    @cached_property
+    def delivered(self) -> pd.DataFrame:
+        """What was asked for beside what the exact distances show."""
+        import pandas as pd
+
+        found = self.contact.assessment.exact_clearance
+        lowest, asked = float(found.after.min()), self.problem.radial_clearance / MICROMETRE
+        return pd.DataFrame(
+            [
+                ("radial clearance at tip and root [µm]", f"{asked:g} or more", found.radial / MICROMETRE),
+                (
+                    "smallest clearance after the first contact [µm]",
+                    "0",
+                    (lowest if abs(lowest) > _NONE else 0.0) / MICROMETRE,
+                ),
+            ],
+            columns=["quantity", "asked", "delivered, exact distances"],
+        )
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their paragraphs, figures and tables."""
+        return (
+            Section(
+                heading="What the amounts deliver",
+                paragraphs=(
+                    f"Objective: {self.problem.description}. A grid that is narrowed down around its best point, "
+                    f"{self.best.evaluations} points in all, finds the optimum without chance.",
+                ),
+                tables=(("delivered", self.delivered),),
+            ),
+            *self.contact.sections,
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units of measurement in the names."""
+        return {
+            "method": self.header.name,
+            "objective": self.problem.description,
+            "equidistant amount [µm]": self.best.amounts[0] / MICROMETRE,
+            "shift amount [µm]": self.best.amounts[1] / MICROMETRE,
+            "objective [µm]": self.best.objective / MICROMETRE,
+            "status": self.best.status,
+            "violation [µm]": self.best.violation / MICROMETRE,
+            "backlash [arcmin]": self.contact.assessment.clearance.backlash / ARCMINUTE,
+            "contact": self.contact.summary,
+            "warnings": list(self.warnings),
+            "assumptions": list(self.header.assumptions),
+        }
+
+
+ASSUMPTIONS = {
+    "song2019": (
+        "song2019 prints no box: equidistant amount 0…1 mm, shift amount 0…±1 mm",
+        "song2019's condition Δr_rp − |Δr_p| > 0 is none for a negative shift; Δr_rp − Δr_p keeps the radial clearance",
+    ),
+    "li2018": (
+        "li2018's formulas are lost: least mean gap, radial clearance kept, no interference, is a well-posed reading",
+        "work interval 25…100° in 100 steps, amounts 0…100 µm: li2018 prints none",
+    ),
+}
+"""Method → what its source does not print."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModificationRequest:
+    """What is to be chosen.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        An unknown method or metric, or a radial clearance out of range.
+    """
+
+    method: str  # ``song2019``: closest to a rotated profile; ``li2018``: least gap on the working flank
+    radial_clearance: float = 15 * MICROMETRE  # Smallest clearance at tip and root [m]
+    rotation: float = 0.005  # δ of the profile to come close to, song2019 only [rad]
+    metric: Metric = "same_angle"  # Distance of the profiles, song2019 only
+    shift_sign: int = 1  # 1 for a positive and −1 for a negative shift, song2019 only [-]
+    # Whether no pin may interfere after closing at φ0, song2019 only; li2018 always asks for it
+    require_gap: bool = False
+
+    def __post_init__(self) -> None:
+        place = "modification"
+        if self.method not in ASSUMPTIONS:
+            raise UnknownNameError.among(place, "method", self.method, ASSUMPTIONS)
+        if self.metric not in METRICS:
+            raise UnknownNameError.among(place, "metric", self.metric, METRICS)
+        if not 0 <= self.radial_clearance <= 1e-3:
+            asked = f"{self.radial_clearance / MICROMETRE:g} µm"
+            raise InputError.of_argument(place, "radial_clearance", asked, "0 to 1000 µm")
+
+    def problem(self, reducer: Reducer) -> ModificationProblem:
+        """Return what is minimised on a reducer's cycloid stage."""
+        if self.method == "li2018":
+            return residual_gap(reducer.cycloid_stage, self.radial_clearance)
+        return rotated_profile_fit(
+            reducer.cycloid_stage,
+            shift_sign=self.shift_sign,
+            metric=self.metric,
+            rotation=self.rotation,
+            radial_clearance=self.radial_clearance,
+            require_gap=self.require_gap,
+        )
+
+
+def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> ModificationAnswer:
+    """Return the best amounts, and what they do on the reducer.
+
+    The reducer's own modification is replaced; the torque on the carrier is that of the contact, negative resists
+    [N·m].
+
+    Raises
+    ------
+    InputError
+        No amounts meet the constraints, or the best ones cannot be ground or mounted.
+    """
+    problem = request.problem(reducer)
+    best = reference(problem)
+    if best.violation > 0:
+        equidistant, shift = (
+            f"{low / MICROMETRE:g}…{high / MICROMETRE:g} µm"
+            for low, high in zip(problem.lower, problem.upper, strict=True)
+        )
+        raise InputError(
+            f"{reducer.name}: no equidistant amount of {equidistant} with a shift of {shift} will meet the "
+            f"constraints; the nearest miss them by {best.violation / MICROMETRE:.3g} µm; "
+            "allowed is less radial clearance."
+        )
+    modified = replace(reducer, modification=best.modification)
+    contact = contact_answer(modified, torque)
+    return ModificationAnswer(
+        header=Header(
+            name=request.method,
+            model=reducer.name,
+            conditions=contact.header.conditions,
+            assumptions=ASSUMPTIONS[request.method],
+        ),
+        problem=problem,
+        best=best,
+        contact=contact,
+        cautions=(
+            *_cautions(request, reducer),
+            *_beyond_catalogue(modified, contact.assessment.clearance.backlash),
+        ),
+    )
+
+
+def _beyond_catalogue(modified: Reducer, backlash: float) -> tuple[str, ...]:
+    """Return whether exact parts with the amounts have more play than the catalogue allows, backlash in [rad]."""
+    if modified.catalogue is None:
+        return ()
+    lost, allowed = float(exact_loop(modified).lost_motion[-1]), modified.catalogue.lost_motion
+    if max(lost, backlash) <= allowed:
+        return ()
+    return (
+        f"Exact parts with these amounts have {backlash / ARCMINUTE:.2g}′ of backlash and {lost / ARCMINUTE:.2g}′ of "
+        f"lost motion; the catalogue of {modified.name} allows {allowed / ARCMINUTE:.2g}′ of lost motion. Ask for less "
+        "radial clearance or rotation before setting a drawing.",
+    )
+
+
+def _cautions(request: ModificationRequest, reducer: Reducer) -> tuple[str, ...]:
+    """Return what the method itself must warn of."""
+    if request.method != "song2019" or request.rotation * reducer.cycloid_stage.disc_pitch_radius <= LARGE:
+        return ()
+    return (
+        f"A rotation of {request.rotation:g} rad is {request.rotation / ARCMINUTE:.0f} arcmin of play to each side; a "
+        "precision reducer has one or two: ask for less before setting a drawing.",
+    )
