@@ -10,8 +10,8 @@ import pandas as pd
 from published.allocation_cases import CASES, bearing_moments, clutch, figures, gap_chain, limit_stack
 
 import tolalloc as ta
-from tolalloc.allocation.program.problem import AllocationProblem, Solution
-from tolalloc.allocation.program.process_choice import allocate, second_best
+from tolalloc.allocation.search.process_choice import allocate, second_best
+from tolalloc.allocation.space.problem import AllocationProblem, Solution
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import SolveError
 from tolalloc.reports.document import Document, Section

@@ -13,15 +13,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tolalloc.allocation.classical_guarantee import RootSumSquare as RootSumSquare
-    from tolalloc.allocation.classical_guarantee import WorstCase as WorstCase
     from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
     from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
-    from tolalloc.allocation.effort import AllocationEffort as AllocationEffort
-    from tolalloc.allocation.effort import FrontEffort as FrontEffort
-    from tolalloc.allocation.effort import SearchEffort as SearchEffort
-    from tolalloc.allocation.guarantee import AtCpk as AtCpk
-    from tolalloc.allocation.guarantee import AtYield as AtYield
+    from tolalloc.allocation.space.effort import AllocationEffort as AllocationEffort
+    from tolalloc.allocation.space.effort import FrontEffort as FrontEffort
+    from tolalloc.allocation.space.effort import SearchEffort as SearchEffort
+    from tolalloc.allocation.space.requirement import AtCpk as AtCpk
+    from tolalloc.allocation.space.requirement import AtYield as AtYield
+    from tolalloc.allocation.space.requirement import RootSumSquare as RootSumSquare
+    from tolalloc.allocation.space.requirement import WorstCase as WorstCase
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
@@ -66,10 +66,10 @@ if TYPE_CHECKING:
 
 _WHERE = {
     "Allocation": "study.questions",
-    "AllocationEffort": "allocation.effort",
+    "AllocationEffort": "allocation.space.effort",
     "Answer": "reports.answer",
-    "AtCpk": "allocation.guarantee",
-    "AtYield": "allocation.guarantee",
+    "AtCpk": "allocation.space.requirement",
+    "AtYield": "allocation.space.requirement",
     "BACKLASH": "reducers",
     "Calculation": "study.questions",
     "Difference": "study.questions",
@@ -80,7 +80,7 @@ _WHERE = {
     "Evaluation": "models.model",
     "FRICTION_TORQUE": "reducers",
     "Figure": "reports.figure",
-    "FrontEffort": "allocation.effort",
+    "FrontEffort": "allocation.space.effort",
     "HYSTERESIS_LOSS": "reducers",
     "InputError": "exceptions",
     "LOST_MOTION": "reducers",
@@ -94,10 +94,10 @@ _WHERE = {
     "RADIAL_CLEARANCE": "reducers",
     "Ranking": "study.questions",
     "RankingEffort": "sensitivity.effort",
-    "RootSumSquare": "allocation.classical_guarantee",
+    "RootSumSquare": "allocation.space.requirement",
     "RunFolderError": "exceptions",
     "SamplingDesign": "drawings.seeds",
-    "SearchEffort": "allocation.effort",
+    "SearchEffort": "allocation.space.effort",
     "Section": "reports.document",
     "SeedTree": "drawings.seeds",
     "Series": "reports.figure",
@@ -109,7 +109,7 @@ _WHERE = {
     "TolallocError": "exceptions",
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
-    "WorstCase": "allocation.classical_guarantee",
+    "WorstCase": "allocation.space.requirement",
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "models.function_model",
     "model": ("models.function_model", "model"),

@@ -33,7 +33,7 @@ from allocation_rivals import SEARCH_UNITS, Compared, Rival
 
 from tests.random_studies import random_study
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
 

@@ -17,10 +17,10 @@ from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 from pymoo.core.problem import ElementwiseProblem
 from pymoo.core.termination import NoTermination
 
-from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.graded import group_options, with_shared_zones
-from tolalloc.allocation.guarantee import Sampled
-from tolalloc.allocation.limited_sample import LimitedSample
+from tolalloc.allocation.search.discrete import group_options, with_shared_zones
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.output_sample import LimitedSample
+from tolalloc.allocation.space.requirement import Sampled
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared

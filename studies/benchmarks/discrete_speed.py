@@ -5,7 +5,7 @@
 Random problems of 30 features with 8 grades from each of 3 processes and 4 stacks (two in quadrature, one worst case,
 one of both) are solved in interleaved rounds by
 
-* (a) the package, `tolalloc.allocation.program.discrete`;
+* (a) the package, `tolalloc.allocation.search.discrete`;
 * (b) cvxpy with HiGHS: one boolean per option, a row in squares or in zones per stack, and for the stack of both the
   tangents at every answer that breaks it, until an answer keeps it.
 
@@ -28,10 +28,9 @@ from jaxtyping import Float
 from kernel_speed import SEED, figures, progress, run_benchmark
 from numpy_cores import CORES, timed
 
-from tolalloc.allocation.cost.closed_forms import ReciprocalPower
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program.discrete import DiscreteProblem, feature_options
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.allocation.cost.model import Process, ReciprocalPower
+from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 
 FEATURES, GRADES, PROCESSES = 30, 8, 3
 STACKS = {"rss 1": (0.0, 1.0), "rss 2": (0.0, 1.0), "worst case": (1.0, 0.0), "both": (0.3, 1.0)}

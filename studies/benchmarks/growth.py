@@ -28,12 +28,11 @@ from tests.prepared import prepared
 from tests.random_reducers import DISC_TILT
 from tests.random_units import random_units
 from tests.verification.test_allocation_program import compiled, random_problem
-from tolalloc.allocation.cost.closed_forms import ReciprocalPower
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program import process_choice
-from tolalloc.allocation.program.convex import front
-from tolalloc.allocation.program.discrete import DiscreteProblem, feature_options
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.allocation.cost.model import Process, ReciprocalPower
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.convex_program import front
+from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.equivalent.model import EquivalentModel

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
-from tolalloc.allocation.cost.model import CostModel, Process
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.allocation.cost.model import CostModel, Exponential, Process, Reciprocal
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.capability.indices import Limits
 
 from .stacks import modified_root_sum_square, root_sum_square, worst_case, yield_root_sum_square

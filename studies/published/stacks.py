@@ -14,7 +14,7 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from tolalloc.allocation.program.problem import Stack
+from tolalloc.allocation.space.problem import Stack
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
 

@@ -10,7 +10,7 @@ from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from tolalloc.allocation.program.problem import AllocationProblem
+from tolalloc.allocation.space.problem import AllocationProblem
 from tolalloc.assembly.angular.allocation import AngularAllocation
 from tolalloc.assembly.angular.program import angular_problem, requirements_of
 from tolalloc.assembly.plan import AssemblyPlan

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.command import ROOT, command, process, refused, tolalloc
-from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.cli.run import allocate
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import TolallocError
@@ -34,9 +34,9 @@ SMALL = """AllocationEffort(
         search=SearchEffort(steps=2, front=FrontEffort(population=8, generations=4, population_on_kernel=8,
             generations_on_kernel=2, designs=10, rounds=1, points=3)))"""
 STUDY = """import tolalloc as ta
-from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.effort import FrontEffort
-from tolalloc.allocation.effort import SearchEffort
+from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.effort import FrontEffort
+from tolalloc.allocation.space.effort import SearchEffort
 
 MOST = ta.AtYield(target=0.95)
 study = ta.Study(

@@ -30,9 +30,9 @@ EFFORT = """effort=ta.Effort(
             population=8, generations=4, population_on_kernel=8, generations_on_kernel=2, designs=10, rounds=1,
             points=3))),
     is_quick=True), questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)]"""
-EFFORTS = """from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.effort import FrontEffort
-from tolalloc.allocation.effort import SearchEffort
+EFFORTS = """from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.effort import FrontEffort
+from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.effort import SobolEffort
 """

@@ -10,7 +10,7 @@ import pytest
 from openpyxl import load_workbook
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.cli.examples import EXAMPLES

@@ -25,7 +25,7 @@ SMALL = """seed=1,
             search=SearchEffort(steps=2)),
         is_quick=True),
 """
-IMPORTS = """from tolalloc.allocation.effort import AllocationEffort, SearchEffort
+IMPORTS = """from tolalloc.allocation.space.effort import AllocationEffort, SearchEffort
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 
 import tolalloc as ta

@@ -11,9 +11,9 @@ from scipy.optimize import minimize
 from studies.published import allocation_cases as published
 from studies.published.stacks import root_sum_square
 from tests.validation_manual import shown
-from tolalloc.allocation.cost.process_costs_file import priced
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Solution
-from tolalloc.allocation.program.process_choice import allocate, second_best
+from tolalloc.allocation.cost.process_costs import priced
+from tolalloc.allocation.search.process_choice import allocate, second_best
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature

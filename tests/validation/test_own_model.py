@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.allocation.effort import QUICK_ALLOCATION
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 
 ROOT = Path(__file__).parents[2]
 CASES = json.loads((ROOT / "tests" / "validation" / "allocation.json").read_text(encoding="utf-8"))["problems"]

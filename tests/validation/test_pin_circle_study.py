@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.allocation.grade import grade_zones
+from tolalloc.allocation.space.ladder import grade_zones
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation

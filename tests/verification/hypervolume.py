@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from pymoo.indicators.hv import HV
 
-from tolalloc.allocation.pareto.found import normalised
+from tolalloc.allocation.front.pareto_problem import normalised
 
 REFERENCE = 1.1
 """Where the hypervolume ends in every objective: ideal at 0, nadir at 1, so the ends of the front count too [-]."""

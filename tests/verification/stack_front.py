@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq
 
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.allocation.cost.model import Process, Reciprocal
+from tolalloc.allocation.front.pareto_problem import Genes, Objective, Objectives
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 
 LOWER, UPPER = 0.2, 5.0
 

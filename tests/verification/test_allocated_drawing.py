@@ -21,12 +21,10 @@ from tolalloc.allocation.answer.cost_formulas import cost_formula
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.allocation.answer.dimensions import frames as frames_of_members
 from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
-from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import SumOfCosts, Weighted
-from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.process_costs_file import load_process_costs
-from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.allocation.effort import QUICK_ALLOCATION
+from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
+from tolalloc.allocation.cost.points import Points, Spline, Tabulated
+from tolalloc.allocation.cost.process_costs import load_process_costs
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame

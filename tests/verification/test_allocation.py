@@ -11,20 +11,15 @@ from scipy.stats import kurtosis, norm, skew
 from tests.prepared import prepared as baseline
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
-from tolalloc.allocation.classical_guarantee import WorstCase
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.effort import SearchEffort
-from tolalloc.allocation.fronts import exact_front
-from tolalloc.allocation.guarantee import AtCpk, AtYield
-from tolalloc.allocation.local_model import root_sum_square_stack, worst_case_stack
-from tolalloc.allocation.programs import Programs
-from tolalloc.allocation.proportional import scale_in_proportion
-from tolalloc.allocation.requirement import Requirement
-from tolalloc.allocation.search import allocate
-from tolalloc.allocation.trial import OutputTrial
-from tolalloc.allocation.trust_region import aimed, kept_stacks
-from tolalloc.allocation.verification import Verifier
+from tolalloc.allocation.cost.model import Process, Reciprocal
+from tolalloc.allocation.front.pareto_front import exact_front
+from tolalloc.allocation.search.convex_program import Programs
+from tolalloc.allocation.search.zone_allocation import aimed, allocate, kept_stacks, scale_in_proportion
+from tolalloc.allocation.space.constraint import root_sum_square_stack, worst_case_stack
+from tolalloc.allocation.space.effort import SearchEffort
+from tolalloc.allocation.space.output_sample import OutputTrial
+from tolalloc.allocation.space.requirement import AtCpk, AtYield, Requirement, WorstCase
+from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.drawings.seeds import SeedTree

@@ -7,19 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import tolalloc.allocation.robustness as module
+import tolalloc.allocation.front.robustness as module
 from tests.prepared import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import SumOfCosts, Weighted
-from tolalloc.allocation.effort import SearchEffort
-from tolalloc.allocation.program import process_choice
-from tolalloc.allocation.quantile import QuantileResponse
-from tolalloc.allocation.robustness import COST_CHANGE, Robustness, Variant, robustness
-from tolalloc.allocation.search import allocate
-from tolalloc.allocation.trade import SettingTrade, setting_trade
-from tolalloc.allocation.verification import Verifier
-from tolalloc.allocation.yield_cost import cost_at_yield
+from tolalloc.allocation.cost.model import Reciprocal, SumOfCosts, Weighted
+from tolalloc.allocation.front.robustness import COST_CHANGE, Robustness, Variant, robustness
+from tolalloc.allocation.front.trade import QuantileResponse, SettingTrade, cost_at_yield, setting_trade
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.zone_allocation import allocate
+from tolalloc.allocation.space.effort import SearchEffort
+from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.model import FLANK, RADIAL

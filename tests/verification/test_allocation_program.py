@@ -10,12 +10,11 @@ import pytest
 from scipy.optimize import linprog, minimize
 
 from tests.seeds import seeds
-from tolalloc.allocation.cost.closed_forms import Exponential, Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program.certificate import cost_bound
-from tolalloc.allocation.program.convex import ConvexProgram, front
-from tolalloc.allocation.program.lagrange_dual import LagrangeDual
-from tolalloc.allocation.program.problem import (
+from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal
+from tolalloc.allocation.search.convex_program import ConvexProgram, front
+from tolalloc.allocation.search.lagrange_dual import LagrangeDual, cost_bound
+from tolalloc.allocation.search.process_choice import allocate, second_best
+from tolalloc.allocation.space.problem import (
     AllocationProblem,
     LeastInfeasible,
     PricedFeature,
@@ -24,7 +23,6 @@ from tolalloc.allocation.program.problem import (
     Stack,
     least_infeasible,
 )
-from tolalloc.allocation.program.process_choice import allocate, second_best
 from tolalloc.exceptions import InputError
 
 KINDS = {

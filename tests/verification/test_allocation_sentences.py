@@ -12,8 +12,8 @@ from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.cost.unit_price import YieldLadder
-from tolalloc.allocation.effort import QUICK_ALLOCATION
-from tolalloc.allocation.search import ZoneAllocation
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reducers.reducer.files import load_identified_stiffness
 from tolalloc.reports.document import Section

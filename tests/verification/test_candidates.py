@@ -8,9 +8,9 @@ import pytest
 
 import tolalloc as ta
 from tolalloc.allocation.answer.answer import AllocationAnswer
-from tolalloc.allocation.candidates import ALIKE, GRADES, TABLE
-from tolalloc.allocation.search import ZoneAllocation
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.search.candidates import ALIKE, GRADES, TABLE
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.verify.verification import VerifiedDesign
 
 ZONE = {"plus": 0.01, "minus": -0.01, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
 

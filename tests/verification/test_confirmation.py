@@ -11,12 +11,10 @@ import pytest
 from scipy.stats import binom, norm
 
 import tolalloc as ta
-from tolalloc.allocation.attempts import FIRST
-from tolalloc.allocation.confirmation import ATTEMPTS, confirm
-from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.following import _still_kept
-from tolalloc.allocation.judging import Judge, confidence_of_fewer
-from tolalloc.allocation.verification import VerifiedDesign, Verifier
+from tolalloc.allocation.search.candidates import _still_kept
+from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, Judge, confidence_of_fewer, confirm
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from tolalloc.allocation.cost.closed_forms import (
+from tolalloc.allocation.cost.fit import best_fit, fits
+from tolalloc.allocation.cost.model import (
     Combined,
+    CostModel,
     Exponential,
+    Process,
     Reciprocal,
     ReciprocalPower,
+    SumOfCosts,
     reciprocal_squared,
 )
-from tolalloc.allocation.cost.fit import best_fit, fits
-from tolalloc.allocation.cost.model import CostModel, Process, SumOfCosts
-from tolalloc.allocation.cost.points import Points
-from tolalloc.allocation.cost.sampled import OUTER_ERROR, Spline, Tabulated
+from tolalloc.allocation.cost.points import OUTER_ERROR, Points, Spline, Tabulated
 from tolalloc.exceptions import InputError
 
 ZONES = np.geomspace(2.0, 30.0, 10)

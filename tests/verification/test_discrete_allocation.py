@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from tests.seeds import seeds
-from tolalloc.allocation.cost.closed_forms import Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program import choice_search
-from tolalloc.allocation.program.choice_search import ChoiceRows, best_choice
-from tolalloc.allocation.program.discrete import DiscreteProblem, Option, feature_options
-from tolalloc.allocation.program.multiple_choice import MultipleChoice
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Shared, Stack
+from tolalloc.allocation.cost.model import Process, Reciprocal
+from tolalloc.allocation.search import multiple_choice
+from tolalloc.allocation.search.discrete import DiscreteProblem, Option, feature_options
+from tolalloc.allocation.search.multiple_choice import ChoiceRows, MultipleChoice, best_choice
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.exceptions import InputError, SolveError
 
 LADDER = np.array([1.0, 1.6, 2.5, 4.0, 6.3, 10.0])
@@ -256,7 +254,7 @@ def test_when_the_nodes_are_used_up_the_answer_says_how_far_it_may_be_from_the_b
 def test_nodes_that_find_nothing_are_no_proof_that_there_is_nothing(monkeypatch):
     program = large_program(0)
     monkeypatch.setattr(
-        choice_search, "exchanged", lambda program, _: np.append(program.starts[1:], program.cost.size) - 1
+        multiple_choice, "exchanged", lambda program, _: np.append(program.starts[1:], program.cost.size) - 1
     )
     with pytest.raises(SolveError, match="within the nodes allowed"):
         best_choice(program, 0)
@@ -276,7 +274,7 @@ def test_the_best_is_found_although_only_the_second_best_was_known(monkeypatch, 
         return dearer[0] if dearer else allowed[0]
 
     costs, over, _ = all_choices(case)
-    monkeypatch.setattr(choice_search, "exchanged", second_cheapest)
+    monkeypatch.setattr(multiple_choice, "exchanged", second_cheapest)
     solution = case.solve()
     allowed = costs[over <= 1e-12]
     assert (solution is None) == (allowed.size == 0)

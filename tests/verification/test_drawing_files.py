@@ -13,7 +13,7 @@ from ezdxf import readfile
 from openpyxl import load_workbook
 
 import tolalloc as ta
-from tolalloc.allocation.effort import QUICK_ALLOCATION
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.study.effort import Effort

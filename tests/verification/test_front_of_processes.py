@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from tests.verification.test_allocation_program import random_problem
-from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.cost.sampled import Points, Tabulated
-from tolalloc.allocation.program.least_priced import by_form
-from tolalloc.allocation.program.problem import LeastInfeasible, Solution
-from tolalloc.allocation.program.process_choice import allocate, front
+from tolalloc.allocation.cost.model import Combined, Exponential, Process, Reciprocal, ReciprocalPower
+from tolalloc.allocation.cost.points import Points, Tabulated
+from tolalloc.allocation.search.lagrange_dual import by_form
+from tolalloc.allocation.search.process_choice import allocate, front
+from tolalloc.allocation.space.problem import LeastInfeasible, Solution
 
 
 @pytest.mark.parametrize("stacks", [1, 2])

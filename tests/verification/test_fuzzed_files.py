@@ -26,7 +26,7 @@ from studies.published.simulated_bench import random_units, simulated_bench
 from tests.plain_reading import DECIMALS, differences, made, rows, said
 from tests.studies.bench_files import CURVES_AND_LOOPS
 from tolalloc.allocation.cost.points import load_shop_points
-from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import DATA as CHAINS
 from tolalloc.assembly.files import load_plan
 from tolalloc.bench.measurement.files import load_measurements

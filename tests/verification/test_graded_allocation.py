@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests.prepared import prepared as baseline
-from tolalloc.allocation.grade import SERIES, ZONES, grade_zones
-from tolalloc.allocation.graded import allocate_grades, group_ladders, group_options, with_shared_zones
-from tolalloc.allocation.trust_region import kept_stacks
-from tolalloc.allocation.verification import Verifier
+from tolalloc.allocation.search.discrete import allocate_grades, group_ladders, group_options, with_shared_zones
+from tolalloc.allocation.search.zone_allocation import kept_stacks
+from tolalloc.allocation.space.ladder import SERIES, ZONES, grade_zones
+from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError

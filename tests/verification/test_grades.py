@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tolalloc.allocation.grade import GRADES, SIZE_STEPS, ZONES, Ladder, grade_zones, group_ladder
+from tolalloc.allocation.space.ladder import GRADES, SIZE_STEPS, ZONES, Ladder, grade_zones, group_ladder
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature

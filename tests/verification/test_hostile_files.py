@@ -13,7 +13,7 @@ from openpyxl import Workbook, load_workbook
 from openpyxl.chart import BarChart
 
 from tolalloc.allocation.cost.points import load_shop_points
-from tolalloc.allocation.cost.process_costs_file import load_process_costs
+from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.bench.measurement.readings import load_readings
 from tolalloc.drawings.process_capability import load_process_capabilities
 from tolalloc.drawings.table_file import DATA

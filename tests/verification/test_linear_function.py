@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 
-from tolalloc.allocation.limited_sample import LimitedSample
+from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.capability.near_limit import SolvedUnits

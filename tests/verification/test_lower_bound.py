@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 from scipy.stats import beta, norm
 
 import tolalloc as ta
-from tolalloc.allocation.guarantee import AtCpk, AtYield
-from tolalloc.allocation.limited_sample import LimitedSample
+from tolalloc.allocation.space.output_sample import LimitedSample
+from tolalloc.allocation.space.requirement import AtCpk, AtYield
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.capability.near_limit import Drawn, SolvedUnits

@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import multinomial
 
 from tests.verification.test_confirmation import GAP, SHOWN, TARGET, at, designed, judge_of, prepared
-from tolalloc.allocation import judging
-from tolalloc.allocation.attempts import FIRST
-from tolalloc.allocation.screen import Screen
+from tolalloc.allocation.verify import acceptance
+from tolalloc.allocation.verify.acceptance import FIRST
+from tolalloc.allocation.verify.screen import Screen
 from tolalloc.capability.monte_carlo import allowed_rejections, proportion
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 
@@ -87,8 +87,8 @@ def test_a_screen_that_knows_nothing_fools_nobody(call, monkeypatch):
     design, share = designed(study), 0.001 if call == "nothing near" else 0.1
     blind = replace(Screen.of(design), share=share)
     called = (lambda x: np.zeros(len(x), bool)) if call == "nothing near" else (lambda x: (x[:, 1] * 1e7) % 1 < share)
-    monkeypatch.setattr(judging.Screen, "of", lambda _: blind)
-    monkeypatch.setattr(judging.Screen, "__call__", lambda _, x: called(x))
+    monkeypatch.setattr(acceptance.Screen, "of", lambda _: blind)
+    monkeypatch.setattr(acceptance.Screen, "__call__", lambda _, x: called(x))
     confirmed = sum(judge_of(study, seed).judge(design, FIRST).confirmed for seed in range(400))
     error = FIRST.error(0.05)
     assert confirmed <= 400 * error + 3 * np.sqrt(400 * error * (1 - error))

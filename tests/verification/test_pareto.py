@@ -11,10 +11,17 @@ import pytest
 from hypervolume import hypervolume_ratio
 from stack_front import LOWER, UPPER, StackProblem, stack_problem
 
-from tolalloc.allocation.pareto.found import knee, nondominated, spread_over, thinned
-from tolalloc.allocation.pareto.genetic import reference_directions, search
-from tolalloc.allocation.pareto.problem import Genes, Objective, Objectives
-from tolalloc.allocation.program import process_choice
+from tolalloc.allocation.front.genetic import reference_directions, search
+from tolalloc.allocation.front.pareto_problem import (
+    Genes,
+    Objective,
+    Objectives,
+    knee,
+    nondominated,
+    spread_over,
+    thinned,
+)
+from tolalloc.allocation.search import process_choice
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 

@@ -10,14 +10,13 @@ import pytest
 
 from tests.prepared import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
-from tolalloc.allocation.effort import FrontEffort
-from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.pareto.answers import Checkpoint, RememberedResponse
-from tolalloc.allocation.pareto.found import nondominated
-from tolalloc.allocation.pareto.front import pareto_front
-from tolalloc.allocation.pareto.problem import DesignProblem
-from tolalloc.allocation.program.problem import Stack
-from tolalloc.allocation.quantile import QuantileResponse
+from tolalloc.allocation.front.checkpoint import Checkpoint, RememberedResponse
+from tolalloc.allocation.front.pareto_front import pareto_front
+from tolalloc.allocation.front.pareto_problem import DesignProblem, nondominated
+from tolalloc.allocation.front.trade import QuantileResponse
+from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.effort import FrontEffort
+from tolalloc.allocation.space.problem import Stack
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.reducers.model import RADIAL

@@ -7,16 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.allocation.cost.closed_forms import (
+from tolalloc.allocation.cost.model import (
     Combined,
     Exponential,
     Reciprocal,
     ReciprocalPower,
     reciprocal_squared,
 )
-from tolalloc.allocation.cost.points import load_shop_points
-from tolalloc.allocation.cost.process_costs_file import UNITS, ProcessCostRow, load_process_costs, priced, today
-from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.allocation.cost.points import Spline, Tabulated, load_shop_points
+from tolalloc.allocation.cost.process_costs import UNITS, ProcessCostRow, load_process_costs, priced, today
 from tolalloc.drawings.table_file import DATA, read_rows
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature

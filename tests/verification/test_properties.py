@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.drawings.drawing import Drawing, load_drawing
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.drawings.tolerance_table import table_frame

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
-from tolalloc.allocation.repricing import named_zones, outside_range, repriced
-from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.space.design_space import DesignSpace, named_zones, outside_range, repriced
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Requirement
 from tolalloc.capability.paired import Change, quantile_change, share_change
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SeedTree

@@ -145,7 +145,7 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
         raise InputError.at("tolalloc allocate", "--limit", limit, f"left out: {leading} has no upper limit to change")
     changed = own if limit is None else replace(own, upper=limit)
     if yield_target is not None:
-        from tolalloc.allocation.guarantee import AtYield
+        from tolalloc.allocation.space.requirement import AtYield
 
         changed = replace(changed, show=AtYield(target=yield_target))
     return replace(study, limits={**study.limits, leading: changed})

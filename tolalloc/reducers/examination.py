@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.guarantee import USUAL_YIELD
+from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.models.model import Examination
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE
 from tolalloc.reducers import PRELOAD, RADIAL_CLEARANCE

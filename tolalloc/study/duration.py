@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolalloc.allocation.verification import SLOPE_UNITS
+from tolalloc.allocation.verify.verification import SLOPE_UNITS
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.sensitivity.inverse import fewest_units

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from tolalloc.allocation.effort import QUICK_ALLOCATION, AllocationEffort
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.exceptions import InputError
 from tolalloc.reading.named_fields import NamedFields
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield, Guarantee
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
 from tolalloc.reading.named_fields import NamedFields, is_number

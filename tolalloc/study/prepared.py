@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from tolalloc.allocation.cost.process_costs_file import currency_of_costs, load_process_costs, priced
-from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.effort import AllocationEffort
-from tolalloc.allocation.guarantee import USUAL_YIELD, AtYield
-from tolalloc.allocation.requirement import JointRequirement, Requirement
+from tolalloc.allocation.cost.process_costs import currency_of_costs, load_process_costs, priced
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, JointRequirement, Requirement
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Model

@@ -173,7 +173,7 @@ class Allocation(Question):
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
         """Return the cheapest drawing."""
-        from tolalloc.allocation.searches import DrawingQuestion, allocate_drawing
+        from tolalloc.allocation.drawing_question import DrawingQuestion, allocate_drawing
 
         study = prepared.study
         question = DrawingQuestion(

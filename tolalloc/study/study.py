@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.named_fields import NamedFields, is_number
 from tolalloc.study.effort import QUICK, Effort

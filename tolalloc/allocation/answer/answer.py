@@ -14,16 +14,16 @@ from tolalloc.allocation.answer.drawing import drawing_table, drawn_sources, sou
 from tolalloc.allocation.answer.sections import sections
 from tolalloc.allocation.answer.sentences import assumptions, sentences, warnings
 from tolalloc.allocation.answer.tables import requirements_table
-from tolalloc.allocation.candidates import Candidates
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
-from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.graded import GradedAllocation
-from tolalloc.allocation.requirement import Requirement
-from tolalloc.allocation.robustness import Robustness
-from tolalloc.allocation.search import ZoneAllocation
-from tolalloc.allocation.trade import SettingTrade
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.front.pareto_front import Fronts
+from tolalloc.allocation.front.robustness import Robustness
+from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.search.candidates import Candidates
+from tolalloc.allocation.search.discrete import GradedAllocation
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Examination, Model

@@ -7,9 +7,8 @@ from functools import singledispatch
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import SumOfCosts, Weighted
-from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
+from tolalloc.allocation.cost.points import Spline, Tabulated
 
 
 @singledispatch

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from tolalloc.allocation.answer.calculator import calculator_sheets, style_calculator
 from tolalloc.allocation.answer.dimensions import frames_of
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
-from tolalloc.allocation.cost.process_costs_file import today
+from tolalloc.allocation.cost.process_costs import today
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import table_frame, with_own_words

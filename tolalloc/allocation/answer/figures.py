@@ -9,9 +9,9 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.answer import tables
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.guarantee import AtYield
-from tolalloc.allocation.trade import SettingTrade
+from tolalloc.allocation.front.pareto_front import Fronts
+from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.wording import quantity, short, with_unit

@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.answer.tables import searches, solver_noise
-from tolalloc.allocation.candidates import GRADES
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.pareto import Front
+from tolalloc.allocation.front.pareto_front import Front, Fronts
+from tolalloc.allocation.search.candidates import GRADES
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.wording import short
 

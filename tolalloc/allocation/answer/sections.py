@@ -11,7 +11,7 @@ from tolalloc.allocation.answer.before_after import units_figure, zones_figure
 from tolalloc.allocation.answer.dimensions import effects_figure
 from tolalloc.allocation.answer.drawing import full_drawing_table
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.document import Section
 from tolalloc.reports.wording import quantity, short, with_unit

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolalloc.allocation.answer.tables import limit_price
-from tolalloc.allocation.robustness import COST_CHANGE, SAME
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.front.robustness import COST_CHANGE, SAME
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.wording import QUICK_RUN, short, with_unit

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.candidates import ALONE, GRADES
-from tolalloc.allocation.guarantee import AtYield
-from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.program.problem import Solution
-from tolalloc.allocation.requirement import Check
-from tolalloc.allocation.search import ZoneAllocation
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.search.candidates import ALONE, GRADES
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.problem import Solution
+from tolalloc.allocation.space.requirement import AtYield, Check
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.wording import short
 

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.closed_forms import ClosedForm, Combined, Exponential, Reciprocal, ReciprocalPower
+from tolalloc.allocation.cost.model import ClosedForm, Combined, Exponential, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.points import Points, ShopPoints
 from tolalloc.exceptions import InputError
 

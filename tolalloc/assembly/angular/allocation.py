@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.program.problem import Solution
-from tolalloc.allocation.program.process_choice import allocate
+from tolalloc.allocation.search.process_choice import allocate
+from tolalloc.allocation.space.problem import Solution
 from tolalloc.assembly.angular.program import AngularLimits, angular_limits, angular_problem, requirements_of
 from tolalloc.assembly.gains import Gains, assembled, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan

@@ -8,9 +8,8 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.closed_forms import ClosedForm, Exponential, Reciprocal
-from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.program.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.allocation.cost.model import ClosedForm, Exponential, Process, Reciprocal
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.assembly.gains import FinalErrors
 from tolalloc.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.exceptions import InputError

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.difference import limited_shares
-from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.capability.indices import quantile_interval
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.reading.units import unit_of

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.model import Process
-from tolalloc.allocation.repricing import cheapest, outside_range, repriced
-from tolalloc.allocation.requirement import Requirement
+from tolalloc.allocation.space.design_space import cheapest, outside_range, repriced
+from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.cli.live.design import LiveDesign, shown_zone
 from tolalloc.cli.live.judged import judged
 from tolalloc.drawings.seeds import SeedTree

@@ -1,0 +1,354 @@
+"""From requirements to the cheapest drawing: all searches of one question, in order, and what is asked around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
+from tolalloc.allocation.front.checkpoint import Checkpoint, RememberedResponse
+from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
+from tolalloc.allocation.front.robustness import Robustness, robustness
+from tolalloc.allocation.front.trade import QuantileResponse, SettingTrade, cost_at_yield, setting_trade
+from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextDesign
+from tolalloc.allocation.search.discrete import (
+    GradedAllocation,
+    allocate_grades,
+    group_options,
+    with_shared_zones,
+)
+from tolalloc.allocation.search.zone_allocation import (
+    ZoneAllocation,
+    allocate,
+    kept_stacks,
+    require_groups,
+    scale_in_proportion,
+)
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.verify.acceptance import AS_GOOD_AS, FIRST, Judge, confidence_of_fewer, confirm
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.capability.experiment import Experiment
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError
+from tolalloc.models.model import Examination, Model
+from tolalloc.reports.header import Header
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import RunRecord
+from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.regrouped import regrouped
+from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+_EXAMINED = 1000
+"""Random units of the drawing that tell whether it can be built [-]."""
+_EXACT = (0.85, 1.25)
+"""Ends of the exact front over the limit asked for [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawingQuestion:
+    """What is asked of the cheapest drawing."""
+
+    model: Model  # The model at the sources of the tolerance table
+    space: DesignSpace  # Design variables with every setting free
+    requirements: tuple[Requirement, ...]  # What must be kept; the first one limits the leading output
+    effort: AllocationEffort  # How much may be computed
+    seed: int  # Seed of every random number [-]
+    largest_failed_share: float  # Share of units that may fail [-]
+    grades: bool  # Whether zones come from ISO 286 grades and preferred numbers alone
+    fixed_first: bool  # Whether the settings are first left as they are, which says what freeing them is worth
+    front: bool  # Whether cost is traded against the limit
+    what_if: bool  # Whether the settings are traded against the zones, and costs, the model and processes are changed
+    # What becomes of units beyond a limit, and what the leading output costs a user although it keeps its limit
+    unit_price: UnitPrice | None
+    quality_loss: QualityLoss | None
+    place: str  # Where the question stands, for messages
+
+    @property
+    def limits_one_side_above(self) -> bool:
+        """Whether the leading output has one limit, an upper one above 0, along which fronts and prices run."""
+        limits = self.requirements[0].limits
+        return limits.lower is None and (limits.upper or 0.0) > 0.0
+
+    @property
+    def search_confidence(self) -> float:
+        """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
+        shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
+        good_as = 1 if self.model.is_fast else AS_GOOD_AS
+        return confidence_of_fewer(shown, units, good_as * self.effort.confirmation_units)
+
+    def seeds(self, name: str) -> SeedTree:
+        """Return the node of the seed tree of a stage."""
+        return SeedTree(self.seed).child("allocate", name)
+
+    def require_answerable(self) -> None:
+        """Raise unless every stage can be asked: zones to change, steps of ladders, units enough.
+
+        Raises
+        ------
+        InputError
+            What cannot be asked, before anything long runs.
+        """
+        require_groups(self.space, self.place)
+        if self.grades:
+            group_options(with_shared_zones(self.space))
+        if self.unit_price and not self.limits_one_side_above:
+            leading = self.requirements[0].output
+            raise InputError(f"{self.place}: unit_price needs one upper limit above 0 on {leading}, the first limit.")
+        asked = {
+            "confirmation_units": (self.effort.confirmation_units, 1 - FIRST.error(self.effort.error)),
+            "verification_units": (self.effort.verification_units, self.search_confidence),
+        }
+        if self.what_if and self.model.uncertain:
+            asked["stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
+        for requirement in self.requirements:
+            for name, (units, confidence) in asked.items():
+                try:
+                    requirement.guarantee.require_enough(units, confidence)
+                except InputError as error:
+                    said = f"{self.place}, effort.allocation.{name} for {requirement.output}, {error}"
+                    raise InputError(said) from None
+
+    def verifier(self, search: str, space: DesignSpace) -> Verifier:
+        """Return what judges the designs of one search on fresh units, other ones than those of any other search."""
+        # The search that frees everything at once keeps the stream that it had before there were others.
+        direct = SeedTree(self.seed).child("verification")
+        return Verifier(
+            space=space,
+            model=self.model,
+            requirements=self.requirements,
+            seeds=direct if search == "direct" else self.seeds("verification").child(search),
+            units=self.effort.verification_units,
+            largest_failed_share=self.largest_failed_share,
+            confidence=self.search_confidence,
+        )
+
+    def quantile(self, spread: float) -> QuantileResponse:
+        """Return the quantile of designs on the real model, common random numbers."""
+        errors, units = self.space.errors, self.effort.shared_units
+        shared = next(self.seeds("shared").uniform_chunks(units, len(errors.columns)))
+        return QuantileResponse(
+            space=self.space,
+            model=self.model,
+            output=self.requirements[0].output,
+            standard=errors.standard_values(shared),
+            spread=spread,
+        )
+
+    def direct(self) -> ZoneAllocation:
+        """Return the allocation of tolerances and settings at once, from proportional scaling."""
+        verifier = self.verifier("direct", self.space)
+        return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
+
+    def fixed(self) -> ZoneAllocation:
+        """Return the allocation of tolerances with the settings as they are."""
+        verifier = self.verifier("alone", self.space.fixed)
+        return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
+
+    def free(self, fixed: ZoneAllocation) -> ZoneAllocation:
+        """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
+        return allocate(self.verifier("joint", self.space), fixed.proportional_tried, self.effort.search, fixed.chosen)
+
+    def graded(self, free: ZoneAllocation, fixed: ZoneAllocation | None) -> GradedAllocation:
+        """Return the cheaper allocation on ladders of zones, with the settings free or as they are."""
+        steps = self.effort.graded_steps
+        found = [allocate_grades(self.verifier("graded", self.space), free.chosen, steps)]
+        if fixed and self.space.holds_present_settings:
+            found.append(allocate_grades(self.verifier("graded alone", self.space.fixed), fixed.chosen, steps))
+        best = answer(tuple(own.chosen for own in found))
+        return next(own for own in found if own.chosen is best)
+
+    def beside_grades(self, free: ZoneAllocation, graded: GradedAllocation) -> ZoneAllocation:
+        """Return the allocation of free zones, looked for again from grades that are cheaper: they are such zones."""
+        if not graded.chosen.met or (free.chosen.met and free.chosen.cost <= graded.chosen.cost):
+            return free
+        verifier = self.verifier("beside grades", self.space)
+        found = allocate(verifier, free.proportional_tried, self.effort.search, graded.chosen)
+        if found.chosen.met and found.chosen.cost <= graded.chosen.cost:
+            return found
+        return found.with_chosen(graded.chosen, (graded.chosen,))
+
+    def confirmed(self, found: Candidates) -> Candidates:
+        """Return what the searches found with the drawing that fresh units confirm."""
+        judge = Judge(
+            model=self.model,
+            seeds=self.seeds("confirmation"),
+            units=self.effort.confirmation_units,
+            error=self.effort.error,
+            largest_failed_share=self.largest_failed_share,
+        )
+        admitted = found.admitted()
+        # Where no search ended inside all limits, what fresh units say of its best design leads to a safer one.
+        promising = {name: own for name, own in admitted.items() if own.met} or {
+            name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
+        }
+        following = NextDesign(
+            found=found,
+            judge=judge,
+            drawn=self.model.drawn_amounts,
+            space=self.space,
+            verifier=partial(self.verifier, "confirmation"),
+        )
+        result = confirm(judge, promising, following, self.effort.gain)
+        return found.with_confirmed(result, self.model.drawn_amounts)
+
+    def trade(self, free: ZoneAllocation) -> SettingTrade | None:
+        """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
+        if not 1 <= len(self.space.settings) <= len(self.effort.setting_steps):
+            return None
+        values = tuple(
+            _denser_below(setting.lower, setting.upper, steps)
+            for setting, steps in zip(self.space.settings, self.effort.setting_steps, strict=False)
+        )
+        return setting_trade(self.quantile(free.chosen.spread), free, values)
+
+    def fronts(self, found: ZoneAllocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
+        """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
+        drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
+        space, ladders = (graded.space, graded.scales) if graded else (self.space, {})
+        effort = self.effort.search.front
+        # Where the limit is out of reach, the front lies around what is kept instead.
+        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
+        stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
+        exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
+        # The searches begin with the same designs, and share what the kernel says of them.
+        kernel = RememberedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
+        further = [()] if not space.settings else [(), (space.settings[-1].name,)]
+        searched = [
+            searched_front(space, kernel, drawn, stacks, exact, self.seeds("front"), effort, ladders, own)
+            for own in further
+        ]
+        third = searched[1][0] if len(searched) > 1 else None
+        return Fronts(exact=exact, searched=searched[0][0], with_setting=third, score=searched[0][1])
+
+    def robustness(self, free: ZoneAllocation) -> Robustness:
+        """Return the answers under changed assumptions."""
+        verifier = replace(self.verifier("robustness", self.space), units=self.effort.stiffness_units)
+        seeds = self.seeds("robustness")
+        return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
+
+    def _changed_models(self, seeds: SeedTree) -> tuple[Model, ...]:
+        """Return models drawn from what is uncertain of the model, none if nothing is said of it."""
+        if not self.model.uncertain:
+            return ()
+        source = self.model.uncertain[0]
+        shape = (self.effort.changed_stiffnesses, len(source.columns))
+        draws = source.standard_values(seeds.child("stiffness").generator().random(shape))
+        return tuple(self.model.changed(change) for change in draws)
+
+    def prices(self, free: ZoneAllocation) -> YieldLadder | None:
+        """Return the price of a good unit over yield targets, if the question prices the others."""
+        price = self.unit_price
+        if price is None:
+            return None
+        return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
+
+    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> tuple[SobolIndices, SobolIndices]:
+        """Return the indices of the leading output at the zones and the settings of a design.
+
+        By source, and by dimension of the drawing.
+        """
+        errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
+        response = self.model.at(space.settings_of(design)).reading((leading,))
+        experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
+        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
+        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
+
+    def examined(self, design: VerifiedDesign) -> Examination:
+        """Return what the model says of random units of a design."""
+        units = design.space.units(design.design, self.seeds("examination"), _EXAMINED)
+        return self.model.at(design.settings).examined(units)
+
+
+def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
+    """Return values of a range, denser towards its lower end, where zones are cheap."""
+    return np.unique(np.round(low + (high - low) * np.linspace(0.0, 1.0, steps) ** 2, 2))
+
+
+def allocate_drawing(
+    question: DrawingQuestion, record: RunRecord, header: Header, checkpoint: Path | None = None
+) -> AllocationAnswer:
+    """Return the cheapest drawing that keeps the requirements.
+
+    Parameters
+    ----------
+    question
+        What is asked.
+    record
+        Keeps statuses and times.
+    header
+        Header of the answer, to which statuses and stages are added.
+    checkpoint
+        File that keeps the answers of the search for the front, so that an interrupted run goes on from them.
+
+    Raises
+    ------
+    InputError
+        What cannot be asked.
+    SolveError
+        Too many units failed.
+    """
+    question.require_answerable()
+    kept = Checkpoint(path=checkpoint, every=4, question=header.digest) if checkpoint else None
+    fixed = graded = trade = fronts = robust = None
+    with one_blas_thread():
+        if question.fixed_first and question.space.settings:
+            with record.stage("tolerances alone"):
+                fixed = question.fixed()
+            with record.stage("with modification"):
+                free = question.free(fixed)
+        else:
+            with record.stage("allocation"):
+                free = question.direct()
+        if question.grades:
+            with record.stage("grades"):
+                graded = question.graded(free, fixed)
+        with record.stage("confirmation"):
+            found = question.confirmed(Candidates(fixed=fixed, free=free, graded=graded))
+            fixed, free, graded = found.fixed, found.free, found.graded
+        if graded:
+            with record.stage("free zones beside grades"):
+                free = question.beside_grades(free, graded)
+        if question.what_if:
+            with record.stage("modification trade"):
+                trade = question.trade(free)
+        before = record.counts
+        if question.front and question.limits_one_side_above:
+            with record.stage("fronts"):
+                fronts = question.fronts(graded or free, kept)
+        # What a checkpoint knew is not solved again: these units tell how the run went and not what was found.
+        searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
+        if question.what_if:
+            with record.stage("robustness"):
+                robust = question.robustness(free)
+        with record.stage("shares of variance"):
+            chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
+            shares, of_dimensions = question.shares(chosen.space, chosen.design)
+        with record.stage("units of the drawing"):
+            examination = question.examined(chosen)
+    statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
+    return AllocationAnswer(
+        header=replace(header, statuses=statuses, stages=record.stages),
+        model=question.model,
+        requirements=question.requirements,
+        space=question.space,
+        fixed=fixed,
+        free=free,
+        graded=graded,
+        shares=shares,
+        shares_of_dimensions=of_dimensions,
+        trade=trade,
+        fronts=fronts,
+        robustness=robust,
+        prices=question.prices(free),
+        loss=question.quality_loss,
+        error=question.effort.error,
+        examination=examination,
+    )

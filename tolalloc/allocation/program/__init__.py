@@ -1,1 +1,0 @@
-"""The mathematical programs of allocation: features with a choice of processes, tolerance stacks, certificates."""

@@ -1,0 +1,183 @@
+"""Every drawing that was verified on the way, and what is tried after one that was tested."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tolalloc.allocation.search.discrete import GradedAllocation, choice_beside
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation, step_from
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.verify.acceptance import Attempt, Confirmed, Judge
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.models.settings import DrawnAmounts
+
+_ROUNDING = 1e-9
+"""Distance of a cost from its bound, over the bound, up to which it is rounding [-]."""
+
+TABLE, ALIKE, ALONE = "tolerance table as it is", "all zones scaled alike", "tolerances alone"
+FREE, GRADES = "everything free", "grades"
+"""What the drawings that are compared are called; a model has its own word for everything free."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidates:
+    """What the searches of one question found."""
+
+    fixed: ZoneAllocation | None  # Settings as they are, if the question asks for it and the model has any
+    free: ZoneAllocation  # Tolerances and settings together
+    graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
+
+    def designs(self, free_label: str = FREE) -> dict[str, VerifiedDesign]:
+        """Return the designs that a report compares, by what they are called."""
+        alone = {ALONE: self.fixed.chosen} if self.fixed else {}
+        grades = {GRADES: self.graded.chosen} if self.graded else {}
+        return {
+            TABLE: self.free.baseline,
+            ALIKE: self.free.proportional,
+            **alone,
+            free_label: self.free.chosen,
+            **grades,
+        }
+
+    def admitted(self, free_label: str = FREE) -> dict[str, VerifiedDesign]:
+        """Return those that may be drawn: the table always, the others where their zones and amounts may be so.
+
+        Where grades are asked for, nothing but them and the table may.
+        """
+        found = self.designs(free_label)
+        if self.graded:
+            return {TABLE: found[TABLE], GRADES: found[GRADES]}
+        return {name: design for name, design in found.items() if name == TABLE or self._space.allows(design.design)}
+
+    @property
+    def drawn(self) -> VerifiedDesign:
+        """The cheapest admitted design that was confirmed; the least violating one if none was."""
+        admitted = tuple(self.admitted().values())
+        confirmed = tuple(own for own in admitted if own.confirmed)
+        return answer(confirmed or tuple(own for own in admitted if not own.met) or admitted)
+
+    def with_confirmed(self, found: Confirmed, drawn_amounts: DrawnAmounts) -> Candidates:
+        """Return the candidates with what became of those that were judged."""
+        free, last = self.free, {name: found.last(name) for name, _ in found.judged}
+        hands = {id(own): last[name] for name, own in self.designs().items() if name in (TABLE, ALIKE) and name in last}
+        free = replace(free, proportional_tried=tuple(hands.get(id(own)) or own for own in free.proportional_tried))
+        tried = {name: tuple(own for kind, own in found.judged if kind == name) for name in last}
+        fixed = self.fixed
+        if fixed and (design := last.get(ALONE)):
+            fixed = fixed.with_chosen(design, tried[ALONE])
+        if design := last.get(FREE):
+            free = free.with_chosen(design, tried[FREE])
+        graded = self.graded
+        if graded and (design := last.get(GRADES)):
+            graded = graded.with_chosen(drawn_amounts, design, tried[GRADES])
+        return Candidates(fixed=fixed, free=free, graded=graded)
+
+    @property
+    def unrestricted(self) -> ZoneAllocation:
+        """The search that found the cheaper zones off the ladders: with the settings as they are, or with them free."""
+        cheapest = _cheapest({name: own.chosen for name, own in self._searches.items()})
+        return next((own for own in self._searches.values() if own.chosen is cheapest), self.free)
+
+    @property
+    def bound(self) -> float | None:
+        """Least cost that the models around the verified designs hold for possible; nothing if one undercuts it.
+
+        The models hold near their designs, and what they say is no better than they are.
+        """
+        free = min(own.bound for own in self._searches.values())
+        bound = self.graded.bound if self.graded else free
+        kept = [own.cost for own in self.admitted().values() if own.met]
+        return None if kept and min(kept) < bound * (1 - _ROUNDING) else bound
+
+    @property
+    def _searches(self) -> dict[str, ZoneAllocation]:
+        """The searches whose zones and settings may be drawn, off the ladders."""
+        alone = self.fixed if self.fixed and self._space.holds_present_settings else None
+        return {FREE: self.free, **({ALONE: alone} if alone else {})}
+
+    @property
+    def _space(self) -> DesignSpace:
+        """The design variables with every setting free."""
+        return self.free.chosen.space
+
+
+def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:
+    """Return the cheapest design that was shown to keep the limits."""
+    return min((own for own in designs.values() if own.met), key=lambda own: own.cost, default=None)
+
+
+_REACH = 1.1
+"""Factor by which a variable may change from a judged design to the next one [-]."""
+_MARGIN = 1.0
+"""How far inside what must be shown the next design is aimed while nothing is confirmed, half as far again after each
+miss but the first [standard errors of what its units and those of the judged one say]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextDesign:
+    """Makes the design that follows a judged one, for `tolalloc.allocation.verify.acceptance.confirm`."""
+
+    found: Candidates  # What the searches found
+    judge: Judge  # Judges the designs
+    drawn: DrawnAmounts  # What the drawing says of the settings
+    space: DesignSpace  # Design variables with every setting free
+    verifier: Callable[[DesignSpace], Verifier]  # Returns what makes the models of a design
+
+    def __call__(
+        self, kind: str, judged: VerifiedDesign, attempt: Attempt, worth: float
+    ) -> tuple[str, VerifiedDesign] | None:
+        """Return the design that the search of a judged one would try next, none where it would try no other.
+
+        After a miss that may be one that the search has tried, where it is cheaper than what the models make. From a
+        drawing that no search made and that is not good enough, the search for free zones goes on.
+        """
+        found = self.found
+        searches = {ALONE: found.fixed, FREE: found.free}
+        if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
+            kind = FREE
+        margin = self.judge.margin(judged, self._errors_inside(judged, attempt, worth))
+        seen = self.judge.foreseen(judged, attempt)
+        if kind == GRADES and found.graded:
+            tried = found.graded.tried[1:]
+            design = choice_beside(self.drawn, seen, tried, margin)
+        elif search := searches.get(kind):
+            tried = search.tried
+            design = step_from(seen, tried, margin, _REACH)
+        else:
+            return None
+        known = () if judged.confirmed else _still_kept(tried, seen)
+        cheapest = min(known, key=lambda own: own.cost, default=None)
+        if cheapest and cheapest.cost <= worth and (design is None or cheapest.cost < judged.space.cost(design)):
+            return kind, cheapest
+        if design is None or judged.space.cost(design) > worth:
+            return None
+        space = self.space if kind == FREE else judged.space
+        return kind, self.verifier(space).verify(design, f"attempt {attempt.number}")
+
+    def _errors_inside(self, judged: VerifiedDesign, attempt: Attempt, worth: float) -> float:
+        """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""
+        if np.isinf(worth):  # nothing is confirmed
+            return _MARGIN * (1 + attempt.missed) / 2
+        # A miss costs nothing then, so at even odds the next one is aimed at the limit itself, but after a miss.
+        errors = _MARGIN * 2 * (0.5 - self.judge.error)
+        return errors if judged.confirmed else max(errors, _MARGIN / 2)
+
+
+def _still_kept(tried: tuple[VerifiedDesign, ...], judged: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
+    """Return the dearer designs of a search that were met, and still are with what a judged one says of them.
+
+    What both say is weighed by their variances. The judged one itself is none of them.
+    """
+    return tuple(
+        own
+        for own in tried
+        if own.met
+        and own.cost > judged.cost
+        and all(
+            side.excess * other.standard_error**2 + other.predicted(own.design) * side.standard_error**2 <= 0
+            for side, other in zip(own.sides, judged.sides, strict=True)
+        )
+    )

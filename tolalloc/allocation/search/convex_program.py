@@ -1,0 +1,328 @@
+"""The convex program: least cost for one choice of processes, compiled once and solved for many stacks."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.allocation.cost.model import Expression
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.lagrange_dual import convex_cost, cost_bound
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.problem import (
+    AllocationProblem,
+    LeastInfeasible,
+    PricedFeature,
+    Shared,
+    Solution,
+    Stack,
+    least_infeasible,
+)
+from tolalloc.exceptions import SolveError
+
+_ATTEMPTS = (
+    # Gap, violation, both where it may stop if it must [-]; whether rows are scaled
+    (1e-12, 1e-10, 1e-8, True),
+    (1e-9, 1e-9, 1e-8, True),
+    (1e-9, 1e-9, 1e-8, False),
+    (1e-8, 1e-8, 1e-8, True),
+    (1e-8, 1e-8, 1e-6, True),
+)
+"""What the solver aims at first, on the scaled program, and then where rounding keeps it from that."""
+_NEGLIGIBLE = 1e-6
+"""Part of a stack's largest root-sum-square term below which a term is left out: only its square counts [-]."""
+_ENOUGH = 1e-10
+"""Gap below which the certificate is not polished further [-]."""
+
+
+_StackParameters = tuple[Any, Any, Any, Any]
+"""Worst case, root sum square, slopes and budget of a stack over its scale, zones over their units, as cvxpy has them.
+"""
+
+
+class ConvexProgram:
+    """Least cost of features that are made by given processes, with every stack within its budget.
+
+    Parameters
+    ----------
+    features
+        What is chosen.
+    processes
+        Position of the process of every feature.
+    stacks
+        Number of stacks that every solve brings.
+    shared
+        Variables that belong to no feature.
+
+    Raises
+    ------
+    InputError
+        A cost is not convex.
+
+    Notes
+    -----
+    Zones are counted in the geometric middle of their process's range, stacks in their budget, costs in what they
+    change there, so the solver sees numbers of order one whatever the unit. The stacks and all bounds are parameters:
+    cvxpy compiles once.
+    """
+
+    def __init__(
+        self, features: Sequence[PricedFeature], processes: Int[np.ndarray, " feature"], stacks: int, shared: Shared
+    ) -> None:
+        import cvxpy as cp
+
+        self.features, self.shared, self.processes = tuple(features), shared, processes
+        self._made = tuple(feature.processes[at] for feature, at in zip(features, processes, strict=True))
+        self.lower = np.array([process.minimum for process in self._made])
+        self.upper = np.array([process.maximum for process in self._made])
+        self._units = np.sqrt(self.lower * self.upper)
+        losses = np.array([feature.loss for feature in features]) * self._units**2
+        slopes = [float(made.cost.slope(np.array(unit))) for made, unit in zip(self._made, self._units, strict=True)]
+        self._cost_scale = float(np.abs(slopes) @ self._units + losses.sum()) or 1.0
+        count, shares = len(self.features), len(shared.names)
+        self._zones, self._shared = cp.Variable(count, pos=True), cp.Variable(shares)
+        self._bounds = [cp.Parameter(count) for _ in range(2)] + [cp.Parameter(shares) for _ in range(2)]
+        self._stacks: list[_StackParameters] = [
+            (cp.Parameter(count, nonneg=True), cp.Parameter(count, nonneg=True), cp.Parameter(shares), cp.Parameter())
+            for _ in range(stacks)
+        ]
+        made = [
+            convex_cost(f"feature {feature.name}", process.rescaled(unit), self._zones[at])
+            for at, (feature, process, unit) in enumerate(zip(features, self._made, self._units, strict=True))
+        ]
+        cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
+        self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
+        self._kept = [self._load(stack) <= stack[-1] for stack in self._stacks]
+        around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]
+        self._problem = cp.Problem(cp.Minimize(cost), [*self._keeping, *self._kept, *around])
+
+    def _load(self, stack: _StackParameters) -> Expression:
+        import cvxpy as cp
+
+        worst_case, root_sum_square, slopes, _ = stack
+        return worst_case @ self._zones + cp.norm2(cp.multiply(root_sum_square, self._zones)) + slopes @ self._shared
+
+    def solve(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None = None,
+        upper: Float[np.ndarray, " feature"] | None = None,
+        shared_lower: Float[np.ndarray, " shared"] | None = None,
+        shared_upper: Float[np.ndarray, " shared"] | None = None,
+    ) -> Solution | None:
+        """Return the cheapest design within the bounds, or None where no design keeps all stacks.
+
+        Parameters
+        ----------
+        stacks
+            What must be kept.
+        lower, upper
+            Bounds of the zones, inside those of the processes unless they are given [unit of the zone].
+        shared_lower, shared_upper
+            Bounds of the shared variables.
+
+        Raises
+        ------
+        SolveError
+            The solver ended neither with a design nor with the proof that there is none.
+        """
+        problem = self._restricted(stacks, lower, upper, shared_lower, shared_upper)
+        if not least_infeasible(problem).feasible:
+            return None
+        units, scales, made = self._units, problem.scales, [feature.processes[0] for feature in problem.features]
+        low, high = np.array([each.minimum for each in made]), np.array([each.maximum for each in made])
+        # A shared variable that cannot move has no interior, and interior-point solvers stumble over it.
+        still = problem.shared.lower == problem.shared.upper
+        held = np.where(still, problem.shared.lower, 0.0)
+        around = (np.where(still, -1.0, problem.shared.lower), np.where(still, 1.0, problem.shared.upper))
+        for parameter, value in zip(self._bounds, (low / units, high / units, *around), strict=True):
+            parameter.value = value
+        for parameters, stack, scale in zip(self._stacks, stacks, scales, strict=True):
+            terms = stack.root_sum_square * high
+            values = (
+                stack.worst_case * units / scale,
+                np.where(terms < _NEGLIGIBLE * terms.max(initial=0.0), 0.0, stack.root_sum_square) * units / scale,
+                np.where(still, 0.0, stack.slopes) / scale,
+                (stack.budget - stack.slopes @ held) / scale,
+            )
+            for parameter, value in zip(parameters, values, strict=True):
+                parameter.value = value
+        self._run()
+        return self._solution(problem, low, high)
+
+    def least_infeasible(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None = None,
+        upper: Float[np.ndarray, " feature"] | None = None,
+        shared_lower: Float[np.ndarray, " shared"] | None = None,
+        shared_upper: Float[np.ndarray, " shared"] | None = None,
+    ) -> LeastInfeasible:
+        """Return the design with the smallest largest violation; the arguments are those of `solve`."""
+        found = least_infeasible(self._restricted(stacks, lower, upper, shared_lower, shared_upper))
+        return replace(found, processes=self.processes)
+
+    def _restricted(
+        self,
+        stacks: Sequence[Stack],
+        lower: Float[np.ndarray, " feature"] | None,
+        upper: Float[np.ndarray, " feature"] | None,
+        shared_lower: Float[np.ndarray, " shared"] | None,
+        shared_upper: Float[np.ndarray, " shared"] | None,
+    ) -> AllocationProblem:
+        """Return the allocation whose only processes are the chosen ones, within the bounds."""
+        low = self.lower if lower is None else np.maximum(lower, self.lower)
+        high = self.upper if upper is None else np.minimum(upper, self.upper)
+        features = tuple(
+            replace(feature, processes=(replace(made, minimum=float(least), maximum=float(most)),))
+            for feature, made, least, most in zip(self.features, self._made, low, high, strict=True)
+        )
+        shared = replace(
+            self.shared,
+            lower=self.shared.lower if shared_lower is None else shared_lower,
+            upper=self.shared.upper if shared_upper is None else shared_upper,
+        )
+        return AllocationProblem(features=features, stacks=tuple(stacks), shared=shared)
+
+    def _run(self) -> None:
+        """Solve the compiled program, less precisely where it must be; how precisely shows in the gap."""
+        import cvxpy as cp
+
+        said = ""
+        for gap, violation, reduced, equilibrate in _ATTEMPTS:
+            settings = {
+                "tol_gap_abs": gap,
+                "tol_gap_rel": gap,
+                "tol_feas": violation,
+                "reduced_tol_gap_abs": reduced,
+                "reduced_tol_gap_rel": reduced,
+                "reduced_tol_feas": reduced,
+                "equilibrate_enable": equilibrate,
+            }
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    # Warm, the solver would keep state of earlier solves, and an answer would depend on them.
+                    self._problem.solve(solver=cp.CLARABEL, warm_start=False, **settings)
+            except cp.SolverError as error:
+                said = str(error).split(".")[0]
+                continue
+            if self._problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+                return
+            said = f"it ended as {self._problem.status}"
+        raise SolveError(f"The convex program of the allocation was not solved: {said}.")
+
+    def _solution(
+        self, problem: AllocationProblem, low: Float[np.ndarray, " feature"], high: Float[np.ndarray, " feature"]
+    ) -> Solution:
+        zones = np.clip(self._zones.value * self._units, low, high)
+        cost = problem.cost(zones, np.zeros(zones.size, dtype=int))
+        prices = np.array([max(float(kept.dual_value), 0.0) for kept in self._kept]) * self._cost_scale / problem.scales
+        return Solution(
+            zones=zones,
+            processes=self.processes,
+            shared=np.clip(self._shared.value, problem.shared.lower, problem.shared.upper),
+            cost=cost,
+            bound=cost_bound(problem, prices, zones, enough=cost - _ENOUGH * abs(cost)),
+            prices=prices,
+            bound_prices=np.maximum(np.stack([side.dual_value for side in self._keeping], axis=1), 0.0)
+            * (self._cost_scale / self._units)[:, None],
+        )
+
+
+def front(
+    program: ConvexProgram, stacks: Sequence[Stack], at: int, budgets: Float[np.ndarray, " point"]
+) -> tuple[Solution | None, ...]:
+    """Return the exact front: the cheapest design for every budget of the stack at a position, None where none is."""
+    return tuple(
+        program.solve([*stacks[:at], replace(stacks[at], budget=float(budget)), *stacks[at + 1 :]])
+        for budget in budgets
+    )
+
+
+SETTLED = 0.01
+"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
+
+
+class Programs:
+    """The convex programs of a design space, one for each choice of processes, compiled once.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    stacks
+        Number of limited sides of all requirements [-].
+    """
+
+    def __init__(self, space: DesignSpace, stacks: int) -> None:
+        self.space, self.stacks = space, stacks
+        self._compiled: dict[tuple[int, ...], ConvexProgram] = {}
+
+    def of(self, processes: Int[np.ndarray, " group"]) -> ConvexProgram:
+        """Return the program of the processes at the given positions."""
+        key = tuple(processes.tolist())
+        if key not in self._compiled:
+            self._compiled[key] = ConvexProgram(self.space.features, processes, self.stacks, self.space.shared)
+        return self._compiled[key]
+
+    def choose(self, stacks: tuple[Stack, ...], present: Int[np.ndarray, " group"]) -> Int[np.ndarray, " group"]:
+        """Return the processes that the models prefer; the present ones stay unless another choice clearly pays.
+
+        Parameters
+        ----------
+        stacks
+            Local models with the budget that is aimed at.
+        present
+            Position of the present process of every group [-].
+        """
+        if not self.space.has_choices:
+            return present
+        best = process_choice.allocate(self.space.problem(stacks))
+        kept = self.of(present).solve(stacks)
+        if kept is not None and isinstance(best, Solution) and best.cost > (1 - SETTLED) * kept.cost:
+            return present
+        return best.processes
+
+    def step(
+        self,
+        stacks: tuple[Stack, ...],
+        processes: Int[np.ndarray, " group"],
+        around: Float[np.ndarray, " variable"],
+        reach: float,
+    ) -> Float[np.ndarray, " variable"]:
+        """Return the cheapest design near another one, or the one there that violates the stacks least.
+
+        Parameters
+        ----------
+        stacks
+            Local models with the budget that is aimed at.
+        processes
+            Position of the process of every group [-].
+        around
+            A design.
+        reach
+            Factor by which variables may change, as far as their ranges go [-].
+        """
+        program, groups, shared = self.of(processes), len(self.space.groups), self.space.shared
+        low, high = (np.clip(around[:groups] * by, program.lower, program.upper) for by in (1 / reach, reach))
+        bounds = (low, high, *_reached(around[groups:], reach, shared.lower, shared.upper))
+        found = program.solve(stacks, *bounds) or program.least_infeasible(stacks, *bounds)
+        return np.concatenate([found.zones, found.shared])
+
+
+def _reached(
+    around: Float[np.ndarray, " shared"],
+    reach: float,
+    lower: Float[np.ndarray, " shared"],
+    upper: Float[np.ndarray, " shared"],
+) -> tuple[Float[np.ndarray, " shared"], Float[np.ndarray, " shared"]]:
+    """Return the bounds within reach of clearances; near zero the reach is that of 1 µm [µm]."""
+    centre = np.clip(around, lower, upper)
+    size = np.maximum(np.abs(centre), 1.0)
+    return np.maximum(lower, centre - size * (1 - 1 / reach)), np.minimum(upper, centre + size * (reach - 1))

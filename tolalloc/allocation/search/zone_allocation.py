@@ -1,0 +1,345 @@
+"""From requirements to a verified allocation: steps of the convex program, and proportional scaling beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.convex_program import SETTLED, Programs
+from tolalloc.allocation.search.lower_bound import LowerBound, lower_bound
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.effort import SearchEffort
+from tolalloc.allocation.space.problem import Solution, Stack
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.exceptions import InputError, SolveError
+
+_LEAST_RISE = 1e-6
+"""What all zones together take of a limit is at least so much of the limit, where it is what a step divides by [-]."""
+
+
+def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
+    """Return designs with all zones scaled alike, the first the tolerance table as it is.
+
+    Notes
+    -----
+    The scale follows the design's own gradient until a met design has next to nothing left to gain: what an
+    engineer does with a few Monte Carlo runs.
+    """
+    space, scale = verifier.space, 1.0
+    tried: list[VerifiedDesign] = []
+    for step in range(steps):
+        # The stream of random units keeps the name that it had.
+        tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}"))
+        factor = _factor(tried[-1])
+        if tried[-1].met and factor < 1 + SETTLED:
+            break
+        scale *= factor
+    return tuple(tried)
+
+
+def _factor(tried: VerifiedDesign) -> float:
+    """Return the common factor of all scales that takes a design to its limits [-]."""
+    factors = []
+    for side in tried.sides:
+        rise = side.load_of_zones(tried.design)
+        budget = -float(side.predicted(tried.design)) - side.standard_error
+        factors.append(1 + budget / max(rise, _LEAST_RISE * side.scale))
+    return float(np.clip(min(factors), 0.4, 2.5))
+
+
+_SIMILAR = (1.25, 1.0)
+"""Ratio of scales, and difference of settings over ten steps of theirs, up to which designs share their models [-]."""
+_REPAIRS = 3
+"""Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
+_EXPLAINED = 2.0
+"""Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
+
+
+def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0) -> tuple[Stack, ...]:
+    """Return the local models of a design with the budget to aim at.
+
+    Parameters
+    ----------
+    last
+        The design.
+    tried
+        It and all designs before it.
+    margin
+        How far inside each limit the aim is [standard errors].
+
+    Notes
+    -----
+    The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
+    each limit. Where the models of the last design also explain other ones near by, their mean deviation from them
+    corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
+    """
+    similar = [item for item in tried if _is_similar(item, last)]
+    stacks = []
+    for at, side in enumerate(last.sides):
+        found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
+        deviation = 0.0 if side.law else float(np.average(found, weights=[item.achieved.units for item in similar]))
+        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
+    return tuple(stacks)
+
+
+def _is_similar(first: VerifiedDesign, second: VerifiedDesign) -> bool:
+    ratio, distance = _SIMILAR
+    scales = np.abs(np.log(first.scales / second.scales)).max(initial=0.0)
+    moved = np.abs(first.settings - second.settings) / (10 * first.space.setting_steps)
+    return bool(scales <= np.log(ratio) and moved.max(initial=0.0) <= distance)
+
+
+def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:
+    """Return the models of a design whose budget is what is aimed at, or what the design itself takes of it.
+
+    Parameters
+    ----------
+    chosen
+        The design.
+    tried
+        All designs of its search, which tell how lucky its own sample was.
+    margin
+        How far inside each limit the aim is; 0 for the limits themselves [standard errors].
+    """
+    loads = [float(side.stack.load(chosen.scales, chosen.settings)) for side in chosen.sides]
+    stacks = aimed(chosen, list(tried), margin)
+    return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
+
+
+def step_from(
+    last: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float, reach: float
+) -> Float[np.ndarray, " variable"]:
+    """Return the cheapest design near a verified one that its models let keep the limits, made by the same processes.
+
+    Parameters
+    ----------
+    last
+        The verified design.
+    tried
+        Designs beside it that correct its models.
+    margin
+        How far inside each limit the aim is [standard errors].
+    reach
+        Factor by which a variable may change [-].
+    """
+    processes = last.space.process_positions(last.design)
+    return Programs(last.space, len(last.sides)).step(
+        aimed(last, [*tried, last], margin), processes, last.design, reach
+    )
+
+
+def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:
+    """Return the designs of a trust-region sequence; each is verified on fresh units before the next is made.
+
+    Parameters
+    ----------
+    verifier
+        Judges the designs and gives the convex models around each.
+    start
+        A verified design to start from.
+    steps
+        Largest number of verified designs, but for up to three that mend the last one [-].
+    reach
+        Factor by which a variable may change in the first step [-].
+
+    Notes
+    -----
+    Where fresh units are further from the prediction than chance explains, the next step reaches less.
+    """
+    space, tried = verifier.space, [start]
+    programs, processes = Programs(space, len(start.sides)), space.process_positions(start.design)
+    for step in range(steps + _REPAIRS):
+        last = tried[-1]
+        if step >= steps and not _is_worth_mending(tried):
+            break
+        stacks = aimed(last, tried)
+        processes = programs.choose(stacks, processes)
+        found = programs.step(stacks, processes, last.design, reach)
+        settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
+        if step > 0 and settled:
+            break
+        tried.append(verifier.verify(found, f"convex {step + 1}"))
+        if not _explains(last, tried[-1]):
+            reach = max(1.25, float(np.sqrt(reach)))
+    return tuple(tried[1:])
+
+
+def _is_worth_mending(tried: list[VerifiedDesign]) -> bool:
+    """Return whether the last design keeps not all limits and is cheaper than every one that does."""
+    kept = [own.cost for own in tried if own.met]
+    return not tried[-1].met and tried[-1].cost < (1 - SETTLED) * min(kept, default=np.inf)
+
+
+def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
+    """Return whether the models of a design predicted what fresh units said of the next one."""
+    return all(
+        abs(now.excess - before.predicted(new.design))
+        <= _EXPLAINED * np.hypot(before.standard_error, now.standard_error)
+        for before, now in zip(last.sides, new.sides, strict=True)
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZoneAllocation:
+    """What the search found."""
+
+    limit: float  # Limit of the leading output, the upper one of two [unit of the output]
+    # The cheapest design that fresh units on the real kernel show to be met, or the least violating one
+    chosen: VerifiedDesign
+    tried: tuple[VerifiedDesign, ...]  # All designs verified on the way, in order
+    # Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself
+    proportional_tried: tuple[VerifiedDesign, ...]
+    # Cheapest design of all that the chosen one's convex models let keep the limits; without locked zones
+    optimum: Solution
+    inside: Solution  # The same one standard error inside the limits, which is where the search aims
+    locked_cost: float  # Cost of the locked zones [cost units]
+
+    @property
+    def proportional(self) -> VerifiedDesign:
+        """The cheapest met design with all zones scaled alike, or the least violating one."""
+        return answer(self.proportional_tried)
+
+    @property
+    def baseline(self) -> VerifiedDesign:
+        """The tolerance table as it is, modification as it was."""
+        return self.proportional_tried[0]
+
+    @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The chosen design's local models with the budget that the search aims at, or that the design takes of it."""
+        return kept_stacks(self.chosen, self.tried, margin=1.0)
+
+    @property
+    def asked_stacks(self) -> tuple[Stack, ...]:
+        """The same with the budget that the limits leave, however far the chosen design lies beyond them."""
+        return self.stacks if self.chosen.met else aimed(self.chosen, list(self.tried))
+
+    def with_chosen(self, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> ZoneAllocation:
+        """Return the allocation with another design, which was found beside those of the search."""
+        every = (*self.tried, *tried)
+        return replace(
+            self,
+            chosen=chosen,
+            tried=every,
+            optimum=cheapest_by_models(chosen.space, chosen, every, margin=0.0),
+            inside=cheapest_by_models(chosen.space, chosen, every, margin=1.0),
+        )
+
+    @cached_property
+    def lower_bound(self) -> LowerBound:
+        """What no design costs less than, by what is known around the chosen one."""
+        return lower_bound(self.chosen)
+
+    @property
+    def bound(self) -> float:
+        """The same as a number [cost units]."""
+        return self.lower_bound.cost
+
+    @property
+    def gap(self) -> float:
+        """Cost of the chosen design over the bound, minus one [-]."""
+        return self.chosen.cost / self.bound - 1
+
+    @property
+    def prices(self) -> dict[str, float]:
+        """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output]."""
+        return {
+            side.stack.name: float(price) for side, price in zip(self.chosen.sides, self.optimum.prices, strict=True)
+        }
+
+    @property
+    def saving(self) -> float:
+        """Cost saved against proportional scaling, as a share of its cost [-]."""
+        return 1 - self.chosen.cost / self.proportional.cost
+
+    @property
+    def saving_at_least(self) -> float:
+        """The same had proportional scaling used the limit to its last arcsecond: so its cost moved with it [-].
+
+        The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
+        """
+        unused = min(1.0, self.proportional.quantile_bound / self.limit)
+        return 1 - self.chosen.cost / (self.proportional.cost * unused)
+
+
+def require_groups(space: DesignSpace, place: str) -> None:
+    """Raise unless a zone may change.
+
+    Raises
+    ------
+    InputError
+        None may.
+    """
+    if not space.groups:
+        raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
+
+
+def cheapest_by_models(
+    space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
+) -> Solution:
+    """Return the cheapest design that the models of a verified one let keep the limits.
+
+    Parameters
+    ----------
+    space
+        The design variables.
+    chosen
+        The verified design.
+    tried
+        All designs of its search.
+    margin
+        How far inside the limits, as far as the verified design itself is [standard errors].
+
+    Raises
+    ------
+    SolveError
+        The program does not even find the design itself.
+    """
+    # A load that is its own budget may lie beyond it by rounding.
+    kept = kept_stacks(chosen, tried, margin)
+    stacks = tuple(replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget)) for stack in kept)
+    found = process_choice.allocate(space.problem(stacks))
+    if not isinstance(found, Solution):
+        raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")
+    return found
+
+
+def allocate(
+    verifier: Verifier,
+    proportional_tried: tuple[VerifiedDesign, ...],
+    effort: SearchEffort,
+    start: VerifiedDesign | None = None,
+) -> ZoneAllocation:
+    """Return the cheapest verified allocation, or the least violating one with what blocks it.
+
+    Parameters
+    ----------
+    verifier
+        Judges designs on fresh units.
+    proportional_tried
+        Designs with all zones scaled alike, `tolalloc.allocation.search.zone_allocation.scale_in_proportion`.
+    effort
+        How much may be spent.
+    start
+        A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
+        modification it tells tolerances alone from tolerances and modification together.
+    """
+    first, space = start or answer(proportional_tried), verifier.space
+    # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
+    tried = ((first,) if space.allows(first.design) else ()) + step_to_optimum(
+        verifier, first, effort.steps, effort.reach
+    )
+    chosen = answer(tried)
+    return ZoneAllocation(
+        limit=verifier.limit,
+        chosen=chosen,
+        tried=tried,
+        proportional_tried=proportional_tried,
+        optimum=cheapest_by_models(space, chosen, tried, margin=0.0),
+        inside=cheapest_by_models(space, chosen, tried, margin=1.0),
+        locked_cost=space.locked_cost,
+    )

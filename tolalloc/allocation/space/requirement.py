@@ -1,0 +1,484 @@
+"""Requirements: an output, its limits, and what must be shown of them, by random units or by a stack."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Literal, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.space.constraint import (
+    Level,
+    Side,
+    levels_of_law,
+    order_statistic,
+    reached,
+    root_sum_square_stack,
+    side_name,
+    side_scale,
+    worst_case_stack,
+)
+from tolalloc.allocation.space.output_sample import FreshUnits, LimitedSample, OutputTrial
+from tolalloc.allocation.space.problem import Stack
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
+from tolalloc.exceptions import InputError
+from tolalloc.reading.named_fields import NamedFields, is_number
+
+USUAL_YIELD = 0.9973
+"""Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
+_BATCHES = 16
+"""Batches of units whose derivatives tell the error of their mean [-]."""
+
+
+@runtime_checkable
+class Guarantee(Protocol):
+    """What must be shown of an output for its limits to count as kept."""
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        ...
+
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side; the requirement is met if no value lies beyond its limit."""
+        ...
+
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
+        """Raise unless so many units can show it with a one-sided confidence."""
+        ...
+
+
+@runtime_checkable
+class Sampled(Guarantee, Protocol):
+    """A guarantee that random units show, with an error."""
+
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what units show of every limited side with one-sided confidence, the upper one first."""
+        ...
+
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least, with one-sided confidence: the other end of `levels`."""
+        ...
+
+
+@dataclass(frozen=True)
+class AtYield(NamedFields):
+    """So many units lie within all limits of the output, shown with an overall error of at most 5 % in a full run.
+
+    Parameters
+    ----------
+    target
+        Share of units that must keep the limits [-].
+
+    Notes
+    -----
+    The values are order statistics: of the units furthest beyond a limit, either one, so many are left out as the
+    sample may reject. So they are inside exactly where the bound of the yield reaches the target, Clopper–Pearson's
+    where all units were solved.
+    """
+
+    called: ClassVar[str] = "guarantee AtYield"
+    by_position: ClassVar[int] = 1
+
+    target: float
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.target) and 0.5 <= self.target < 1):
+            share = self.target / 100 if is_number(self.target) and 50 <= self.target < 100 else USUAL_YIELD
+            raise InputError.at(self.called, "target", self.target, f"a share from 0.5 to below 1, such as {share:g}")
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return f"{self.target:.2%} of units"
+
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
+        """Raise unless so many units can show it.
+
+        Raises
+        ------
+        InputError
+            Too few units for the target, even if none is rejected.
+        """
+        if allowed_rejections(units, self.target, confidence) < 0:
+            needed = int(np.ceil(np.log(1 - confidence) / np.log(self.target)))
+            raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
+
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
+
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what units show of every limited side, or what its law does where they keep to it."""
+        if sample.law:
+            return levels_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
+        beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
+        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
+
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least."""
+        if sample.law:
+            return levels_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
+        beyond = sample.units.least_excess(sample.excess, self.target, confidence)
+        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
+
+
+@dataclass(frozen=True)
+class AtCpk(NamedFields):
+    """The capability index of the output reaches a target, shown with an overall error of about 5 % in a full run.
+
+    Parameters
+    ----------
+    target
+        Smallest Cpk [-].
+
+    Notes
+    -----
+    The estimate is normal around Cpk with n·var = 1/9 + Cpk·γ/3 + Cpk²·(κ − 1)/4, skewness γ (towards the limit) and
+    kurtosis κ those of the sample: Bissell's interval where both are normal. The value is mean + 3·c·σ, with c the
+    estimate at which the lower bound is the target. Cpk is that of the whole sample; read as a yield, it still
+    assumes a normal output. Units without a usable answer are left out.
+
+    References
+    ----------
+    Bissell 1990, Appl. Statist. 39, 331–340; the delta method for other distributions.
+    """
+
+    called: ClassVar[str] = "guarantee AtCpk"
+    by_position: ClassVar[int] = 1
+
+    target: float
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.target) and 0 < self.target <= 10):
+            raise InputError.at(self.called, "target", self.target, "a Cpk above 0 up to 10")
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return f"Cpk {self.target:g}"
+
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:  # noqa: ARG002
+        """Raise unless so many units can show it.
+
+        Raises
+        ------
+        InputError
+            Too few units for the normal approximation.
+        """
+        if units < 100:
+            raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
+
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
+
+    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what units show of every limited side."""
+        return tuple(self._level(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
+
+    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+        """Return what every limited side is at least."""
+        return self.levels(sample, 1 - confidence)
+
+    def _level(
+        self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
+    ) -> Level:
+        turned = sign * values
+        needed, error = self._needed(turned, confidence)
+        deviation = float(turned.std(ddof=1))
+        value = float(turned.mean()) + 3 * needed * deviation
+        return Level(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
+
+    def _needed(self, turned: Float[np.ndarray, " unit"], confidence: float) -> tuple[float, float]:
+        """Return the estimate whose lower bound is the target, and its standard error [-].
+
+        Below even odds the target is its upper bound.
+        """
+        from scipy.stats import kurtosis, norm, skew
+
+        z, units = float(norm.ppf(confidence)), turned.size
+        lean, tails = float(skew(turned)), float(kurtosis(turned, fisher=False)) - 1
+        # (c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4), the larger root; the smaller one below even odds.
+        square, half = units - z**2 * tails / 4, units * self.target + z**2 * lean / 6
+        # At even odds both roots are the target, up to rounding.
+        root = np.sqrt(max(half**2 - square * (units * self.target**2 - z**2 / 9), 0.0))
+        needed = (half + np.copysign(root, z)) / square
+        variance = (1 / 9 + needed * lean / 3 + needed**2 * tails / 4) / units
+        return float(needed), float(np.sqrt(variance))
+
+
+def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...], limits: Limits) -> tuple[Side, ...]:
+    """Return the sides of what spreads, each with its local model."""
+    return tuple(_spread_side(trial, level, limits) for level in levels)
+
+
+def _spread_side(trial: OutputTrial, level: Level, limits: Limits) -> Side:
+    value, groups = reached(level, trial.values), trial.groups
+    excess, weights, derivative = value - level.sign * level.limit, *_weights(trial, level.sign, value)
+    gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
+    if trial.law:
+        gradient[:groups] = trial.units.space.by_scale(trial.law.excess_by_zone(limits, excess))
+        batches[:, :groups] = gradient[:groups]
+    return Side(
+        sign=level.sign,
+        limit=level.limit,
+        value=level.value,
+        standard_error=level.standard_error,
+        scale=side_scale(trial, level.limit),
+        stack=root_sum_square_stack(side_name(trial, level.sign), trial.design, excess, gradient, groups),
+        batches=batches,
+        law=trial.law,
+    )
+
+
+def _weights(
+    trial: OutputTrial, sign: int, value: float
+) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
+    """Return derivatives of units, and by what each counts in that of mean + spread·σ, the turned value.
+
+    Theory page, equation (24).
+    """
+    turned, (known, derivative) = sign * trial.values, trial.derived()
+    spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
+    standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
+    return sign * (1.0 + spread * standard), derivative
+
+
+def _batches(
+    weights: Float[np.ndarray, " known"], derivative: Float[np.ndarray, "known variable"]
+) -> Float[np.ndarray, "batch variable"]:
+    """Return the same derivative by batches of units."""
+    parts = min(_BATCHES, weights.size)
+    split = (np.array_split(each, parts) for each in (weights, derivative))
+    return np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
+
+
+_MISSED = 0.005
+"""Share of a worst case by which an ascent may have missed it [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstCase:
+    """No unit inside its zones lies beyond a limit, as far as an ascent from many starts can tell."""
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return "worst case found"
+
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
+        """Accept every number of units; none is asked."""
+
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side."""
+        return tuple(self._side(trial, sign, limit) for sign, limit in limits.turned)
+
+    def _side(self, trial: OutputTrial, sign: Literal[1, -1], limit: float) -> Side:
+        value, gradient = trial.worst(sign)
+        stack = worst_case_stack(
+            side_name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
+        )
+        return Side(
+            sign=sign,
+            limit=limit,
+            value=value,
+            standard_error=_MISSED * abs(value),
+            scale=side_scale(trial, limit),
+            stack=stack,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootSumSquare:
+    """Nominal value and root-sum-square of what every source adds at its limit, to first order, lie inside the limits.
+
+    Notes
+    -----
+    The classical stack: √Σ(Dᵢtᵢ)² with the derivatives Dᵢ at nominal and tᵢ half the zone. It takes sizes and
+    positions, needs no sample and knows neither distributions nor what the model bends, so the report shows the yield
+    of fresh units beside it.
+    """
+
+    @property
+    def words(self) -> str:
+        """What must be shown, in words."""
+        return "root-sum-square"
+
+    def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
+        """Accept every number of units; none is asked."""
+
+    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+        """Return every limited side.
+
+        Raises
+        ------
+        InputError
+            A source that is neither a size nor a position.
+        """
+        value, locked, added, by_setting = trial.linear()
+        spread = float(np.hypot(locked, np.linalg.norm(added)))
+        scales, settings = trial.design[: trial.groups], trial.design[trial.groups :]
+        return tuple(
+            Side(
+                sign=sign,
+                limit=limit,
+                value=value + sign * spread,
+                standard_error=0.0,
+                scale=side_scale(trial, limit),
+                stack=Stack(
+                    name=side_name(trial, sign),
+                    worst_case=np.zeros(trial.groups),
+                    root_sum_square=added / scales,
+                    # Locked zones take their part of the quadrature: the free ones may fill what it leaves.
+                    budget=_left(sign * (limit - value), locked) + float(sign * by_setting @ settings),
+                    slopes=sign * by_setting,
+                ),
+            )
+            for sign, limit in limits.turned
+        )
+
+
+def _left(distance: float, locked: float) -> float:
+    """Return what locked zones leave of the distance to a limit, less than nothing beyond it [unit of the output]."""
+    return float(np.sqrt(max(distance**2 - locked**2, 0.0))) if distance > locked else distance - locked
+
+
+JOINT = "largest excess over all limits [-]"
+"""What a yield of all limits together judges: the excess over a limit, relative to it, below zero in a good unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """Limits of an output and what must be shown of them."""
+
+    output: str  # Name of the output with its unit
+    limits: Limits  # One or two limits [unit of the output]
+    guarantee: Guarantee  # What must be shown
+
+    @property
+    def sentence(self) -> str:
+        """The requirement in words."""
+        ends = {"at least": self.limits.lower, "at most": self.limits.upper}
+        said = " and ".join(f"{word} {end:g}" for word, end in ends.items() if end is not None)
+        return f"{self.output}: {said}, shown for {self.guarantee.words}"
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs of the model that it reads."""
+        return (self.output,)
+
+    def read(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, " unit"]:
+        """Return what is limited, of the units whose outputs are given, NaN where a unit has none."""
+        return values[self.output]
+
+    def trial(self, units: FreshUnits, confidence: float) -> OutputTrial:
+        """Return what units say of it."""
+        return OutputTrial(units=units, output=self.output, confidence=confidence)
+
+    def check(self, trial: OutputTrial) -> Check:
+        """Return how a design stands against the requirement."""
+        return Check(requirement=self, sides=self.guarantee.judge(trial, self.limits))
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointRequirement(Requirement):
+    """The limits of several requirements, which so many units keep all at once.
+
+    Notes
+    -----
+    What is limited is the largest excess of a unit over any limit, relative to the limit, which is at most zero in a
+    good unit. Its derivative is that of the limit that is exceeded most.
+    """
+
+    requirements: tuple[Requirement, ...]  # Whose limits must be kept at once
+
+    @classmethod
+    def of(cls, requirements: tuple[Requirement, ...], shown: AtYield) -> JointRequirement:
+        """Return the requirement that a share of the units keeps the limits of all others."""
+        return cls(output=JOINT, limits=Limits(upper=0.0), guarantee=shown, requirements=requirements)
+
+    @property
+    def sentence(self) -> str:
+        """The requirement in words."""
+        return f"all limits at once, shown for {self.guarantee.words}"
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs of the model that it reads."""
+        return tuple(own.output for own in self.requirements)
+
+    def read(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, " unit"]:
+        """Return the largest excess of every unit [-]."""
+        return np.asarray(self.excesses(values).max(axis=0))
+
+    def excesses(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, "side unit"]:
+        """Return how far every unit lies beyond every limit, relative to it [-]."""
+        return np.array(
+            [
+                sign * (values[own.output] - limit) / (abs(limit) or 1.0)
+                for own in self.requirements
+                for sign, limit in own.limits.turned
+            ]
+        )
+
+    def trial(self, units: FreshUnits, confidence: float) -> OutputTrial:
+        """Return what units say of it."""
+        return JointTrial(units=units, output=self.output, confidence=confidence, requirement=self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTrial(OutputTrial):
+    """What fresh units of a design say of all limits at once."""
+
+    requirement: JointRequirement  # The limits
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, " good"]:
+        """The largest excess of the units that have all outputs [-]."""
+        found = self.requirement.read({own: self.units.values(own) for own in self.requirement.outputs})
+        return np.asarray(found[np.isfinite(found)])
+
+    def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
+        """Return the largest excess of some units and its derivative by every variable [-]."""
+        first = {own: self.units.of_first(own) for own in self.requirement.outputs}
+        units = min(values.size for values, _ in first.values())
+        excesses = self.requirement.excesses({own: values[:units] for own, (values, _) in first.items()})
+        slopes = np.array(
+            [
+                sign * first[own.output][1][:units] / (abs(limit) or 1.0)
+                for own in self.requirement.requirements
+                for sign, limit in own.limits.turned
+            ]
+        )
+        known = np.isfinite(excesses).all(axis=0) & np.isfinite(slopes).all(axis=(0, 2))
+        nearest = excesses[:, known].argmax(axis=0)
+        at = np.arange(nearest.size)
+        return excesses[:, known][nearest, at], slopes[:, known][nearest, at]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """How a verified design stands against one requirement."""
+
+    requirement: Requirement  # The requirement
+    sides: tuple[Side, ...]  # Its limited sides, the upper one first
+
+    @property
+    def met(self) -> bool:
+        """Whether the guarantee is shown."""
+        return all(side.excess <= 0 for side in self.sides)
+
+    @property
+    def tightest(self) -> Side:
+        """The side with the largest relative excess."""
+        return max(self.sides, key=lambda side: side.relative_excess)
+
+    @property
+    def slack(self) -> float:
+        """What is left to the nearer limit, negative beyond it [unit of the output]."""
+        return -max(side.excess for side in self.sides)

@@ -1,0 +1,222 @@
+"""A design counts only after fresh units on the real model have judged it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.output_sample import FreshUnits, LimitedSample
+from tolalloc.allocation.space.requirement import Check, Requirement
+from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.linear_function import LinearLaw
+from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
+from tolalloc.capability.near_limit import SolvedUnits
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.models.model import Model
+
+SLOPE_UNITS = 1024
+"""Units that differences of an output without derivatives are averaged over [-]."""
+DERIVATIVE_UNITS = 6144
+"""Units of a fast model whose derivatives are averaged: they cost as much as many values, and err less [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confirming:
+    """Fresh units that no search has seen, most of them near a limit."""
+
+    units: SolvedUnits  # Which of the drawn units they are
+    outputs: dict[str, Float[np.ndarray, " solved"]]  # Outputs of all requirements, NaN where a unit has none
+    leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
+
+    def sample(self, check: Check, law: LinearLaw | None) -> LimitedSample:
+        """Return what the units say of a requirement whose output has a law, or has none."""
+        requirement = check.requirement
+        return LimitedSample(
+            values=requirement.read(self.outputs),
+            units=self.units,
+            limits=requirement.limits,
+            law=law,
+            leaving=self.leaving.get(requirement.output, 0),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerifiedDesign:
+    """A design with the fresh Monte Carlo run that judged it."""
+
+    name: str  # Which search made it, and its number there
+    space: DesignSpace  # The design variables
+    design: Float[np.ndarray, " variable"]  # Scales [-] and settings
+    processes: tuple[str, ...]  # Name of the process of every group
+    cost: float  # Cost [cost units]
+    sample: (
+        RedrawnUnits  # The fresh units on the real model with the leading output, which the first requirement limits
+    )
+    achieved: Yield  # Yield within its limits
+    checks: tuple[Check, ...]  # How the design stands against every requirement, the leading one first
+    joint: Yield  # Share of units that keep the limits of all requirements
+    # Outputs of all requirements of every fresh unit, NaN where a unit has none
+    outputs: dict[str, Float[np.ndarray, " unit"]]
+    # Change of the leading output's value with the zone of each active source; none where the model does not know its
+    # derivatives exactly [unit of the output per m]
+    by_zone: Float[np.ndarray, " source"] | None
+    # Change of the leading output with a deviation of each active source, `FreshUnits.sensitivity`; none as above
+    by_deviation: Float[np.ndarray, " source"] | None
+    confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
+    confirming: Confirming | None = None  # What judged it last, none if that were the units of its search
+    confirmed: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
+
+    @property
+    def scales(self) -> Float[np.ndarray, " group"]:
+        """Scale of every group [-]."""
+        return self.design[: len(self.space.groups)]
+
+    @property
+    def settings(self) -> Float[np.ndarray, " setting"]:
+        """The settings [units of their names]."""
+        return self.space.settings_of(self.design)
+
+    @property
+    def met(self) -> bool:
+        """Whether every requirement is met, as far as these units tell."""
+        return all(check.met for check in self.checks)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """All limited sides of all requirements."""
+        return tuple(side for check in self.checks for side in check.sides)
+
+    @property
+    def laws(self) -> dict[str, LinearLaw]:
+        """Law of every limited output that is linear, at the zones of the design."""
+        zones = self.space.zones(self.design)
+        found = {check.requirement.output: check.sides[0].law for check in self.checks}
+        return {output: replace(law, zones=zones) for output, law in found.items() if law}
+
+    @property
+    def blocking(self) -> Check:
+        """The requirement with the largest relative excess."""
+        return max(self.checks, key=lambda check: check.tightest.relative_excess)
+
+    @property
+    def quantile_bound(self) -> float:
+        """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
+        return self.checks[0].sides[0].value
+
+    def shown_at(self, target: float) -> float:
+        """Return the smallest upper limit of the leading output that the units show kept at another yield.
+
+        With the same confidence; infinite where they are too few [unit of the output].
+        """
+        if self.confirming is None:
+            return self.sample.quantile_bound(target, self.confidence)
+        values = self.checks[0].requirement.read(self.confirming.outputs)
+        finite = np.where(np.isfinite(values), values, np.inf)
+        return self.confirming.units.kept_excess(finite, target, self.confidence)
+
+    @property
+    def spread(self) -> float:
+        """Distance of that from the mean of the sample over its standard deviation [-]."""
+        values = self.sample.values
+        return float((self.quantile_bound - values.mean()) / values.std(ddof=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verifier:
+    """Judges designs on fresh units.
+
+    Raises
+    ------
+    InputError
+        There are too few units for a guarantee.
+    """
+
+    space: DesignSpace  # The design variables
+    model: Model  # The real model
+    requirements: tuple[Requirement, ...]  # What must be kept; the first one limits the leading output
+    seeds: SeedTree  # Node of the seed tree; every verification takes its own child
+    units: int  # Units per verification [-]
+    # How many of them derivatives that the model does not know exactly are averaged over [-]
+    slope_units: int = SLOPE_UNITS
+    largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
+    confidence: float = CONFIDENCE  # With which guarantees are judged, one-sided [-]
+
+    def __post_init__(self) -> None:
+        for requirement in self.requirements:
+            requirement.guarantee.require_enough(self.units, self.confidence)
+
+    @property
+    def limit(self) -> float:
+        """Limit of the leading output, the upper one of two [unit of the output]."""
+        limits = self.requirements[0].limits
+        return float(limits.upper if limits.upper is not None else limits.lower or 0.0)
+
+    def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
+        """Return the design judged by fresh units of its own.
+
+        Raises
+        ------
+        SolveError
+            More units failed.
+        """
+        seeds, errors = self.seeds.child(name), self.space.errors
+        outputs = tuple(dict.fromkeys(name for requirement in self.requirements for name in requirement.outputs))
+        fresh = FreshUnits(
+            space=self.space,
+            model=self.model,
+            design=design,
+            standard=errors.standard_values(np.concatenate([*seeds.uniform_chunks(self.units, len(errors.columns))])),
+            outputs=outputs,
+            slope_units=self.slope_units,
+            derivative_units=min(self.units, DERIVATIVE_UNITS) if self.model.is_fast else self.units,
+            seeds=seeds,
+        )
+        for sample in fresh.samples:
+            require_few_failures(sample, name, self.largest_failed_share)
+        checks = tuple(
+            requirement.check(requirement.trial(fresh, self.confidence)) for requirement in self.requirements
+        )
+        values = {output: fresh.values(output) for output in outputs}
+        kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])
+        return VerifiedDesign(
+            name=name,
+            space=self.space,
+            design=design,
+            processes=self.space.process_names(design),
+            cost=float(self.space.cost(design)),
+            sample=RedrawnUnits(
+                evaluation=fresh.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
+            ),
+            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))),
+            checks=checks,
+            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
+            outputs=values,
+            by_zone=_by_zone(fresh, checks[0].sides[0].value),
+            by_deviation=fresh.sensitivity(fresh.outputs[0]) if fresh.outputs[0] in fresh.exact else None,
+            confidence=self.confidence,
+        )
+
+
+def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"] | None:
+    """Return the change of mean + spread·σ of the leading output with the zones; equation (24)."""
+    leading = fresh.outputs[0]
+    if leading not in fresh.exact:
+        return None
+    exact, values = fresh.exact[leading].evaluation, fresh.samples[0].values
+    known = exact.values[exact.good, 0]
+    standard = (known - known.mean()) / known.std()
+    spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
+    return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / known.size)
+
+
+def answer(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
+    """Return the cheapest met design, or the least violating one where none is met."""
+    met = [design for design in tried if design.met]
+    if met:
+        return min(met, key=lambda design: design.cost)
+    return min(tried, key=lambda design: design.blocking.tightest.relative_excess)
