@@ -19,7 +19,8 @@ from tolalloc.allocation.front.pareto_problem import (
     to_genes,
 )
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.convex_program import Programs, front
+from tolalloc.allocation.search.convex_program import front
+from tolalloc.allocation.search.zone_allocation import Programs
 from tolalloc.allocation.space.constraint import Side
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import FrontEffort

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.convex_program import Programs
-from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import Solution
 from tolalloc.models.model import Evaluation, Model
