@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from scipy.optimize import minimize_scalar
 from scipy.special import log_ndtr, logsumexp, ndtr
 
-from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState, RareFailure
+from tolalloc.capability.limit_state import CountedLimitState, LimitState, RareFailure
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 

@@ -21,7 +21,7 @@ from scipy.stats import chi2, gamma, gumbel_r, norm
 from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Uniform
 from tests.reliability_problems import PROBLEMS, exact, problem
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.rare_failure.limit_state import RareFailure, ResponseLimit
+from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source

@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.rare_cases import CASES, RareCase, random_units
-from tolalloc.capability.rare_failure.agreement import agreement
+from tolalloc.capability.yield_at_limit import agreement
 from tolalloc.drawings.seeds import SeedTree
 
 UNITS = 16_384

@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import tolalloc as ta
 from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.capability.rare_failure.limit_state import ResponseLimit
 from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Response

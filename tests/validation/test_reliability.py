@@ -15,8 +15,8 @@ from scipy.stats import chi2
 
 from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tests.reliability_problems import FOUR_BRANCHES, MARGINS, PROBLEMS, exact, problem
-from tolalloc.capability.rare_failure.limit_state import RareFailure
-from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
+from tolalloc.capability.limit_state import RareFailure
+from tolalloc.capability.rare_failure import subset_simulation
 from tolalloc.drawings.seeds import SeedTree
 
 SEVERAL_POINTS = {"RP75": [6**0.5] * 2, FOUR_BRANCHES: [3.0, 3.0, 3.5, 3.5]}

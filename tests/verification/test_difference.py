@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 import tolalloc as ta
 from tests.studies.command import tolalloc
-from tolalloc.capability.paired import quantile_change, share_change
+from tolalloc.capability.monte_carlo import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers.equivalent.model import EquivalentModel

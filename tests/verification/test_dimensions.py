@@ -17,8 +17,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation
 from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, callout, callout_assumptions, svg_of, written
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.regrouped import regrouped
-from tolalloc.sensitivity.sobol import sobol_indices
+from tolalloc.sensitivity.sobol import regrouped, sobol_indices
 
 UM = 1e-6
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.limit_state import ResponseLimit
-from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
+from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.capability.yield_at_limit import yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -54,8 +53,8 @@ ESTIMATORS = {
     "moment_units": lambda units: moment_independent(drawn(units), ERRORS, SEEDS, resamples=2),
     "surrogate_units": lambda units: answers_of(Itself(), drawn(units).x, SEEDS),
     "level_units": lambda units: subset_simulation(LIMIT, SEEDS, samples=units),
-    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, widened=100),
-    "widened_units": lambda units: widened_sampling(LIMIT, SEEDS, samples=units),
+    "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, scaled=100),
+    "widened_units": lambda units: scaled_sigma_sampling(LIMIT, SEEDS, samples=units),
     "permutations": lambda count: shapley_effects(Experiment.of(Itself(), ERRORS, SEEDS), count),
 }
 SMALLEST = {
@@ -111,4 +110,4 @@ def test_the_growth_of_the_sobol_analysis_is_checked(field, effort):
 def test_the_quick_effort_is_allowed_and_more_places_than_sources_are_not_asked_for():
     assert QUICK.ranking.units == 2048
     effort = SobolEffort(start=16, limit=16, places=3)
-    assert sobol_indices(Experiment.of(Itself(), ERRORS, SEEDS), effort).growth.stable
+    assert sobol_indices(Experiment.of(Itself(), ERRORS, SEEDS), effort).convergence.stable

@@ -15,10 +15,9 @@ import pytest
 from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
+from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.limit_state import ResponseLimit
-from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
+from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -140,7 +139,7 @@ def test_subset_simulation_counts_it_as_safe_and_cautions(at):
 def test_weighted_samples_count_it_as_safe_and_caution(at):
     points = DesignPoints.only(design_point(limit_state((), "NaN")))
     for estimate in (
-        lambda state: widened_sampling(state, SEEDS, samples=1000),
+        lambda state: scaled_sigma_sampling(state, SEEDS, samples=1000),
         lambda state: importance_sampling(state, points, SEEDS, samples=1000),
     ):
         found = [estimate(limit_state((at,), kind)) for kind in KINDS]
@@ -161,7 +160,7 @@ def planted_yield(at: tuple[int, ...], kind: str, units: int, *share: float) -> 
     """Return the yield from random units of which some fail, which no later sample does."""
     state = limit_state(at, kind, *share)
     sample = monte_carlo(replace(state.experiment, largest_failed_share=0.1), units)
-    return yield_at_limit(state, sample, samples=200, runs=2, widened=100)
+    return yield_at_limit(state, sample, samples=200, runs=2, scaled=100)
 
 
 @pytest.mark.parametrize("at", [0, 1999])

@@ -15,10 +15,9 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.ranking import Growth, Step
+from tolalloc.sensitivity.ranking import Convergence, Step
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, order_contribution
+from tolalloc.sensitivity.sobol import OrderContribution, SobolAnalysis, order_contribution, sobol_indices
 
 NAMES = ("a", "b", "c", "d")
 ORDERS = (1, 2, 39)
@@ -138,7 +137,7 @@ def independent_blocks(weights: np.ndarray, blocks: int, seed: int) -> SobolAnal
         ranked=OUTPUTS,
         sources=NAMES[:sources],
         indices=saltelli_indices(evaluation, sources, SeedTree(seed).child("resamples"), resamples=200),
-        growth=Growth(history=(Step(blocks=blocks, first=(0,), probability=1.0),), probability=0.9),
+        convergence=Convergence(history=(Step(blocks=blocks, first=(0,), probability=1.0),), probability=0.9),
         samples=evaluation.status.size,
         blocks_of_others=blocks,
     )

@@ -10,10 +10,8 @@ from scipy.stats import poisson
 
 from tests.rare_cases import CASES, breitung, flat, metaballs_probability, outside_sphere, random_units, uniform_sum
 from tolalloc.capability.monte_carlo import monte_carlo
-from tolalloc.capability.rare_failure.agreement import Agreement, agreement, judged
-from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
-from tolalloc.capability.yield_at_limit import yield_at_limit
+from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
+from tolalloc.capability.yield_at_limit import Agreement, agreement, judged, yield_at_limit
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 
@@ -71,11 +69,11 @@ def test_a_slope_that_leads_away_fools_subset_simulation_and_is_noticed():
     ]
     assert fooled
     levels, seed = fooled[0]
-    widened = widened_sampling(case, SeedTree(seed), samples=1000, runs=4, known=levels.failing)
-    found = judged(random_units(case, SeedTree(seed), 2000), levels, widened)
+    scaled = scaled_sigma_sampling(case, SeedTree(seed), samples=1000, runs=4, known=levels.failing)
+    found = judged(random_units(case, SeedTree(seed), 2000), levels, scaled)
     assert "contradict each other" in found.verdict
     assert found.verdict.startswith("Do not rely on this estimate")
-    assert found.estimate.probability == widened.probability
+    assert found.estimate.probability == scaled.probability
     assert abs(found.estimate.probability - case.exact) <= 3 * found.estimate.standard_error
 
 
@@ -100,7 +98,7 @@ class NoAnswerFarOut:
 
 def test_widths_stay_where_the_model_answers():
     """At a width of 1.72 a hundredth of the units has no answer: the first width stays below, and failures are few."""
-    found = widened_sampling(NoAnswerFarOut(), SeedTree(0), samples=2000, runs=2)
+    found = scaled_sigma_sampling(NoAnswerFarOut(), SeedTree(0), samples=2000, runs=2)
     assert found.runs[0].levels[0].bound < 1.72
     assert abs(found.probability - flat(2, 3.5).exact) <= 3.5 * found.standard_error
     assert any("no usable answer" in text for text in found.cautions)
@@ -118,7 +116,7 @@ def test_a_check_that_stops_is_a_caution():
 def test_random_units_alone_are_not_relied_on_where_few_fail_and_nothing_else_does():
     """A small island that no slope leads to and that ends further out."""
     case = replace(flat(2, 4.0), margin=lambda u: np.where(np.linalg.norm(u - [3.0, 0.0], axis=1) < 0.3, -1.0, 4.0))
-    found = [asked(case, seed, samples=100, runs=2, widened=100) for seed in range(3)]
+    found = [asked(case, seed, samples=100, runs=2, scaled=100) for seed in range(3)]
     assert any("neither subset" in item.verdict for item in found)
     assert all(item.verdict.startswith("Do not rely") for item in found)
 
@@ -126,13 +124,13 @@ def test_random_units_alone_are_not_relied_on_where_few_fail_and_nothing_else_do
 def test_random_units_may_contradict():
     case = flat(2, 3.5)
     levels = subset_simulation(case, SeedTree(0), samples=1000, runs=3)
-    widened = widened_sampling(case, SeedTree(0), samples=1000, runs=3, known=levels.failing)
+    scaled = scaled_sigma_sampling(case, SeedTree(0), samples=1000, runs=3, known=levels.failing)
     plain = replace(random_units(case, SeedTree(0), 20_000), effective_samples=25.0)
-    assert "of 20000 random units 25 lie beyond the limit" in judged(plain, levels, widened).verdict
+    assert "of 20000 random units 25 lie beyond the limit" in judged(plain, levels, scaled).verdict
 
 
 def test_an_estimate_that_a_factor_of_two_may_change_is_not_relied_on():
-    found = asked(flat(2, 4.5), 0, samples=100, runs=2, widened=100)
+    found = asked(flat(2, 4.5), 0, samples=100, runs=2, scaled=100)
     assert "more than a factor of two" in found.verdict
     assert not found.estimate.trustworthy
 
@@ -141,7 +139,7 @@ def test_the_yield_is_that_of_the_agreement():
     """The normal columns of a drawing give the case itself."""
     limit = flat(2, 3.5).limit(0)
     sample = monte_carlo(replace(limit.experiment, seeds=SeedTree(0, ("units",))), 1000)
-    found = yield_at_limit(limit, sample, samples=200, runs=2, widened=100)
+    found = yield_at_limit(limit, sample, samples=200, runs=2, scaled=100)
     assert found.estimate.calls == found.calls == sum(item.calls for item in found.estimates)
     assert found.interval.low < 1 - flat(2, 3.5).exact < found.interval.high
     assert found.interval.estimate == 1 - found.estimate.probability

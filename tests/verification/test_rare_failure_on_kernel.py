@@ -11,12 +11,10 @@ from scipy.stats import chi2, norm
 
 from tests.prepared import prepared
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
-from tolalloc.capability.rare_failure.agreement import METHOD
-from tolalloc.capability.rare_failure.limit_state import RareFailure, ResponseLimit
-from tolalloc.capability.rare_failure.subset_simulation import subset_simulation
-from tolalloc.capability.rare_failure.widened_sampling import widened_sampling
-from tolalloc.capability.yield_at_limit import log_normal_interval, yield_at_limit
+from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
+from tolalloc.capability.yield_at_limit import METHOD, log_normal_interval, yield_at_limit
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -135,7 +133,7 @@ def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
 def test_widened_sampling_states_its_own_spread():
     """Over 60 seeds on a known share, each of two small runs."""
     limit, exact = limited(Radius, normals(6), 4.5), chi2.sf(4.5**2, 2)
-    results = [widened_sampling(limit, SeedTree(seed), samples=500, runs=2) for seed in range(60)]
+    results = [scaled_sigma_sampling(limit, SeedTree(seed), samples=500, runs=2) for seed in range(60)]
     found = np.array([item.probability for item in results])
     stated = np.mean([item.standard_error for item in results])
     assert found.mean() == pytest.approx(exact, abs=4 * found.std() / np.sqrt(60))
@@ -192,8 +190,8 @@ def test_arguments_out_of_range():
     sample = units_of(limit, 0, 100)
     for call in (
         lambda: yield_at_limit(limit, sample, runs=1),
-        lambda: widened_sampling(limit, SeedTree(0), runs=0),
-        lambda: widened_sampling(limit, SeedTree(0), samples=105),
+        lambda: scaled_sigma_sampling(limit, SeedTree(0), runs=0),
+        lambda: scaled_sigma_sampling(limit, SeedTree(0), samples=105),
     ):
         with pytest.raises(InputError):
             call()

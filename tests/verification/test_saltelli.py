@@ -14,11 +14,11 @@ from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.ranking import (
     SourceRanking,
     before,
-    grow_until_stable,
     indistinguishable_from_zero,
     percentile_interval,
     rank_interval,
     ranks,
+    until_converged,
 )
 from tolalloc.sensitivity.saltelli import SaltelliIndices, resample_counts, saltelli_indices
 
@@ -229,30 +229,30 @@ def test_the_blocks_asked_for_tell_neighbours_apart():
 def test_promised_orders_are_counted_that_another_ranking_reproduces():
     """Promised at 0.9 are a before b and a before c; b before c, at 0.75, is not."""
     first = ranking([0.5, 0.3, 0.2], RESAMPLED)
-    found = first.reproduced_by(ranking([0.3, 0.2, 0.4], RESAMPLED))
+    found = first.replicated_by(ranking([0.3, 0.2, 0.4], RESAMPLED))
     assert (found.promised, found.reproduced, found.share) == (2, 1, 0.5)
-    assert first.reproduced_by(ranking([0.3, 0.1, 0.2], RESAMPLED)).share == 1.0
+    assert first.replicated_by(ranking([0.3, 0.1, 0.2], RESAMPLED)).share == 1.0
     equal = ranking([0.3, 0.3, 0.3], np.full((4, 3), 0.3))
-    assert first.reproduced_by(equal).reproduced == 0
-    assert np.isnan(equal.reproduced_by(first).share)
+    assert first.replicated_by(equal).reproduced == 0
+    assert np.isnan(equal.replicated_by(first).share)
     with pytest.raises(InputError, match="not of the same sources"):
-        first.reproduced_by(ranking([0.3, 0.1, 0.2], RESAMPLED, "abd"))
+        first.replicated_by(ranking([0.3, 0.1, 0.2], RESAMPLED, "abd"))
 
 
 def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
-    found = grow_until_stable(gaps, "abcd", 3, start=64, limit=1 << 14)
+    found = until_converged(gaps, "abcd", 3, start=64, limit=1 << 14)
     assert found.stable
     assert [step.blocks for step in found.history] == [64 << at for at in range(len(found.history))]
     assert found.history[-1].first == (1, 2, 0)
     assert found.history[-1].probability >= 0.9 > found.history[-2].probability
     assert found.status.startswith("The order of the first 3 over the outputs with a limit, ")
     assert "is stable: " in found.status
-    stopped = grow_until_stable(gaps, "abcd", 3, start=64, limit=200)
+    stopped = until_converged(gaps, "abcd", 3, start=64, limit=200)
     assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
     assert "not stable at the largest number of blocks allowed" in stopped.status
     assert "resamples of 128 blocks" in stopped.status
     with pytest.raises(InputError, match="first number of blocks"):
-        grow_until_stable(gaps, "abcd", 3, start=64, limit=32)
+        until_converged(gaps, "abcd", 3, start=64, limit=32)
 
 
 def test_twins_of_one_group_may_change_places():
@@ -260,5 +260,5 @@ def test_twins_of_one_group_may_change_places():
         values = np.array([0.4, 0.4, 0.1])
         return values, values + SeedTree(1).generator().normal(size=(400, 3)) * 0.02
 
-    assert not grow_until_stable(twins, "abc", 2, start=64, limit=64).stable
-    assert grow_until_stable(twins, "aac", 2, start=64, limit=64).stable
+    assert not until_converged(twins, "abc", 2, start=64, limit=64).stable
+    assert until_converged(twins, "aac", 2, start=64, limit=64).stable

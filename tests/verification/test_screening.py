@@ -20,8 +20,13 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
-from tolalloc.sensitivity.given_data import OutputDensity, delta_index, pawn_index
-from tolalloc.sensitivity.screening import elementary_effects, moment_independent
+from tolalloc.sensitivity.screening import (
+    OutputDensity,
+    delta_index,
+    elementary_effects,
+    moment_independent,
+    pawn_index,
+)
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.UNIFORM) -> Source:

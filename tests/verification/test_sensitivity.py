@@ -17,8 +17,7 @@ from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices, sobol_indices
 
 
 def sizes(*names: str) -> ErrorModel:

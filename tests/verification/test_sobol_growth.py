@@ -18,8 +18,7 @@ from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.saltelli import SAMPLES_AT_ONCE, SaltelliDesign, saltelli_indices
-from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis
+from tolalloc.sensitivity.sobol import SobolAnalysis, sobol_indices
 
 FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")
 CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))
@@ -116,8 +115,8 @@ def test_blocks_are_added_until_the_order_is_stable_and_none_is_evaluated_twice(
     response = Linear(np.array([[1.0, 1.05, 0.3, 0.1]]), errors.columns)
     effort = SobolEffort(start=16, limit=4096, places=4, probability=0.95)
     found = sobol_indices(Experiment.of(response, errors, SeedTree(2)), effort)
-    steps = found.growth.history
-    assert found.growth.stable
+    steps = found.convergence.history
+    assert found.convergence.stable
     assert len(steps) > 1
     assert all(step.probability < 0.95 for step in steps[:-1])
     assert steps[-1].probability >= 0.95
@@ -152,14 +151,14 @@ class Renamed(Linear):
 
 def test_equal_sources_reach_the_limit_and_the_analysis_says_so():
     found = analysis([[1.0, 1.0, 1.0, 1.0]], SobolEffort(start=16, limit=100, places=4, probability=0.99))
-    assert not found.growth.stable
-    assert "not stable" in found.growth.status
-    assert (found.blocks, len(found.growth.history)) == (64, 3)
+    assert not found.convergence.stable
+    assert "not stable" in found.convergence.status
+    assert (found.blocks, len(found.convergence.history)) == (64, 3)
 
 
 def test_a_fixed_number_of_blocks_is_one_step_and_there_are_never_more_places_than_sources():
     found = analysis([[1.0, 3.0]], fixed(64, places=3))
-    assert [(step.blocks, step.first) for step in found.growth.history] == [(64, (1, 0))]
+    assert [(step.blocks, step.first) for step in found.convergence.history] == [(64, (1, 0))]
 
 
 def test_one_pass_gives_every_output_and_one_ranking_over_all():
@@ -264,7 +263,7 @@ def test_more_than_one_block_in_a_hundred_stops_the_analysis_unless_the_caller_a
 def test_a_second_seed_reproduces_what_the_first_promises():
     weights = [[1.0, 0.95, 0.5, 0.45, 0.4]]
     first, second = (analysis(weights, fixed(256), seed).overall for seed in (1, 2))
-    found = first.reproduced_by(second)
+    found = first.replicated_by(second)
     assert 6 <= found.promised <= 10
     assert found.share >= found.confidence
 

@@ -16,15 +16,22 @@ from tolalloc.models.model import Evaluation, Response
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
-from tolalloc.sensitivity.surrogate.choice import ENOUGH_Q2, choose, shortfalls
-from tolalloc.sensitivity.surrogate.quadratic_form import fit_quadratic_form
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
+    fit_quadratic_form,
     on_products_of_two,
     quadratic_regression,
     sparse_quadratic_regression,
 )
-from tolalloc.sensitivity.surrogate.validation import Candidate, Score, answers_of, cross_validate
+from tolalloc.sensitivity.surrogate.validation import (
+    ENOUGH_Q2,
+    Candidate,
+    Score,
+    answers_of,
+    choose,
+    cross_validate,
+    shortfalls,
+)
 
 COLUMNS = ("a", "b", "c")
 OUTPUTS = ("answer [arcsec]",)

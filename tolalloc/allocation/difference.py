@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.space.design_space import DesignSpace, named_zones, outside_range, repriced
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Requirement
-from tolalloc.capability.paired import Change, quantile_change, share_change
+from tolalloc.capability.monte_carlo import Change, quantile_change, share_change
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.drawings.sources import Source

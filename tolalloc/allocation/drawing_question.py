@@ -42,9 +42,7 @@ from tolalloc.reports.header import Header
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.regrouped import regrouped
-from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices, regrouped, sobol_indices
 
 _EXAMINED = 1000
 """Random units of the drawing that tell whether it can be built [-]."""

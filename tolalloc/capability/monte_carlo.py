@@ -1,14 +1,15 @@
-"""Monte Carlo: many random units, their yield and its confidence."""
+"""Monte Carlo: random units, their yield and its confidence, limits of any side, and changes on the same units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
+from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation, Response
@@ -167,3 +168,131 @@ def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share:
             f"Monte Carlo {name}: {result.failed} of {units} units have no usable answer; allowed is "
             f"{largest_failed_share:.4g} of them, because more would bias every figure."
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneSided:
+    """The first output of a response, turned so that only its large values are bad.
+
+    Notes
+    -----
+    An upper limit leaves the output as it is, a lower one turns its sign. Two limits take the larger of the distances
+    beyond either, to which the distance between them is added, so that a tolerance relative to the limit has a scale.
+    """
+
+    response: Response  # What answers
+    limits: Limits  # Limits of its first output
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The response's columns."""
+        return self.response.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The response's outputs."""
+        return self.response.outputs
+
+    @property
+    def limit(self) -> float:
+        """Largest turned output allowed [output]."""
+        if self.limits.width is not None:
+            return self.limits.width
+        return -self.limits.lower if self.limits.upper is None and self.limits.lower is not None else self._upper
+
+    @property
+    def _upper(self) -> float:
+        assert self.limits.upper is not None
+        return self.limits.upper
+
+    def turned(self, values: Float[np.ndarray, "sample output"]) -> Float[np.ndarray, "sample output"]:
+        """Return the outputs with the first one turned."""
+        lower, width = self.limits.lower, self.limits.width
+        if lower is None:
+            return values
+        first = (
+            -values[:, :1] if width is None else width + np.maximum(lower - values[:, :1], values[:, :1] - self._upper)
+        )
+        return np.concatenate([first, values[:, 1:]], axis=1)
+
+    def read(self, turned: float) -> float:
+        """Return a turned output as a reader knows it: the output itself, or for two limits the distance beyond."""
+        if self.limits.width is not None:
+            return turned - self.limits.width
+        return turned if self.limits.lower is None else -turned
+
+    def facing(self, response: Response) -> Response:
+        """Return another response of the same output, turned alike; itself for an upper limit."""
+        return response if self.limits.lower is None else replace(self, response=response)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the turned output of every sample."""
+        found = self.response(x)
+        return replace(found, values=self.turned(found.values))
+
+    def of_sample(self, sample: MonteCarlo) -> MonteCarlo:
+        """Return the same units with their first output turned."""
+        evaluation = replace(sample.evaluation, values=self.turned(sample.evaluation.values))
+        return sample if self.limits.lower is None else replace(sample, evaluation=evaluation)
+
+
+_RESAMPLES = 1000
+"""Resamples of the units behind the interval of a quantile's change [-]."""
+_BATCH, _UNITS_AT_ONCE = 50, 2**20
+"""Resamples at a time, and units of all of them unless one alone has more, for the sake of memory [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """A change with its two-sided 95 % interval."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " unit"]) -> Change:
+    """Return how the share of good units changes [-].
+
+    Only units that are good once and bad once count. The interval takes the exact one of either kind at half the error
+    each, so it holds its 95 % at least, with no unit between the two as well.
+    """
+    units = before.size
+    gained, lost = int(np.count_nonzero(after & ~before)), int(np.count_nonzero(before & ~after))
+    up, down = proportion(units, units - gained), proportion(units, units - lost)
+    return Change(estimate=(gained - lost) / units, low=up.low - down.high, high=up.high - down.low)
+
+
+def quantile_change(
+    before: Float[np.ndarray, " unit"],
+    after: Float[np.ndarray, " unit"],
+    share: float,
+    generator: np.random.Generator,
+) -> Change:
+    """Return how a quantile of the units with both answers changes [unit of the output].
+
+    The interval is that of the bootstrap over units, each with both its values; with fewer than some ten units beyond
+    the quantile it is too narrow.
+    """
+    from scipy.stats import bootstrap
+
+    def change(first: np.ndarray, second: np.ndarray, axis: int = -1) -> np.ndarray:
+        return np.asarray(np.quantile(second, share, axis=axis) - np.quantile(first, share, axis=axis))
+
+    both = np.isfinite(before) & np.isfinite(after)
+    pair = (before[both], after[both])
+    estimate = float(change(*pair))
+    if np.array_equal(*pair):
+        return Change(estimate=estimate, low=estimate, high=estimate)
+    found = bootstrap(
+        pair,
+        change,
+        paired=True,
+        vectorized=True,
+        n_resamples=_RESAMPLES,
+        batch=max(1, min(_BATCH, _UNITS_AT_ONCE // both.size)),
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        rng=generator,
+    ).confidence_interval
+    return Change(estimate=estimate, low=float(found.low), high=float(found.high))

@@ -1,10 +1,18 @@
-"""The yield at a limit down to a few parts per million: random units, and rare-failure methods where they see none."""
+"""The yield at a limit, also where a rejected unit is rare: what methods that fail differently agree on.
+
+Random units see every region, but only if it is not rare. Subset simulation is led by the slope of the limit state,
+which may lead away from the likelier of two regions. Scaled-sigma sampling is led by distance alone, and sees no region
+that ends further out. Whatever misses a region gives too little, never too much. A caution stands where a factor of two
+is open.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from scipy.stats import binom
 from scipy.stats import t as student
 
 from tolalloc.capability.experiment import FEWEST_RUNS
@@ -16,12 +24,198 @@ from tolalloc.capability.indices import (
     capability,
     defects_per_million_opportunities,
 )
+from tolalloc.capability.limit_state import ChainedEstimate, LimitState, RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, require_few_failures
-from tolalloc.capability.rare_failure.agreement import agreement
-from tolalloc.capability.rare_failure.limit_state import RareFailure, ResponseLimit
-from tolalloc.exceptions import InputError
+from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, scaled_sigma_sampling, subset_simulation
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, SolveError
 
-METHOD = "Monte Carlo"
+METHOD = "Subset simulation and widened sampling"
+FEWEST_BEYOND = 30
+"""Random units beyond the limit from which they decide alone: chance does not halve or double so many [-]."""
+RARE = 1e-3
+"""Share of random units without an answer above which they decide alone [-]."""
+LARGEST_DIFFERENCE = 3.0
+"""Difference of two estimates in standard errors beyond which they contradict each other [-]."""
+FACTOR_IN_DOUBT = 2.0
+"""Factor by which an estimate without a caution may not change within three standard errors [-]."""
+_SMALLEST_CHANCE = 0.005
+"""Chance of the count of random units below which it contradicts an estimate [-]."""
+_VAGUE = 0.5
+"""Coefficient of variation from which too small an estimate of widened sampling says nothing [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """What methods that fail differently say of one rare failure."""
+
+    estimate: RareFailure  # What to rely on, with its cautions
+    estimates: tuple[RareFailure, ...]  # What every method said, random units first
+    verdict: str  # One sentence that says what to rely on, and why
+
+    @property
+    def calls(self) -> int:
+        """Calls of the limit state by all methods [-]."""
+        return sum(item.calls for item in self.estimates)
+
+
+def agreement(
+    limit_state: LimitState,
+    plain: RareFailure,
+    seeds: SeedTree,
+    *,
+    samples: int = 4000,
+    runs: int = 5,
+    scaled: int = 2000,
+    largest_failed_share: float = 0.01,
+) -> Agreement:
+    """Return the probability of failure by random units, and where they see few failures by methods for rare ones.
+
+    Parameters
+    ----------
+    limit_state
+        The limit state.
+    plain
+        Share of random units beyond the limit, those without an answer included; they decide alone if 30 or more of
+        them lie there, or if more than a thousandth has no answer.
+    seeds
+        Node of the seed tree.
+    samples, scaled
+        Samples of each level of subset simulation and of each width of widened sampling, multiples of 10 [-].
+    runs
+        Independent runs of either method [-].
+    largest_failed_share
+        Share of the samples that may fail [-].
+
+    Raises
+    ------
+    SolveError
+        More samples than allowed have no usable answer.
+    """
+    # A unit without an answer is a rejected one, which the methods for rare failures cannot know.
+    if plain.effective_samples >= FEWEST_BEYOND or plain.failed > RARE * plain.calls:
+        verdict = f"Rely on the random units: a share of {plain.probability:.3g} beyond the limit is not rare."
+        return Agreement(estimate=plain, estimates=(plain,), verdict=verdict)
+    levels = subset_simulation(limit_state, seeds.child("levels"), samples, runs, largest_failed_share)
+    try:
+        found: ScaledSigmaEstimate | SolveError = scaled_sigma_sampling(
+            limit_state, seeds.child("widened"), scaled, runs, largest_failed_share, known=levels.failing
+        )
+    except SolveError as error:
+        # Far out a model may have no answers. The check is lost then, not what is checked.
+        found = error
+    return judged(plain, levels, found)
+
+
+def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -> Agreement:
+    """Return what three independent estimates agree on; widened sampling may have stopped with an error.
+
+    Notes
+    -----
+    Widened sampling sees a share q of subset simulation's failures. Where it found less, P_w/q up to P_s is compared;
+    half of that correction, in its logarithm, counts as its standard error. The mean is weighted by the inverse squares
+    of the coefficients of variation, and its error grows with the difference, as is usual for measured constants.
+    Beyond three standard errors of the difference the larger estimate stands, because what misses a region gives too
+    little.
+
+    References
+    ----------
+    Birge 1932, Phys. Rev. 40: the error of a weighted mean times the ratio √(χ²/(n − 1)) where that is above 1.
+    """
+    methods = (levels,) if isinstance(scaled, SolveError) else (levels, scaled)
+    if not any(item.probability for item in methods):
+        few = f"{plain.effective_samples:.0f} of them lie beyond the limit where other methods meet none"
+        plain = replace(plain, cautions=plain.cautions + (few,) * bool(plain.probability))
+        reliance = "Do not rely on the random units" if plain.cautions else "Rely on the random units alone"
+        said = "; ".join(("neither subset simulation nor widened sampling met a failure", *plain.cautions))
+        return Agreement(estimate=plain, estimates=(plain, *methods), verdict=f"{reliance}: {said}.")
+    common = _common(levels, scaled)
+    doubts = common.doubts
+    if np.exp(LARGEST_DIFFERENCE * np.sqrt(np.log1p((common.error / common.probability) ** 2))) > FACTOR_IN_DOUBT:
+        doubts += ("within three standard errors it may change by more than a factor of two",)
+    doubts += _against(plain, common)
+    lost = f"{plain.failed} of {plain.calls} random units have no usable answer and are not part of it"
+    cautions = (
+        doubts
+        + (lost,) * bool(plain.failed)
+        + tuple(dict.fromkeys(caution for item in methods for caution in item.cautions))
+    )
+    reliance = "Do not rely on this estimate" if doubts else "Rely on it with caution" if cautions else "Rely on it"
+    return Agreement(
+        estimate=RareFailure(
+            probability=common.probability,
+            standard_error=common.error,
+            calls=sum(item.calls for item in (plain, *methods)),
+            failed=sum(item.failed for item in (plain, *methods)),
+            method=METHOD,
+            cautions=cautions,
+            effective_samples=(common.probability / common.error) ** 2,
+        ),
+        estimates=(plain, *methods),
+        verdict=f"{reliance}: {'; '.join((common.found, *cautions))}.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Common:
+    """What two methods say together."""
+
+    probability: float
+    error: float
+    found: str
+    doubts: tuple[str, ...] = ()
+
+
+def _common(levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -> _Common:
+    """Return what subset simulation and widened sampling say together, unless neither met a failure."""
+    alone = partial(_Common, probability=levels.probability, error=levels.standard_error)
+    if isinstance(scaled, SolveError):
+        return alone(found="subset simulation is not checked", doubts=(f"widened sampling stopped: {scaled}"[:-1],))
+    seen = scaled.seen_share
+    if not levels.probability:
+        return _Common(
+            probability=scaled.probability,
+            error=scaled.standard_error,
+            found="widened sampling alone met failures",
+            doubts=("subset simulation met none",),
+        )
+    if scaled.probability < levels.probability and scaled.coefficient_of_variation > _VAGUE:
+        if not any(run.levels[0].share for run in scaled.runs):
+            return alone(found="widened sampling met no failure at any width, so no other broad region")
+        found = f"widened sampling can see {seen:.0%} of the failures and says nothing definite"
+        return alone(found=found, doubts=("it lost failures on the way",) * (seen > 0.5))
+    # What widened sampling cannot see explains at most that it found less.
+    explained = scaled.probability / seen if seen else np.inf
+    corrected = max(scaled.probability, min(explained, levels.probability))
+    own, chance = levels.coefficient_of_variation, (1 - seen) / max(seen * MOST_KNOWN, 1.0)
+    halved = float(np.log(corrected / scaled.probability)) / 2
+    other = float(np.sqrt(scaled.coefficient_of_variation**2 + chance + halved**2))
+    apart = abs(float(np.log(levels.probability / corrected))) / float(np.hypot(own, other))
+    found = f"subset simulation and widened sampling differ by {apart:.1f} standard errors"
+    if apart > LARGEST_DIFFERENCE:
+        larger = max(levels, scaled, key=lambda item: item.probability)
+        half = abs(levels.probability - scaled.probability) / 2
+        said = f"they contradict each other with {levels.probability:.2g} and {scaled.probability:.2g}"
+        error = max(larger.standard_error, half)
+        return _Common(probability=larger.probability, error=error, found=found, doubts=(said,))
+    weights = np.array([own, other]) ** -2
+    mean = float(weights @ [levels.probability, corrected] / weights.sum())
+    return _Common(probability=mean, error=mean * max(1.0, apart) / float(np.sqrt(weights.sum())), found=found)
+
+
+def _against(plain: RareFailure, common: _Common) -> tuple[str, ...]:
+    """Return what the random units say against an estimate: more or fewer beyond the limit than chance explains."""
+    beyond = round(plain.effective_samples) - plain.failed
+    low, high = (
+        float(np.clip(common.probability + way * LARGEST_DIFFERENCE * common.error, 0.0, 1.0)) for way in (-1.0, 1.0)
+    )
+    more, fewer = binom.sf(beyond - 1, plain.calls, high), binom.cdf(beyond, plain.calls, low)
+    expected = common.probability * plain.calls
+    said = f"of {plain.calls} random units {beyond} lie beyond the limit, {expected:.2g} are expected"
+    return (said,) * bool(min(more, fewer) < _SMALLEST_CHANCE)
+
+
+_RANDOM_UNITS = "Monte Carlo"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +261,7 @@ def yield_at_limit(
     *,
     samples: int = 4000,
     runs: int = 5,
-    widened: int = 2000,
+    scaled: int = 2000,
 ) -> YieldAtLimit:
     """Return the yield at a limit.
 
@@ -78,7 +272,7 @@ def yield_at_limit(
     sample
         Random units whose first output is the limited one; they decide alone if 30 or more exceed the limit, units
         without an answer included.
-    samples, widened
+    samples, scaled
         Samples of each level of subset simulation and of each width of widened sampling, multiples of 10 [-].
     runs
         Independent runs of either, two or more [-].
@@ -107,13 +301,13 @@ def yield_at_limit(
         experiment.seeds,
         samples=samples,
         runs=runs,
-        widened=widened,
+        scaled=scaled,
         largest_failed_share=allowed,
     )
     return YieldAtLimit(
         limit=limit,
         interval=ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
-        if found.estimate.method == METHOD
+        if found.estimate.method == _RANDOM_UNITS
         else log_normal_interval(found.estimate, runs),
         estimate=found.estimate,
         estimates=found.estimates,
@@ -159,7 +353,7 @@ def _random_units(sample: MonteCarlo, within: Yield) -> RareFailure:
         standard_error=float(np.sqrt(share * (1 - share) / units)) if within.rejected else float("inf"),
         calls=units,
         failed=sample.failed,
-        method=METHOD,
+        method=_RANDOM_UNITS,
         cautions=(lost,) * bool(sample.failed),
         effective_samples=float(within.rejected),
     )

@@ -8,8 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.capability.one_sided import OneSided
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
@@ -33,13 +32,13 @@ from tolalloc.sensitivity.driver_tables import ranking_table
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.limit_tables import capability_table, inverse_table, reject_table
 from tolalloc.sensitivity.measures import Measures
-from tolalloc.sensitivity.ranking import Reproduction
+from tolalloc.sensitivity.ranking import Replication
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent, elementary_effects
 from tolalloc.sensitivity.sections import driver_sections, limit_sections, trust_sections
 from tolalloc.sensitivity.sentences import assumptions, sentences, summary, warnings
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol_analysis import OrderContribution, SobolAnalysis, SobolIndices, order_contribution
-from tolalloc.sensitivity.surrogate.choice import Choice
+from tolalloc.sensitivity.sobol import OrderContribution, SobolAnalysis, SobolIndices, order_contribution
+from tolalloc.sensitivity.surrogate.validation import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
 
@@ -67,7 +66,7 @@ class RankingAnswer(Answer):
     sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
     # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
     dimensions: SobolIndices | None
-    reproduction: Reproduction  # How much of the ranking a second seed has shown
+    replication: Replication  # How much of the ranking a second seed has shown
     orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
     # What not knowing the model itself does to the leading output; none where all of it is known
     effect: UncertainEffect | None
@@ -213,9 +212,9 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         with record.stage("Sobol indices"):
             effect = measures.uncertain(sample)
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
-            dimensions = measures.dimensions(sobol.growth.history[-1].blocks)
+            dimensions = measures.dimensions(sobol.convergence.history[-1].blocks)
         with record.stage("Sobol, second seed"):
-            again = measures.second_seed(sobol.growth.history[-1].blocks)
+            again = measures.second_seed(sobol.convergence.history[-1].blocks)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()
@@ -250,7 +249,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
         design=effort.design,
         sobol=sobol,
         dimensions=dimensions,
-        reproduction=sobol.of(leading).reproduced_by(again),
+        replication=sobol.of(leading).replicated_by(again),
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,
         shapley=shapley,

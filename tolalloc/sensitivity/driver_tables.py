@@ -13,7 +13,7 @@ from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices
 
 if TYPE_CHECKING:
     from tolalloc.sensitivity.answer import RankingAnswer
@@ -133,7 +133,7 @@ def overall_table(answer: RankingAnswer) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def growth_table(answer: RankingAnswer) -> pd.DataFrame:
+def convergence_table(answer: RankingAnswer) -> pd.DataFrame:
     """Return how the first places settled as the blocks grew."""
     names = answer.sobol.sources
     return pd.DataFrame(
@@ -143,7 +143,7 @@ def growth_table(answer: RankingAnswer) -> pd.DataFrame:
                 "first places": ", ".join(names[at] for at in step.first),
                 "share of the resamples with this order [%]": step.probability * 100,
             }
-            for step in answer.sobol.growth.history
+            for step in answer.sobol.convergence.history
         ]
     )
 

@@ -8,9 +8,8 @@ from functools import cached_property
 
 from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
-from tolalloc.capability.one_sided import OneSided
-from tolalloc.capability.rare_failure.limit_state import ResponseLimit
+from tolalloc.capability.limit_state import ResponseLimit
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, monte_carlo
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -20,15 +19,13 @@ from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import sobol_indices
-from tolalloc.sensitivity.sobol_analysis import SobolAnalysis, SobolIndices
-from tolalloc.sensitivity.surrogate.choice import Choice, choose
+from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, sobol_indices
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     quadratic_regression,
     sparse_quadratic_regression,
 )
-from tolalloc.sensitivity.surrogate.validation import Candidate
+from tolalloc.sensitivity.surrogate.validation import Candidate, Choice, choose
 from tolalloc.sensitivity.target import TargetSensitivity, target_sensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 
@@ -159,7 +156,7 @@ class Measures:
             self.one_sided.of_sample(sample),
             samples=self.effort.level_units,
             runs=self.effort.level_runs,
-            widened=self.effort.widened_units,
+            scaled=self.effort.widened_units,
         )
 
     def inverse(self, choice: Choice) -> InverseSensitivity:

@@ -33,7 +33,7 @@ class Neighbours:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reproduction:
+class Replication:
     """How much of what a ranking promised another one has shown, which had other samples.
 
     Notes
@@ -117,13 +117,13 @@ class SourceRanking:
         require_places(count, len(self.sources))
         return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
 
-    def reproduced_by(self, other: SourceRanking) -> Reproduction:
+    def replicated_by(self, other: SourceRanking) -> Replication:
         """Return how many of the orders promised here the same analysis with another seed has."""
         if other.sources != self.sources:
             raise InputError("Reproduction: the two rankings are not of the same sources.")
         promised = before(self.total_resamples) >= _CONFIDENCE
         found = promised & (other.total[:, np.newaxis] > other.total)
-        return Reproduction(
+        return Replication(
             confidence=_CONFIDENCE,
             promised=int(np.count_nonzero(promised)),
             reproduced=int(np.count_nonzero(found)),
@@ -203,7 +203,7 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Growth:
+class Convergence:
     """How the order settled as the blocks grew."""
 
     history: tuple[Step, ...]  # One step per number of blocks
@@ -226,7 +226,7 @@ class Growth:
         )
 
 
-def grow_until_stable(
+def until_converged(
     resampled: Callable[[int], Resampled],
     groups: Sequence[str],
     count: int,
@@ -234,7 +234,7 @@ def grow_until_stable(
     start: int,
     limit: int,
     probability: float = 0.9,
-) -> Growth:
+) -> Convergence:
     """Double the blocks until the order of the first sources is stable.
 
     Parameters
@@ -270,4 +270,4 @@ def grow_until_stable(
         if history[-1].probability >= probability:
             break
         blocks *= 2
-    return Growth(history=tuple(history), probability=probability)
+    return Convergence(history=tuple(history), probability=probability)

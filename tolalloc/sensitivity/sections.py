@@ -28,7 +28,7 @@ def driver_sections(answer: RankingAnswer) -> tuple[Section, ...]:
             tables=(
                 ("ranking", answer.ranking),
                 *_pairs(answer),
-                ("growth", driver_tables.growth_table(answer)),
+                ("growth", driver_tables.convergence_table(answer)),
             ),
         ),
         *_dimensions(answer),

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.reports.wording import QUICK_RUN, quantity, sign_of
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices
 
 if TYPE_CHECKING:
     from tolalloc.sensitivity.answer import RankingAnswer
@@ -27,7 +27,7 @@ def sentences(answer: RankingAnswer) -> tuple[str, ...]:
     """Return the answer in sentences."""
     return (
         *_drivers(answer.dimensions or answer.indices),
-        answer.sobol.growth.status,
+        answer.sobol.convergence.status,
         *_reproduced(answer),
         *_orders(answer),
         *_uncertain(answer),
@@ -41,7 +41,7 @@ def sentences(answer: RankingAnswer) -> tuple[str, ...]:
 
 def _reproduced(answer: RankingAnswer) -> tuple[str, ...]:
     """Return what a second seed made of the promised orders, if any was promised."""
-    found = answer.reproduction
+    found = answer.replication
     if not found.promised:
         return ()
     return (
@@ -165,7 +165,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
     found = []
     if answer.header.quick:
         found.append(QUICK_RUN)
-    if not answer.sobol.growth.stable:
+    if not answer.sobol.convergence.stable:
         found.append("The order of the first places is not settled: see the blocks that would tell neighbours apart.")
     if answer.errors.is_correlated:
         found.append(
@@ -173,7 +173,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
             "variance among their members; lift, PAWN, delta and root-sum-square do not know of the correlation, so a "
             "source that only goes along with another shows there too."
         )
-    if answer.reproduction.promised and answer.reproduction.share < answer.reproduction.confidence:
+    if answer.replication.promised and answer.replication.share < answer.replication.confidence:
         found.append("A second seed did not show as many of the promised orders as it should: add blocks.")
     if answer.design is not SamplingDesign.MONTE_CARLO:
         found.append(
@@ -247,9 +247,9 @@ def summary(answer: RankingAnswer) -> dict[str, Any]:
         "Sobol blocks [-]": answer.sobol.blocks,
         "Sobol blocks dropped [-]": answer.sobol.dropped,
         "samples of the Sobol analysis [-]": answer.sobol.samples,
-        "order of the first places is stable": answer.sobol.growth.stable,
-        "pairs promised [-]": answer.reproduction.promised,
-        "pairs a second seed shows [-]": answer.reproduction.reproduced,
+        "order of the first places is stable": answer.sobol.convergence.stable,
+        "pairs promised [-]": answer.replication.promised,
+        "pairs a second seed shows [-]": answer.replication.reproduced,
         "requirements": answer.requirements.replace({np.nan: None}).to_dict("records"),
         "probability beyond the limit [-]": beyond.estimate.probability,
         "yield [-]": beyond.interval.estimate,

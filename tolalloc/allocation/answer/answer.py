@@ -31,7 +31,7 @@ from tolalloc.reading.units import unit_of
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section
 from tolalloc.reports.wording import short
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.space.requirement import AtYield, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
-from tolalloc.sensitivity.surrogate.quadratic_form import QuadraticForm, fit_quadratic_form
+from tolalloc.sensitivity.surrogate.regression import QuadraticForm, fit_quadratic_form
 
 _LEARNT = 0.8
 """Share of the units that the regression learns from; the others tell how far it is off [-]."""

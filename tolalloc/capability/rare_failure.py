@@ -1,8 +1,10 @@
-"""Widened sampling: from a normal distribution wide enough to fail often back to the standard one, width by width.
+"""Rare failures: subset simulation and scaled-sigma sampling in standard normal space.
 
-It asks of a sample only whether it fails, never by how much, so no slope of the limit state can lead it to one region
-and away from another, as it can lead subset simulation. It is led by distance alone, and loses regions that end further
-out: a sample that fails is expected to fail at a larger width too.
+Subset simulation writes a rare failure as a product of shares that are not rare. Scaled-sigma sampling leads from a
+normal distribution wide enough to fail often back to the standard one, width by width. It asks of a sample only whether
+it fails, never by how much, so no slope of the limit state can lead it to one region and away from another, as it can
+lead subset simulation. It is led by distance alone, and loses regions that end further out: a sample that fails is
+expected to fail at a larger width too.
 """
 
 from __future__ import annotations
@@ -13,20 +15,87 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.capability.rare_failure.chains import (
+from tolalloc.capability.limit_state import (
     LENGTH,
     ChainedEstimate,
     Chains,
+    CountedLimitState,
+    Level,
+    LimitState,
     Run,
     Values,
     level,
     require_samples,
     run_of,
 )
-from tolalloc.capability.rare_failure.limit_state import CountedLimitState, LimitState
 from tolalloc.drawings.seeds import SeedTree
 
-METHOD = "Widened sampling"
+_SUBSET = "Subset simulation"
+_LARGEST_LEVELS = 10
+
+
+def subset_simulation(
+    limit_state: LimitState, seeds: SeedTree, samples: int = 2000, runs: int = 1, largest_failed_share: float = 0.01
+) -> ChainedEstimate:
+    """Return the probability of failure from one or several independent subset simulations.
+
+    Parameters
+    ----------
+    limit_state
+        The limit state.
+    seeds
+        Node of the seed tree.
+    samples
+        Samples of each level, a multiple of 10 [-].
+    runs
+        Independent runs, whose mean is the estimate [-].
+    largest_failed_share
+        Share of the samples that may fail [-].
+
+    Raises
+    ------
+    SolveError
+        More samples than allowed have no usable answer.
+
+    References
+    ----------
+    Au & Beck 2001, P = P₁·Π Pᵢ; Papaioannou et al. 2015, conditional sampling v = √(1 − σ²)·u + σ·ξ with adapted σ.
+    """
+    require_samples(_SUBSET, samples, runs)
+    counted = CountedLimitState(limit_state, largest_failed_share)
+    found = tuple(_subset_run(counted, seeds.child(f"run {run}").generator(), samples) for run in range(runs))
+    return ChainedEstimate.of(_SUBSET, found, counted)
+
+
+def _subset_run(counted: CountedLimitState, generator: np.random.Generator, samples: int) -> Run:
+    """Return one run, whose last level counts the failures."""
+    chains = Chains.independent(counted.values, generator, samples, counted.variables)
+    levels: list[Level] = []
+    caution = ""
+    starts = samples // LENGTH
+    while True:
+        threshold = float(np.partition(chains.values.ravel(), starts - 1)[starts - 1])
+        if threshold < 0:
+            break
+        inside = chains.values <= threshold
+        stuck = not np.isfinite(threshold) or inside.all()
+        if stuck or len(levels) + 1 == _LARGEST_LEVELS:
+            if not (chains.values < 0).any():
+                caution = (
+                    "the limit state is flat, so no level leads on to the failure"
+                    if stuck
+                    else f"the failure is further than {_LARGEST_LEVELS} levels away"
+                )
+            break
+        levels.append(level(chains, inside, threshold))
+        # Repeated states can tie with the threshold, so more than the wanted number may be inside.
+        chosen = generator.permutation(np.flatnonzero(inside.ravel()))[:starts]
+        chains = chains.continued(counted.values, generator, chosen, threshold)
+    levels.append(level(chains, chains.values < 0, 0.0))
+    return run_of(levels, chains, chains.values < 0, samples, caution)
+
+
+_SCALED = "Widened sampling"
 _WIDER = 1.25
 _LARGEST_WIDTH = 8.0
 _SOUGHT_SHARE = 0.15
@@ -41,7 +110,7 @@ _FAILING = float(np.nextafter(0.0, -1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
-class WidenedEstimate(ChainedEstimate):
+class ScaledSigmaEstimate(ChainedEstimate):
     """What widened sampling found, and what it can see of known failures."""
 
     seen_share: (
@@ -49,14 +118,14 @@ class WidenedEstimate(ChainedEstimate):
     )
 
 
-def widened_sampling(
+def scaled_sigma_sampling(
     limit_state: LimitState,
     seeds: SeedTree,
     samples: int = 2000,
     runs: int = 1,
     largest_failed_share: float = 0.01,
     known: Float[np.ndarray, "state variable"] | None = None,
-) -> WidenedEstimate:
+) -> ScaledSigmaEstimate:
     """Return the probability of failure from one or several independent runs of widened sampling.
 
     Parameters
@@ -90,16 +159,16 @@ def widened_sampling(
     (scaled-sigma sampling), extrapolate from failures at larger widths; here chains lead back to width 1, as in subset
     simulation.
     """
-    require_samples(METHOD, samples, runs)
+    require_samples(_SCALED, samples, runs)
     search, counted = CountedLimitState(limit_state, 1.0), CountedLimitState(limit_state, largest_failed_share)
     widths, more = _widths(search, seeds.child("widths").generator(), samples // 4, largest_failed_share)
     found = tuple(
-        _one_run(counted, seeds.child(f"run {run}").generator(), samples, round(more * samples), widths)
+        _scaled_run(counted, seeds.child(f"run {run}").generator(), samples, round(more * samples), widths)
         for run in range(runs)
     )
     seen = 1.0 if known is None or not known.size else _seen_share(counted, known, widths)
     counted.calls, counted.failed = counted.calls + search.calls, counted.failed + search.failed
-    return WidenedEstimate(**vars(ChainedEstimate.of(METHOD, found, counted)), seen_share=seen)
+    return ScaledSigmaEstimate(**vars(ChainedEstimate.of(_SCALED, found, counted)), seen_share=seen)
 
 
 def _seen_share(counted: CountedLimitState, known: Float[np.ndarray, "state variable"], widths: list[float]) -> float:
@@ -127,7 +196,7 @@ def _widths(
     failing = chains.values < 0
     while failing.mean() < _SOUGHT_SHARE and width < _LARGEST_WIDTH:
         width, before = width * _WIDER, counted.failed
-        trial = Chains.independent(_widened(counted, width), generator, samples, counted.variables)
+        trial = Chains.independent(_scaled(counted, width), generator, samples, counted.variables)
         found = trial.values < 0
         if counted.failed - before > largest_failed_share * samples:
             break
@@ -136,7 +205,7 @@ def _widths(
     first = float(failing.mean())
     while failing.any() and widths[-1] > 1.0 and len(widths) < _MOST_WIDTHS:
         chosen = _starts(generator, failing, samples)
-        chains = chains.continued(_widened(counted, widths[-1]), generator, chosen, _FAILING)
+        chains = chains.continued(_scaled(counted, widths[-1]), generator, chosen, _FAILING)
         width, failing = _narrower(counted, chains, widths[-1])
         widths.append(width)
     more = min(_MOST_AT_FIRST, _SOUGHT_SHARE / first) if first else 1.0
@@ -161,24 +230,24 @@ def _narrower(
     return (1.0, failing) if kept is None else (high, kept)
 
 
-def _one_run(
+def _scaled_run(
     counted: CountedLimitState, generator: np.random.Generator, samples: int, first: int, widths: list[float]
 ) -> Run:
     """Return one run, whose last level counts the failures at width 1."""
-    chains = Chains.independent(_widened(counted, widths[0]), generator, first, counted.variables)
+    chains = Chains.independent(_scaled(counted, widths[0]), generator, first, counted.variables)
     failing = chains.values < 0
     levels = [level(chains, failing, widths[0])]
     for wider, narrower in pairwise(widths):
         if not failing.any():
             break
         chosen = _starts(generator, failing, samples)
-        chains = chains.continued(_widened(counted, wider), generator, chosen, _FAILING)
+        chains = chains.continued(_scaled(counted, wider), generator, chosen, _FAILING)
         failing = _failing(counted, chains, narrower)
         levels.append(level(chains, failing, narrower))
     return run_of(levels, chains, failing, first)
 
 
-def _widened(counted: CountedLimitState, width: float) -> Values:
+def _scaled(counted: CountedLimitState, width: float) -> Values:
     """Return the limit state of samples that are so many times as wide."""
     return lambda u: counted.values(width * u)
 

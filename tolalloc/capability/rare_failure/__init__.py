@@ -1,1 +1,0 @@
-"""Rare failures: subset simulation and widened sampling in standard normal space."""
