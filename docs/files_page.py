@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from tolalloc.cli.start.schema import KINDS, schema
+from tolalloc.cli.start import KINDS, schema
 
 TITLES = {
     "reducer": ("Reducer", "`NAME.reducer.toml`: sizes, stiffness, modification and load; `tolalloc new` writes one."),

@@ -9,7 +9,7 @@ import pandas as pd
 from published.modification_comparison import compared, comparison_document
 
 import tolalloc as ta
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.modification import ModificationRequest, closed_form, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer

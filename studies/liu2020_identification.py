@@ -22,7 +22,7 @@ from tolalloc.bench.identification.prediction import KernelPredictor
 from tolalloc.bench.identification.problem import IdentificationProblem
 from tolalloc.bench.identification.request import IdentificationRequest, identify
 from tolalloc.bench.measurement.files import Measurements
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

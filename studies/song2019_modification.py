@@ -12,7 +12,7 @@ import pandas as pd
 from published.modification_comparison import algorithms_table, compared, comparison_document, convergence_figure
 
 import tolalloc as ta
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.assessment import assess
 from tolalloc.reducers.cycloid.mesh import flank_angle

@@ -11,7 +11,7 @@ from math import inf
 import pandas as pd
 
 import tolalloc as ta
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import shown_progress
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.dynamics.prototype import engine, with_rigid_bearings

@@ -22,7 +22,7 @@ import numpy as np
 from kernel_speed import figures, progress, run_benchmark
 from numpy_cores import timed
 
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.dynamics.motion import Damping
 from tolalloc.reducers.dynamics.simulation import simulate as simulate_model

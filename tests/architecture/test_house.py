@@ -24,7 +24,7 @@ DOORS = {
     "sklearn": ("sensitivity/surrogate/", "reducers/stand_ins.py"),
     "matplotlib": ("reports/",),
     "jinja2": ("reports/",),
-    "openpyxl": ("cli/start/", "reports/", "allocation/answer/", "drawings/workbook.py"),
+    "openpyxl": ("cli/start.py", "reports/", "allocation/answer/", "drawings/table_file.py"),
     "distributed": ("running/workers.py",),
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),

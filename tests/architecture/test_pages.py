@@ -14,7 +14,7 @@ import pytest
 
 import tolalloc as ta
 from tolalloc import exceptions
-from tolalloc.cli.start.schema import KINDS, schema
+from tolalloc.cli.start import KINDS, schema
 from tolalloc.study.prepared import Prepared
 
 ROOT = Path(__file__).parents[2]

@@ -15,9 +15,8 @@ import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.allocation.answer.calculator import Formula
-from tolalloc.cli.console import print_table
+from tolalloc.cli.console import Bars, Lines, print_table
 from tolalloc.cli.main import main
-from tolalloc.cli.progress import Bars, Lines
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.reports.excel import write_sheets
 from tolalloc.reports.writer import write_csv

@@ -18,11 +18,9 @@ import pytest
 import tolalloc as ta
 from tests.live_page import STUDY
 from tests.studies.command import ROOT, command, tolalloc
-from tolalloc.cli.live.address import Address
-from tolalloc.cli.live.design import LiveDesign
 from tolalloc.cli.live.desk import Desk
-from tolalloc.cli.live.server import LARGEST, MOST_CONNECTIONS, LiveServer
-from tolalloc.cli.live.session import Session
+from tolalloc.cli.live.server import LARGEST, MOST_CONNECTIONS, Address, LiveServer
+from tolalloc.cli.live.session import LiveDesign, Session
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers import TORQUE

@@ -15,8 +15,8 @@ from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.main import app
-from tolalloc.cli.start.bench_files import FACTOR, STIFFER
-from tolalloc.cli.start.reducer_text import PRESETS
+from tolalloc.cli.samples import FACTOR, STIFFER
+from tolalloc.cli.start import PRESETS
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel

@@ -10,9 +10,8 @@ import pytest
 
 from tests.studies.command import ROOT, refused, tolalloc
 from tests.studies.scripts import study_script
-from tolalloc.drawings.process_capability import load_process_capabilities
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table
 
 PEAK_TO_PEAK = "peak-to-peak transmission error"
 EFFORT = """effort=ta.Effort(ranking=RankingEffort(

@@ -13,7 +13,7 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.files import DATA, load_plan
 from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.cli.main import app
-from tolalloc.cli.start.schema import KINDS, schema
+from tolalloc.cli.start import KINDS, schema
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
 

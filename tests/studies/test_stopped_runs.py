@@ -14,7 +14,7 @@ import pytest
 
 from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
-from tolalloc.cli.progress import Lines
+from tolalloc.cli.console import Lines
 from tolalloc.reports import writer
 from tolalloc.reports.folder import claimed
 from tolalloc.running import result_cache as kept_units

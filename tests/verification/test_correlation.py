@@ -12,9 +12,8 @@ from scipy.special import ndtr
 from scipy.stats import kstest
 
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair, load_correlations
-from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.distributions import Batch, Distribution
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.mixtures import Batch
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolalloc.drawings.distributions import RAYLEIGH, Distribution, moments
+from tolalloc.drawings.distributions import RAYLEIGH, Batch, Distribution, moments, smoothed_magnitude
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.mixtures import Batch, smoothed_magnitude
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import (

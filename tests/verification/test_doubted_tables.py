@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.drawings.plausibility import doubts
+from tolalloc.drawings.tolerance_table import doubts
 from tolalloc.exceptions import InputError
 
 UNIT = {"mm": 1.0, "µm": 1e-3}

@@ -32,10 +32,9 @@ from tolalloc.assembly.files import load_plan
 from tolalloc.bench.measurement.files import load_measurements
 from tolalloc.drawings.correlation import load_correlations
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.process_capability import load_process_capabilities
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.table_file import DATA
-from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
+from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table, table_text
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.reducer.files import PRESETS, load_identified_stiffness, load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit

@@ -15,9 +15,8 @@ from openpyxl.chart import BarChart
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.bench.measurement.readings import load_readings
-from tolalloc.drawings.process_capability import load_process_capabilities
 from tolalloc.drawings.table_file import DATA
-from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.file_content import require_believable
 from tolalloc.reading.files import shipped_or_path

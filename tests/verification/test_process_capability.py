@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tolalloc.drawings.distributions import Distribution
-from tolalloc.drawings.process_capability import load_process_capabilities
-from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, shown_progress, tell, write_report
 
 
 def assemble(

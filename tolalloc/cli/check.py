@@ -51,7 +51,7 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
 
 def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
-    from tolalloc.drawings.plausibility import doubts
+    from tolalloc.drawings.tolerance_table import doubts
     from tolalloc.reading.units import COST_UNITS
 
     study, model = prepared.study, prepared.model

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, shown_progress, tell, write_report
 from tolalloc.cli.options import ReducerOption, StiffnessOption, TestTorqueOption, named_reducer
-from tolalloc.cli.progress import shown_progress
 
 
 def diagnose(

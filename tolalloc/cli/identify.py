@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, shown_progress, tell, write_report
 from tolalloc.cli.options import ReducerOption, named_reducer
-from tolalloc.cli.progress import shown_progress
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, tell, write_report
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, shown_progress, tell, write_report
 from tolalloc.cli.options import named_reducer
-from tolalloc.cli.progress import shown_progress
 from tolalloc.study.inquiry import Inquiry, Word
 
 

@@ -21,11 +21,10 @@ from tolalloc.cli.identify import identify
 from tolalloc.cli.inquiries import inquiry_command
 from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
-from tolalloc.cli.new import new
+from tolalloc.cli.new import new, schema
 from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
-from tolalloc.cli.schema import schema
 from tolalloc.cli.series import series
 from tolalloc.cli.simulate import simulate
 from tolalloc.cli.transmission_error import te

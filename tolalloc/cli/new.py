@@ -1,4 +1,4 @@
-"""The command ``tolalloc new``: a folder that runs at once."""
+"""The commands ``tolalloc new``, a folder that runs at once, and ``tolalloc schema``, what may stand in a TOML file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import note
+from tolalloc.cli.console import note, print_json
 from tolalloc.exceptions import InputError
 
 
@@ -22,8 +22,7 @@ def new(
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
-    from tolalloc.cli.start.folder import SAMPLES, NewFolder
-    from tolalloc.cli.start.reducer_text import PRESETS, Likeness
+    from tolalloc.cli.start import PRESETS, SAMPLES, Likeness, NewFolder
 
     if name is None:
         if not sys.stdin.isatty():
@@ -45,3 +44,12 @@ def new(
     )
     typer.echo("Every zone and cost is assumed: open zones.xlsx and write your own.")
     note(f"Next: cd {name} && tolalloc check study.py && tolalloc open study.py", dim=True)
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(help="Kind of TOML file: reducer, unit, stiffness, bench or chain.")],
+) -> None:
+    """Print the JSON schema of a kind of TOML file: its fields, their units and ranges."""
+    from tolalloc.cli.start import schema as schema_of
+
+    print_json(schema_of(kind))

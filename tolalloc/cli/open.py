@@ -14,9 +14,8 @@ from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
 
 if TYPE_CHECKING:
-    from tolalloc.cli.live.address import Address
     from tolalloc.cli.live.desk import Desk
-    from tolalloc.cli.live.server import LiveServer
+    from tolalloc.cli.live.server import Address, LiveServer
 
 
 def open_page(
@@ -25,8 +24,8 @@ def open_page(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
     """Open the live page of a study: move a zone, see cost, curve and yield of the real model."""
-    from tolalloc.cli.live.address import Address
     from tolalloc.cli.live.desk import Desk
+    from tolalloc.cli.live.server import Address
     from tolalloc.cli.live.session import Session
     from tolalloc.study.prepared import Prepared
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, tell
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, shown_progress, tell
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
 

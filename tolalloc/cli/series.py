@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, announce_compilation, note, tell
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import AsJson, announce_compilation, note, shown_progress, tell
 from tolalloc.cli.run import Fresh, Quick, Scheduler, solvers
 from tolalloc.cli.study_script import load_script
 from tolalloc.exceptions import StoppedError

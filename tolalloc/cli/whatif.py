@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import AsJson, ReportFolder, announce_kernel, tell, write_report
-from tolalloc.cli.progress import shown_progress
+from tolalloc.cli.console import AsJson, ReportFolder, announce_kernel, shown_progress, tell, write_report
 from tolalloc.cli.run import Script
 from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
-from tolalloc.drawings.plausibility import doubts
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
     read_table_file,
@@ -20,7 +19,7 @@ from tolalloc.drawings.table_file import (
     stated_currency,
     stated_settings,
 )
-from tolalloc.drawings.tolerance_table import load_tolerance_table, sources_of_rows, table_frame, table_text
+from tolalloc.drawings.tolerance_table import doubts, load_tolerance_table, sources_of_rows, table_frame, table_text
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file
 from tolalloc.reading.files import found_from_here, write_new
@@ -243,7 +242,7 @@ def _notes(table: Path, header: int, sheet: str) -> tuple[str, ...]:
     left_out = (titles,) if header > 1 else ()
     if table.suffix.lower() not in (".xlsx", ".xlsm"):
         return left_out
-    from tolalloc.drawings.workbook import hidden_cells
+    from tolalloc.drawings.table_file import hidden_cells
 
     return (*left_out, *hidden_cells(table, sheet))
 

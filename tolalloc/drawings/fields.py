@@ -9,9 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tolalloc.drawings.distributions import Distribution, require_shape
+from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
-from tolalloc.drawings.mixtures import batches_text, parsed_batches
 from tolalloc.drawings.sources import ANGULAR, Source
 from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text

@@ -10,9 +10,19 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Distribution, Family, Marginal
+from tolalloc.drawings.distributions import (
+    NORMAL,
+    RAYLEIGH,
+    Batch,
+    Distribution,
+    Family,
+    Marginal,
+    Mixture,
+    smoothed,
+    smoothed_magnitude,
+    smoothing_width,
+)
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.mixtures import Batch, Mixture, smoothed, smoothed_magnitude, smoothing_width
 from tolalloc.drawings.zones import Feature, Spectrum, ZoneMapping
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 

@@ -1,4 +1,4 @@
-"""A user's own function as a model: ranked, judged and allocated like the equivalent model of a reducer."""
+"""A user's own function or Functional Mock-up Unit as a model: ranked, judged and allocated like a reducer's."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,71 @@ from tolalloc.models.model import Evaluation, Examination, Model, Observer, Sett
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.user_function import UserFunction, identity
 from tolalloc.reading.units import MILLIMETRE
+
+
+@dataclass(frozen=True)
+class SimulatedUnit:
+    """A unit as a function of its parameters, one sample a call.
+
+    Parameters
+    ----------
+    path
+        The file.
+    parameters, variables
+        What is set before, and read after a simulation.
+    stop_time
+        Simulated time [s].
+    engine
+        The library.
+    """
+
+    path: Path
+    parameters: tuple[str, ...]
+    variables: tuple[str, ...]
+    stop_time: float
+    engine: Any
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.path.stem
+
+    def __call__(self, *values: float) -> list[float]:
+        """Return the variables at the end of a simulation with these parameters.
+
+        Raises
+        ------
+        ValueError
+            The simulation has no end.
+        """
+        start = {name: float(value) for name, value in zip(self.parameters, values, strict=True)}
+        try:
+            found = self.engine.simulate_fmu(
+                str(self.path), start_values=start, output=list(self.variables), stop_time=self.stop_time
+            )
+        except TypeError:
+            raise
+        except Exception as error:
+            raise ValueError(f"{self.path}: {error}") from None
+        return [float(found[name][-1]) for name in self.variables]
+
+
+def simulated(path: str, parameters: tuple[str, ...], variables: tuple[str, ...], stop_time: float) -> SimulatedUnit:
+    """Return a unit as a function.
+
+    Raises
+    ------
+    InputError
+        The library is missing, or there is no such file.
+    """
+    try:
+        import fmpy
+    except ImportError:
+        raise InputError("Functional Mock-up Units need the optional extra: pip install -e '.[fmu]'.") from None
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such Functional Mock-up Unit.")
+    return SimulatedUnit(Path(path), parameters, variables, stop_time, fmpy)
+
 
 _STEP = 1e-4
 """Step of a difference to either side, over the zone, for a function without noise [-]."""
@@ -320,8 +386,6 @@ def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], s
     InputError
         The optional library that runs such units is not installed, or there is no such file.
     """
-    from tolalloc.models.fmu import simulated
-
     function = simulated(path, tuple(inputs.values()), tuple(outputs.values()), stop_time)
     return FunctionModel(
         function=function, inputs=tuple(inputs), outputs=tuple(outputs), step=_STEP_OF_SIMULATION, name=function.name

@@ -1,20 +1,194 @@
-"""What the page may ask: each request is a name and a record, each answer a record."""
+"""What the page may ask: each request is a name and a record, each answer a record; questions run in the background."""
 
 from __future__ import annotations
 
+import re
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from threading import Lock
+from threading import Event, Lock, Thread
 from typing import Any
 
-from tolalloc.cli.live.design import LiveDesign, names_in
-from tolalloc.cli.live.jobs import Job
-from tolalloc.cli.live.saving import Saving
-from tolalloc.cli.live.session import Session
-from tolalloc.cli.live.units import LiveUnits
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.cli.live.session import LiveDesign, LiveUnits, Session, names_in
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import table_text
+from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.reading.files import write_new
+from tolalloc.study.prepared import Prepared
+from tolalloc.study.study import Study
+
+KINDS = ("ranking", "allocation")
+
+
+class _StoppedError(Exception):
+    """Nobody wants the answer any more."""
+
+
+@dataclass
+class Job:
+    """One question in the background, and its own progress, which can be read at any time."""
+
+    kind: str
+    study: Study
+    settings: tuple[str, ...]  # Names of the settings that an answer may choose
+    stage: str = "begins"
+    units: int = 0
+    answer: dict[str, Any] | None = None
+    error: str = ""
+    began: float = field(default_factory=time.monotonic)
+    _stop: Event = field(default_factory=Event)
+
+    @classmethod
+    def asked(cls, kind: str, study: Study, settings: tuple[str, ...] = ()) -> Job:
+        """Ask a question of a study, at the quick effort.
+
+        Raises
+        ------
+        InputError
+            The page does not ask such a question.
+        """
+        if kind not in KINDS:
+            raise InputError.at("page", "question", kind, " or ".join(KINDS))
+        job = cls(kind=kind, study=study, settings=settings)
+        Thread(target=job._run, daemon=True, name=f"live {kind}").start()
+        return job
+
+    def stop(self) -> None:
+        """Stop it as soon as the next units are solved."""
+        self._stop.set()
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage."""
+        self._look()
+        self.stage, self.units = stage, 0
+
+    def advance(self, units: int) -> None:
+        """So many more units are solved."""
+        self._look()
+        self.units += units
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """How far it has come, and its answer once there is one."""
+        seconds = round(time.monotonic() - self.began, 1)
+        told = {"kind": self.kind, "stage": self.stage, "units": self.units, "seconds": seconds}
+        return {**told, "answer": self.answer, "error": self.error}
+
+    def _look(self) -> None:
+        if self._stop.is_set():
+            raise _StoppedError
+
+    def _run(self) -> None:
+        try:
+            answer = self.study.ask(self.kind, "quick", self)
+            said = {"sentences": list(answer.told), "warnings": list(answer.warned)}
+            self.answer = said | _found(answer, self.settings)
+        except _StoppedError:
+            self.error = "stopped"
+        except TolallocError as error:
+            self.error = str(error)
+        except Exception:
+            self.error = "The program failed; the terminal says where."
+            raise
+
+
+def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
+    """Return what the page takes over of an answer: shares of the sources, or the zones of the cheapest drawing."""
+    from tolalloc.reports.charts import chart
+
+    first = next(iter(answer.figures.values()), None)
+    drawn = {"figure": chart(first)} if first else {}
+    if answer.kind == "ranking":
+        frame = answer.to_frame()
+        return {**drawn, "shares": dict(zip(frame["source"], frame["contribution [%]"].astype(float), strict=True))}
+    frame = answer.drawing_table
+    zones = {str(row["source"]): float(row["zone [µm]"]) for _, row in frame.iterrows()}
+    chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
+    return {**drawn, "met": bool(answer.met), "cost": float(answer.cost), "zones": zones, "settings": chosen}
+
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
+_SCRIPT = '''"""{before} at other zones, saved from the live page."""
+
+from importlib import import_module
+
+import tolalloc as ta
+
+study = import_module("{module}").study.changed(
+    "{table}",
+    settings={settings!r},
+    name="{name}",
+)
+
+if __name__ == "__main__":
+    ta.run_script()
+'''
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saving:
+    """Where designs of a session are written: beside the study's script, never over a file."""
+
+    session: Session
+    script: Path
+
+    def study(self, design: LiveDesign, name: str = "", locked: frozenset[str] = frozenset()) -> Study:
+        """Return the study at a design, with further sources locked."""
+        before = self.session.prepared.study
+        if before.drawing is None:
+            raise InputError(f"study {before.name}: it has no drawing that could change.")
+        sources = (replace(own, locked=own.locked or own.name in locked) for own in self.session.sources(design))
+        drawing = before.drawing.with_sources(sources)
+        return before.changed(drawing, self._settings(design), name)
+
+    def save(self, design: LiveDesign, name: str) -> dict[str, Any]:
+        """Write the tolerance table and the study of a design, and return their names.
+
+        Raises
+        ------
+        InputError
+            A name that is none of a Python module, or files that are there already.
+        """
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+            raise InputError.at("page", "name", name, "60 letters, digits and _, a letter first")
+        table, script = (self.script.parent / f"{name}{ending}" for ending in (".tolerances.csv", ".py"))
+        for path in (table, script):
+            if path.exists():
+                raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
+        drawing, currency = self.study(design, name).drawing, self.session.prepared.currency
+        sources = tuple(map(_with_range, drawing.sources if drawing else ()))
+        write_new(table, table_text(sources, table.parent, currency))
+        self._require_readable(table, design)
+        before = self.session.prepared.study.name
+        values = self._settings(design)
+        text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
+        write_new(script, text)
+        return {"table": table.name, "script": script.name, "folder": str(self.script.parent)}
+
+    def _require_readable(self, table: Path, design: LiveDesign) -> None:
+        """Take a table back that no study would read, such as one with a zone that the model does not believe."""
+        try:
+            changed = self.session.prepared.study.changed(table, self._settings(design))
+            _ = (prepared := Prepared(study=changed)).model, prepared.space
+        except TolallocError:
+            table.unlink()
+            raise
+
+    def _settings(self, design: LiveDesign) -> dict[str, float]:
+        """Return the settings and operating conditions that differ from the study's own."""
+        known = zip(self.session.prepared.model.settings, design.settings, strict=True)
+        return {own.name: value for own, value in known if value != own.value} | dict(design.operating)
+
+
+def _with_range(source: Source) -> Source:
+    """Return a source whose smallest and largest zone take in the one that was tried."""
+    if source.zone <= 0:
+        return source
+    smallest, largest = min(source.minimum, source.zone), max(source.maximum, source.zone)
+    return replace(source, minimum=smallest, maximum=largest)
+
 
 _TABS = 64
 """Tabs whose latest request is remembered [-]."""

@@ -1,28 +1,183 @@
-"""What the page asks of a study: price and curve at once, then the yield of more and more of the same random units."""
+"""A study on the live page: the design that somebody tries, what random units say of it, and one unit alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tolalloc.allocation.cost.model import Process
+from tolalloc.allocation.difference import limited_shares
 from tolalloc.allocation.space.design_space import cheapest, outside_range, repriced
 from tolalloc.allocation.space.requirement import Requirement
-from tolalloc.cli.live.design import LiveDesign, shown_zone
-from tolalloc.cli.live.judged import judged
+from tolalloc.capability.indices import quantile_interval
+from tolalloc.capability.monte_carlo import proportion
+from tolalloc.drawings.fields import LARGEST_ZONE
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.exceptions import InputError
+from tolalloc.drawings.sources import Source, limited_measure
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Model
-from tolalloc.models.settings import Setting
-from tolalloc.reading.units import COST_UNITS, MICROMETRE
+from tolalloc.models.settings import Setting, require_settings
+from tolalloc.reading.named_fields import is_number
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
+from tolalloc.reports.charts import chart, numbers, shares
+from tolalloc.reports.figure import BINS, Figure, Series
+from tolalloc.reports.wording import short
 from tolalloc.study.prepared import Prepared
+
+_DECIMALS = 4
+"""Decimals of a zone; a table writes one more, so that half a zone is written whole too [-]."""
+_SMALLEST = 10.0**-_DECIMALS
+"""Smallest zone with these decimals [µm]."""
+
+
+@dataclass(frozen=True)
+class LiveDesign:
+    """Zones that differ from the drawing's, the values of the model's settings, and under which conditions it is asked.
+
+    Parameters
+    ----------
+    zones
+        Source and its zone [m], by name.
+    settings
+        Values of all settings, in the model's order [units of their names].
+    operating
+        Operating condition and its value, by name, where it differs from the study's [units of their names].
+    """
+
+    zones: tuple[tuple[str, float], ...]
+    settings: tuple[float, ...]
+    operating: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def read(cls, sent: Any, prepared: Prepared) -> LiveDesign:
+        """Return the design of a record ``{"zones": {source: µm}, "settings": {name: value}}``.
+
+        Operating conditions stand among the settings.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            What is no such record, a source or setting that the study does not have, a value that is not allowed.
+        """
+        zones, settings = (_numbers(sent, key) for key in ("zones", "settings"))
+        present = {own.name: own.zone for own in prepared.errors.active}
+        for name, zone in zones.items():
+            if name not in present:
+                raise UnknownNameError.among("page", "source", name, present)
+            if not _SMALLEST <= zone <= LARGEST_ZONE:
+                raise InputError.at("page", name, zone, f"a zone of {_SMALLEST:g} to {LARGEST_ZONE:g} µm")
+        # A zone that the drawing has is said by the drawing, so that no bit of it depends on the way to the page.
+        told = {
+            name: round(zone, _DECIMALS) * MICROMETRE
+            for name, zone in zones.items()
+            if zone != shown_zone(present[name])
+        }
+        model = prepared.model
+        require_settings("page", (*model.settings, *model.operating_conditions), settings)
+        values = tuple(float(settings.get(own.name, own.value)) for own in model.settings)
+        operating = tuple(
+            (own.name, float(settings[own.name]))
+            for own in model.operating_conditions
+            if settings.get(own.name, own.value) != own.value
+        )
+        return cls(zones=tuple(sorted(told.items())), settings=values, operating=operating)
+
+
+def shown_zone(zone: float) -> float:
+    """Return a zone as the page shows it [m → µm]."""
+    return float(f"{zone / MICROMETRE:.9g}")
+
+
+def _numbers(sent: Any, key: str) -> Mapping[str, float]:
+    """Return a record of numbers inside a record, empty where there is none."""
+    found = sent.get(key, {}) if isinstance(sent, dict) else None
+    if not isinstance(found, dict) or not all(is_number(value) for value in found.values()):
+        raise InputError.at("page", key, found, "names with their numbers")
+    return found
+
+
+def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> frozenset[str]:
+    """Return the names that a request lists, none where it lists none.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is no list, or a name that is not known.
+    """
+    found = sent.get(key, [])
+    if not isinstance(found, list):
+        raise InputError.at("page", key, found, "a list of names")
+    for name in found:
+        if name not in known:
+            raise UnknownNameError.among("page", key, str(name), known)
+    return frozenset(found)
+
+
+def judged(prepared: Prepared, outputs: tuple[str, ...], values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
+    """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
+
+    Parameters
+    ----------
+    prepared
+        The study.
+    outputs
+        Names of the outputs, in the order of the values.
+    values
+        Outputs of every unit, NaN where a unit has none [as the names state].
+    """
+    read = [(own, values[:, outputs.index(own.output)]) for own in prepared.requirements]
+    kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
+    inside = proportion(len(values), int(np.count_nonzero(~kept)))
+    limited = prepared.model.own_limits
+    return {
+        "units": len(values),
+        "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
+        "yield": [inside.estimate, inside.low, inside.high],
+        "target": prepared.target,
+        # share of units that do not work at all, for every limit that the model has of its own
+        "broken": {
+            own.output: float((~own.limits.kept_by(found)).mean()) for own, found in read if own.output in limited
+        },
+        "outputs": [_output(own, found, kept) for own, found in read],
+    }
+
+
+def _output(
+    requirement: Requirement, values: Float[np.ndarray, " unit"], kept: Bool[np.ndarray, " unit"]
+) -> dict[str, Any]:
+    limits, known = requirement.limits, values[np.isfinite(values)]
+    inside = proportion(len(values), int(np.count_nonzero(~limits.kept_by(values))))
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    order = np.argsort(np.where(np.isfinite(values), values, -np.inf))
+    return {
+        "name": short(requirement.output),
+        "output": requirement.output,
+        "unit": unit_of(requirement.output),
+        "lower": limits.lower,
+        "upper": limits.upper,
+        "quantiles": [_quantile(known, share) for share in limited_shares(requirement)],
+        "inside": [inside.estimate, inside.low, inside.high],
+        "histogram": shares(known, low, (high - low) / BINS or 1.0),
+        "worst": int(order[-1]) + 1,
+        "median": int(order[len(order) // 2]) + 1,
+        "reject": int(np.flatnonzero(~kept)[0]) + 1 if not kept.all() else None,
+    }
+
+
+def _quantile(values: Float[np.ndarray, " known"], share: float) -> dict[str, Any]:
+    """Return a quantile with its 95 % interval, whose ends are unknown where the units are too few."""
+    if not values.size:
+        return {"share": share, "value": None, "interval": [None, None]}
+    found = quantile_interval(values, share)
+    return {"share": share, "value": found.estimate, "interval": numbers([found.low, found.high])}
+
 
 FIRST = 256
 """Units that are judged at once [-]."""
@@ -204,3 +359,133 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
         "locked": source.locked,
         "cost": source.cost,
     }
+
+
+_SWEPT = 9
+"""Values of an error between the ends of its zone [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveUnits:
+    """The random units of a session, one at a time; unit 0 has exact parts, the others count from 1."""
+
+    session: Session
+
+    def unit(self, design: LiveDesign, number: int) -> dict[str, Any]:
+        """Return outputs and pictures of a unit.
+
+        Raises
+        ------
+        InputError
+            There is no such unit.
+        """
+        x = self._columns(design, number)
+        values = self._values(design, x[np.newaxis])[0]
+        label = f"unit {number}" if number else "exact parts"
+        figures = self.session.model(design).pictured({label: (np.array(design.settings), x)})
+        return {
+            "unit": number,
+            "values": [
+                {"name": short(name), "unit": unit_of(name), "value": value}
+                for name, value in zip(self.session.outputs, numbers(values), strict=True)
+            ],
+            "figures": [chart(figure) for figure in figures],
+        }
+
+    def scene(self, design: LiveDesign, number: int, swept: tuple[str, float] | None = None) -> dict[str, Any]:
+        """Return a unit as a moving picture needs it; nothing where the model has none.
+
+        Parameters
+        ----------
+        design
+            The design.
+        number
+            Number of the unit [-].
+        swept
+            A source and where its error stands in its zone, from -1 to 1; as the unit has it unless given [-].
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            There is no such unit or source.
+        SolveError
+            It does not come to rest somewhere.
+        """
+        names = tuple(own.name for own in self.session.prepared.errors.active)
+        x, label = self._columns(design, number), f"unit {number}" if number else "exact parts"
+        if swept:
+            source, share = swept
+            if not (is_number(share) and abs(share) <= 1):
+                raise InputError.at("page", "share", share, "a number from -1 to 1")
+            x, label = self._at_shares(design, number, source, np.array([share]))[0], f"{label}, {source} moved"
+        return {"scene": self.session.model(design).scene(np.array(design.settings), x, label, names)}
+
+    def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
+        """Return the leading output of a unit while one of its errors goes from one end of its zone to the other.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            There is no such unit or source.
+        """
+        shares = np.linspace(-1.0, 1.0, _SWEPT)
+        tried = self._at_shares(design, number, source, shares)
+        values = self._values(design, tried)[:, 0]
+        model, settings = self.session.model(design), np.array(design.settings)
+        labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
+        curves = [model.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
+        leading = self.session.outputs[0]
+        figure = Figure(
+            name="sweep",
+            title=f"{short(leading)} while {source} goes through its zone, all else of the unit as it is",
+            x_label=f"{source} over its zone [-]",
+            y_label=f"{short(leading)} [{unit_of(leading)}]",
+            series=(Series(label=source, kind="line", x=list(shares), y=list(values)),),
+        )
+        known = values[np.isfinite(values)]
+        return {
+            "source": source,
+            "figure": chart(figure),
+            "spread": float(known.max() - known.min()) if known.size else None,
+            "curves": [[chart(own) for own in figures] for figures in curves],
+        }
+
+    def _at_shares(
+        self, design: LiveDesign, number: int, source: str, shares: Float[np.ndarray, " share"]
+    ) -> Float[np.ndarray, "share column"]:
+        """Return the deviations of a unit with one of its errors at places of its zone [m, angles rad]."""
+        errors, sources = self.session.prepared.errors, {own.name: own for own in self.session.sources(design)}
+        if source not in sources:
+            raise UnknownNameError.among("page", "source", source, sources)
+        own = np.array([name == source for name in errors.source_of_column])
+        tried = np.tile(self._columns(design, number), (len(shares), 1))
+        tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
+        return tried
+
+    def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
+        """Return the deviations of a unit [m, angles rad]."""
+        if not (type(number) is int and 0 <= number <= MOST):
+            raise InputError.at("page", "unit", number, f"a whole number up to {MOST}, 0 for exact parts")
+        if number:
+            return np.asarray(self.session.deviations(design, slice(number - 1, number))[0])
+        errors, zones = self.session.prepared.errors, np.array([own.zone for own in self.session.sources(design)])
+        return np.asarray(errors.deviations(np.zeros((1, len(errors.columns))), zones)[0])
+
+    def _full(self, source: Source, number: int, at: np.ndarray) -> Float[np.ndarray, " own_column"]:
+        """Return the deviations with which the source fills its zone, in the direction of the unit [m, angles rad]."""
+        session = self.session
+        zones = np.ones(len(session.prepared.errors.active))
+        own = session.prepared.errors.deviations(session.standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
+        centred = own - _middle(source)
+        measure = float(limited_measure(source, own[np.newaxis])[0]) or 1.0
+        half = source.zone / 2 if source.feature is Feature.SIZE else source.zone
+        return np.asarray(centred * half / measure)
+
+    def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
+        evaluation = self.session.model(design).reading(self.session.outputs)(x)
+        return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
+
+
+def _middle(source: Source) -> float:
+    """Return where the columns of a source stand in the middle of its zone [m, angles rad]."""
+    return source.middle / source.lever

@@ -1,0 +1,406 @@
+"""A new folder that runs at once: reducer, tolerance table, study, samples, schemas for editors, what to do next."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any
+
+from pydantic import BaseModel, create_model
+
+from tolalloc.assembly.files import ChainRecord, PartRecord
+from tolalloc.assembly.steps import AssemblyStep
+from tolalloc.bench.measurement.files import CurveRecord, LoopRecord, MeasurementRecord, PeakToPeakRecord
+from tolalloc.cli.samples import Samples
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.fields import COLUMNS, HEADERS
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import ReducerRecord, load_reducer
+from tolalloc.reducers.reducer.stiffness_records import IdentifiedStiffnessRecord
+from tolalloc.reducers.reducer.unit_file import UnitRecord
+
+
+def _chain() -> type[BaseModel]:
+    """Return the record of a chain file with its inner tables, which are read one by one."""
+    inner: dict[str, Any] = {"part": (tuple[PartRecord, ...], ...), "step": (tuple[AssemblyStep, ...], ())}
+    return create_model("ChainRecord", __base__=ChainRecord, **inner)
+
+
+def _bench() -> type[BaseModel]:
+    """Return the record of a measurement file with its inner tables, which are read one by one."""
+    inner: dict[str, Any] = {
+        "units": (str | tuple[str, ...], ...),  # one name is read as a list of one
+        "peak_to_peak": (PeakToPeakRecord | None, None),
+        "curves": (tuple[CurveRecord, ...], ()),
+        "loops": (tuple[LoopRecord, ...], ()),
+    }
+    return create_model("MeasurementRecord", __base__=MeasurementRecord, **inner)
+
+
+KINDS: dict[str, Callable[[], type[BaseModel]]] = {
+    "reducer": lambda: ReducerRecord,
+    "unit": lambda: UnitRecord,
+    "stiffness": lambda: IdentifiedStiffnessRecord,
+    "bench": _bench,
+    "chain": _chain,
+}
+"""Kind of TOML file → the record that reads it."""
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """Return the JSON schema of a kind of TOML file.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such kind.
+
+    Examples
+    --------
+    >>> schema("reducer")["properties"]["crank_count"]["maximum"]
+    6
+    """
+    if kind not in KINDS:
+        raise UnknownNameError.among("schema", "kind", kind, KINDS)
+    record = KINDS[kind]()
+    found = record.model_json_schema(by_alias=True)
+    for table in (found, *found.get("$defs", {}).values()):
+        for own in table.get("properties", {}).values():
+            own.pop("title", None)  # pydantic's, the name once more
+        if spacing := table.get("properties", {}).get("disc_spacing_mm"):
+            del spacing["default"]
+            spacing["description"] = "the face width, unless given"
+    title = f"{kind} file of tolalloc"
+    return {**found, "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+
+
+PRESETS = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
+"""Presets whose dimensions follow one rule, smallest first."""
+_FOLDER = Path(__file__).parents[1] / "reducers" / "reducer" / "presets"
+CRANKS, DISCS = (2, 3, 4), (1, 2, 3)
+"""Counts that a folder can be made for [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Likeness:
+    """Which preset a new reducer is like, and how many cranks and discs it has; those of the preset unless given."""
+
+    preset: str = "rv20e"
+    cranks: int | None = None
+    discs: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.preset not in PRESETS:
+            raise UnknownNameError.among("new reducer", "preset", self.preset, PRESETS)
+        for name, count, allowed in (("cranks", self.cranks, CRANKS), ("discs", self.discs, DISCS)):
+            if count is not None and count not in allowed:
+                raise InputError.of_argument("new reducer", name, count, f"{allowed[0]} to {allowed[-1]}")
+
+    @property
+    def reducer(self) -> Reducer:
+        """The preset itself."""
+        return load_reducer(self.preset)
+
+    def text(self, name: str) -> str:
+        """Return the reducer file; what the preset does not state of the new counts is marked as an assumption."""
+        text = (_FOLDER / f"{self.preset}.reducer.toml").read_text(encoding="utf-8")
+        text = re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
+        changed = []
+        for field, count in (("crank_count", self.cranks), ("disc_count", self.discs)):
+            before = int(re.search(rf"^{field} = (\d+)", text, re.MULTILINE)[1])  # type: ignore[index]
+            if count not in (None, before):
+                text = re.sub(rf"^{field} = \d+", f"{field} = {count}", text, count=1, flags=re.MULTILINE)
+                changed.append(f"{field} {count} instead of {before}")
+        if changed:
+            note = f"{', '.join(changed)}: all parts as in {self.preset}, which has another load on each of them"
+            text = text.replace("assumptions = [\n", f'assumptions = [\n  "{note}",\n', 1)
+        return f"# Made by tolalloc new, like {self.preset}. Change what you know, and what `assumptions` says.\n{text}"
+
+
+_FIRST_STAGE = re.compile(r"sun\.|planet\d|mesh\d")
+_FINE = re.compile(r".*(\.phase|\.rotation|\.tilt|each_pin\..*|\.each_tooth\..*|\.clearance)$")
+"""Sources that a first study neglects: they stand in the table with a zone of 0 and locked."""
+_NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
+_KNOWN_DIAMETER = 104.0
+"""Diameter of the pin circle of the RV-20E, whose zones are the shipped ones [mm]."""
+
+
+def sources_of(reducer: Reducer) -> tuple[Source, ...]:
+    """Return all sources of a reducer with assumed zones.
+
+    Zones and their ranges are those of the shipped RV-20E, scaled by the tolerance unit i = 0.45·D^(1/3) + 0.001·D of
+    ISO 286-1 with D the diameter of the pin circle in mm. The first stage is locked.
+    """
+    known = {source.name: source for source in load_tolerance_table("rv20e_all_sources")}
+    scale = size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
+    names = dict.fromkeys(map(source_name, EquivalentModel(reducer).columns))
+    found = []
+    for name in names:
+        like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
+        if like is not None:
+            found.append(_scaled(replace(like, name=name, part=name.partition(".")[0]), reducer, scale))
+    return tuple(sorted(found, key=lambda own: bool(_FINE.match(own.name)) + 2 * bool(_FIRST_STAGE.match(own.name))))
+
+
+def size_factor(diameter: float) -> float:
+    """Return how much wider zones are on a pin circle of a diameter [mm] than on that of the RV-20E [-].
+
+    >>> size_factor(104.0), round(size_factor(155.0), 3)
+    (1.0, 1.154)
+    """
+
+    def unit(size: float) -> float:
+        return float(0.45 * size ** (1 / 3) + 0.001 * size)
+
+    return unit(diameter) / unit(_KNOWN_DIAMETER)
+
+
+def _scaled(source: Source, reducer: Reducer, scale: float) -> Source:
+    """Return a source at this size, its number of like features that of the reducer."""
+    stage = reducer.cycloid_stage
+    each = source.each if source.each == 1 else stage.pin_count if "each_pin" in source.name else stage.disc_teeth
+    nominal = {"pin.diameter": 2 * stage.pin_radius, "housing.groove.radius": stage.pin_radius}.get(source.name, 0.0)
+    zone, least, most = (_rounded(scale * own) for own in (source.zone, source.minimum, source.maximum))
+    note = "zone, range and cost assumed: those of the RV-20E, scaled by ISO 286's tolerance unit"
+    own = replace(source, zone=zone, minimum=least, maximum=most, each=each, nominal=nominal, note=note)
+    if _FINE.match(source.name):
+        return replace(own, zone=0.0, minimum=0.0, maximum=0.0, cost=0.0, locked=True, note="neglected: give it a zone")
+    if _FIRST_STAGE.match(source.name):
+        return replace(own, locked=True, note=f"{note}; locked: the first stage is divided by the ratio")
+    return own
+
+
+def _rounded(length: float) -> float:
+    """Return a length in whole tenths of a micrometre [m]."""
+    return round(length / MICROMETRE, 1) * MICROMETRE
+
+
+_CHOICES = {
+    "feature": [str(feature.value) for feature in Feature],
+    "distribution": [str(own.value) for own in Distribution],
+    "unit": ["µm", "mm"],
+    "locked": ["yes", "no"],
+    "sorted": ["yes", "no"],
+    "grade": [f"IT{grade}" for grade in range(1, 12)],
+}
+"""Column → what may stand there; of a grade, which is carried through, anything else too."""
+_SPARE = 200
+"""Rows below the table that have the same choices [-]."""
+
+
+def table_workbook(sources: Sequence[Source]) -> bytes:
+    """Return the workbook of a tolerance table."""
+    from openpyxl import Workbook
+    from openpyxl.comments import Comment
+    from openpyxl.styles import Font, PatternFill
+    from openpyxl.utils import get_column_letter
+    from openpyxl.worksheet.datavalidation import DataValidation
+
+    book = Workbook()
+    sheet = book.active
+    sheet.title = "tolerances"
+    sheet.append(list(HEADERS.values()))
+    for row in table_rows(sources):
+        sheet.append(row)
+    for at, (name, column) in enumerate(COLUMNS.items(), start=1):
+        letter, head = get_column_letter(at), sheet.cell(row=1, column=at)
+        head.font, head.fill = Font(bold=True), PatternFill("solid", fgColor="DDE6F0")
+        head.comment = Comment(column.meaning, "tolalloc")
+        longest = max(len(str(cell.value or "")) for cell in sheet[letter])
+        sheet.column_dimensions[letter].width = min(longest, 40) + 3
+        if name in _CHOICES:
+            allowed = DataValidation(type="list", formula1=f'"{",".join(_CHOICES[name])}"', allow_blank=True)
+            allowed.showErrorMessage = name != "grade"
+            allowed.error, allowed.errorTitle = f"Allowed are {', '.join(_CHOICES[name])}.", name
+            allowed.add(f"{letter}2:{letter}{sheet.max_row + _SPARE}")
+            sheet.add_data_validation(allowed)
+    sheet.freeze_panes = "B2"
+    content = BytesIO()
+    book.save(content)
+    return content.getvalue()
+
+
+SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "parts", "assembly")
+"""Kinds of samples that a folder may have."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
+_USUAL = 60.0
+"""Limit of the peak-to-peak where no catalogue value is stated [arcsec]."""
+_STUDY = '''"""{name}: which error drives it, and which zones are cheapest."""
+
+import tolalloc as ta
+
+study = ta.Study(
+    # Smallest and largest nominal clearance [µm] that the tooth modification may leave on the flank, at tip and root.
+    ta.reducer("reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
+    ta.drawing("zones.xlsx"),
+    limits={{
+        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
+        ta.LOST_MOTION: ta.Limit(upper=1.0),
+    }},
+    questions=[ta.Ranking(), ta.Allocation()],
+    name="{name}",
+    seed=1,
+)
+
+if __name__ == "__main__":
+    ta.run_script()
+'''
+_READ_ME = """# {name}
+
+Made by `tolalloc new`. In this folder, one after the other:
+
+```sh
+tolalloc check study.py
+tolalloc open study.py
+tolalloc run study.py --quick
+```
+
+`check` says what the study reads, and how many random units are preloaded. `open` shows what each zone does, live.
+`run` writes `runs/{name}/report.html`: what drives the error, and the cheapest zones. Leave `--quick` out before you
+set a drawing.
+
+| file | is |
+|---|---|
+| `reducer.toml` | the reducer; `assumptions` lists what nobody measured |
+| `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
+| `zones.csv` | the same as text |
+| `study.py` | limits and questions |
+| `schemas` | what may stand in the TOML files, for editors that offer it |
+{samples}{commands}
+Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
+"""
+_SAID = {
+    "costs": {"shop.csv": "prices of a shop, invented"},
+    "processes": {
+        "processes.csv": "what processes hold, assumed",
+        "process_costs.csv": "ways to make a feature and what each costs, invented",
+        "with_processes.py": "the study with these ways to choose from",
+    },
+    "cmm": {
+        "pin_diameters.csv": "measured pins, simulated: name it under `measured`, with `empirical` under `distribution`"
+    },
+    "bench": {"bench.toml": "curves and loops of two units, simulated; its tables are `bench_….csv`"},
+    "curve": {"unit7.csv": "the curve of a bad unit, simulated"},
+    "parts": {"parts.csv": "measured parts of two units, simulated"},
+    "assembly": {
+        "chain.toml": "which part is adjusted against which, as zhang2025 has it",
+        "angles.csv": "measured angles of four parts, invented",
+    },
+}
+"""Kind of sample → its files and what they are."""
+_ASKED = {
+    "costs": "tolalloc costs shop.csv",
+    "processes": "tolalloc check with_processes.py",
+    "bench": "tolalloc identify bench.toml --reducer reducer.toml",
+    "curve": "tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv",
+    "parts": "tolalloc mount parts.csv --reducer reducer.toml",
+    "assembly": "tolalloc assemble chain.toml --measured angles.csv",
+}
+"""Kind of sample → the command that reads it."""
+_SCHEMAS = {"reducer.toml": "reducer", "bench.toml": "bench", "chain.toml": "chain"}
+"""File → kind of its schema."""
+
+
+def _write_schemas(folder: Path) -> None:
+    """Write the schemas of a folder's TOML files and name them in their first lines, where editors look."""
+    (folder / "schemas").mkdir()
+    for file, kind in _SCHEMAS.items():
+        if (path := folder / file).exists():
+            text = json.dumps(schema(kind), ensure_ascii=False, indent=2)
+            (folder / "schemas" / f"{kind}.json").write_text(text + "\n", encoding="utf-8")
+            named = f"#:schema ./schemas/{kind}.json\n{path.read_text(encoding='utf-8')}"
+            path.write_text(named, encoding="utf-8")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewFolder:
+    """A folder to be made.
+
+    Parameters
+    ----------
+    place
+        Where it will be; its last part names reducer and study.
+    like
+        What the reducer is like.
+    samples
+        Kinds of samples, of `SAMPLES`.
+    """
+
+    place: Path
+    like: Likeness
+    samples: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.place.name):
+            raise InputError.at("new folder", "name", self.place.name, "60 letters, digits, - and _, a letter first")
+        for kind in self.samples:
+            if kind not in SAMPLES:
+                raise UnknownNameError.among("new folder", "sample", kind, (*SAMPLES, "all"))
+
+    def write(self) -> tuple[Reducer, tuple[Source, ...]]:
+        """Write the folder, whole or not at all, and return its reducer and its sources.
+
+        Raises
+        ------
+        InputError
+            Something is there already, or the folder cannot be made.
+        """
+        if self.place.exists():
+            raise InputError(f"{self.place}: is there already; choose another name, nothing is overwritten.")
+        above = self.place.absolute().parent
+        try:
+            above.mkdir(parents=True, exist_ok=True)
+            beside = Path(mkdtemp(prefix=f".{self.place.name}-", suffix=".unfinished", dir=above))
+        except OSError as error:
+            raise InputError(f"{self.place}: the folder cannot be made ({error.strerror}).") from None
+        try:
+            found = self._fill(beside)
+            beside.chmod(0o755)
+            os.rename(beside, self.place)
+        except BaseException:
+            rmtree(beside, ignore_errors=True)
+            raise
+        return found
+
+    def _fill(self, folder: Path) -> tuple[Reducer, tuple[Source, ...]]:
+        name = self.place.name
+        (folder / "reducer.toml").write_text(self.like.text(name), encoding="utf-8")
+        reducer = load_reducer(folder / "reducer.toml")
+        sources = sources_of(reducer)
+        (folder / "zones.csv").write_text(table_text(sources, folder), encoding="utf-8")
+        (folder / "zones.xlsx").write_bytes(table_workbook(sources))
+        limit = reducer.catalogue.transmission_error / ARCSECOND if reducer.catalogue else _USUAL
+        (folder / "study.py").write_text(_STUDY.format(name=name, limit=round(limit, 6)), encoding="utf-8")
+        (folder / "README.md").write_text(self._read_me(), encoding="utf-8")
+        if "processes" in self.samples:
+            study = (folder / "study.py").read_text(encoding="utf-8")
+            files = '"zones.xlsx", processes="processes.csv", costs="process_costs.csv"'
+            study = study.replace('"zones.xlsx"', files).replace(f'name="{name}"', f'name="{name}-processes"')
+            (folder / "with_processes.py").write_text(study, encoding="utf-8")
+        makers = Samples(reducer=reducer, sources=sources).makers if self.samples else {}
+        for kind in self.samples:
+            for file, text in makers[kind]().items():
+                (folder / file).write_text(text, encoding="utf-8")
+        _write_schemas(folder)
+        return reducer, sources
+
+    def _read_me(self) -> str:
+        """Return the page of the folder: what to type, and what every file is."""
+        rows = "".join(f"| `{file}` | {what} |\n" for kind in self.samples for file, what in _SAID[kind].items())
+        asked = "".join(f"{_ASKED[kind]}\n" for kind in self.samples if kind in _ASKED)
+        commands = f"\nOn the samples, some of them for minutes:\n\n```sh\n{asked}```\n" if asked else ""
+        return _READ_ME.format(name=self.place.name, samples=rows, commands=commands)
