@@ -14,6 +14,7 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.reducers.scene.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
+from tolalloc.reports.picture.blocks import scene_record
 from tolalloc.reports.picture.moving import MovingPicture
 
 PICTURES = 30
@@ -34,7 +35,7 @@ def build(quick: bool) -> Document:
     picture = MovingPicture(
         name="reducer",
         title=f"{scene.reducer}, unit {scene.unit}",
-        record=scene.record(coarse=True),
+        record=scene_record(scene, coarse=True),
         pictures=4 if quick else PICTURES,
     )
     ways = (scene.forward, scene.backward)

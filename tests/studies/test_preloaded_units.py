@@ -15,6 +15,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import ReducerChoice
 from tolalloc.reducers.equivalent.preload import preload
 from tolalloc.reducers.rigidity import rated_pin_force
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
@@ -87,7 +88,8 @@ def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     def verdict(reducer: ReducerChoice, scale: float) -> str:
         asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_baseline"), limits=LIMITS))
         errors, uniform = asked.errors, np.random.default_rng(5).uniform(size=(200, len(asked.errors.columns)))
-        return asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones)).but
+        counted = asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones))
+        return portrait_of(asked.model).examination(counted).but
 
     assert "preloaded" in verdict(ta.reducer("rv20e"), 1.0)
     assert verdict(ta.reducer("rv20e"), 1e-3) == ""

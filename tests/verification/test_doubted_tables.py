@@ -10,6 +10,7 @@ import pytest
 import tolalloc as ta
 from tolalloc.drawings.tolerance_table import doubts
 from tolalloc.exceptions import InputError
+from tolalloc.reports.portrait import portrait_of
 
 UNIT = {"mm": 1.0, "µm": 1e-3}
 
@@ -98,7 +99,7 @@ def outcome(rows: list[dict], place: int, kind: str) -> str:
         return "doubted"
     names = tuple(own["id"] for own in rows)
     model = ta.model(lambda *sizes: sum(sizes), inputs=names, outputs=("sum [mm]",)).bound(drawing.errors, "table")
-    said = model.examined(np.zeros((0, len(model.columns)))).sentences  # what `check` prints of the model
+    said = portrait_of(model).examination({}).sentences  # what `check` prints of the model
     if any("No nominal size" in sentence and row["id"] in sentence for sentence in said):
         return "doubted"
     return "silent"

@@ -14,6 +14,7 @@ from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 
 
@@ -35,12 +36,12 @@ def test_remarks_speak_of_the_modification_in_force(model, clearances):
     there = model.at(np.array(clearances))
     modified = replace(model.reducer, modification=there.modification(np.array(clearances)))
     expected = float(exact_loop(modified).lost_motion[-1]) / ARCMINUTE
-    assert lost_motion(there.remarks) == float(f"{expected:.2g}")
+    assert lost_motion(portrait_of(there).remarks) == float(f"{expected:.2g}")
     assert there.kernel.fixed["modification.equidistant"] == modified.modification.equidistant
 
 
 def test_a_modification_beyond_the_catalogue_is_a_caution_of_its_settings_alone(model):
-    inside, beyond = (model.cautions(np.array(own)) for own in ((1.04, 8.0), (8.0, 20.0)))
+    inside, beyond = (portrait_of(model).cautions(np.array(own)) for own in ((1.04, 8.0), (8.0, 20.0)))
     assert not any("lost motion" in own for own in inside)
     assert any("lost motion of 1.8′ is above the catalogue's 1′" in own for own in beyond)
 
@@ -48,7 +49,8 @@ def test_a_modification_beyond_the_catalogue_is_a_caution_of_its_settings_alone(
 def test_a_check_of_a_design_speaks_of_its_clearances(model):
     x = np.zeros((4, len(model.columns)))
     for clearances in ((2.0, 9.0), (5.0, 15.0)):
-        said = " ".join(model.at(np.array(clearances)).examined(x).sentences)
+        there = model.at(np.array(clearances))
+        said = " ".join(portrait_of(there).examination(there.examined(x)).sentences)
         assert f"Nominal clearance {clearances[0]:g} µm on the flank and {clearances[1]:g} µm at tip and root" in said
         assert f"The radial clearance of a unit is {clearances[1]:g} µm at least" in said
 

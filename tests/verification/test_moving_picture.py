@@ -21,10 +21,11 @@ from tolalloc.reducers.equivalent.kinematics import Positions
 from tolalloc.reducers.scene.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.page import as_json, asset
-from tolalloc.reports.picture.blocks import block, coarse_block, values_of
+from tolalloc.reports.picture.blocks import block, coarse_block, scene_record, values_of
 from tolalloc.reports.picture.moving import MovingPicture
 from tolalloc.reports.picture.pose import Pose
 from tolalloc.reports.plots import drawn, save_png
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.writer import write_document
 
 SOURCES = tuple(source.name for source in load_tolerance_table("rv20e_all_sources"))
@@ -39,7 +40,7 @@ def scene(rv20e, table4) -> Scene:
 
 @pytest.fixture(scope="module")
 def picture(scene) -> MovingPicture:
-    record = scene.record(coarse=True)
+    record = scene_record(scene, coarse=True)
     return MovingPicture(name="reducer", title="RV-20E", record=record, shares={"disc1.teeth": 1.0, "pins": 0.3})
 
 
@@ -92,7 +93,7 @@ def test_the_ranking_of_a_reducer_pictures_its_drivers():
     """Of a place the sources count together, over the place that drives most."""
     baseline = prepared()
     errors, x = baseline.errors, np.zeros(len(baseline.model.columns))
-    (section,) = baseline.model.moving(
+    (section,) = portrait_of(baseline.model).moving(
         errors, x, {"disc1.pitch": 0.4, "disc1.runout": 0.1, "pin.diameter": 0.25}, "unit"
     )
     (figure,) = section.figures
@@ -166,7 +167,7 @@ def said(scene, tmp_path_factory) -> dict[str, object]:
     page.write_text(
         f'<!doctype html><meta charset="utf-8"><style>{asset("mechanism.css")}</style><div id="box"></div>'
         "<table><tr><td>disc1.bore2.position</td></tr></table>"
-        f'<script type="application/json" id="scene">{as_json(scene.record())}</script><pre id="said"></pre>'
+        f'<script type="application/json" id="scene">{as_json(scene_record(scene))}</script><pre id="said"></pre>'
         f'<script type="module">{asset("mechanism.js")}\n{probe}</script>',
         encoding="utf-8",
     )
@@ -199,7 +200,7 @@ def test_the_browser_puts_parts_where_the_kinematics_put_them(said, rv20e):
 
 @pytest.mark.slow
 def test_the_browser_draws_what_the_still_picture_draws(said, scene):
-    record = scene.record()
+    record = scene_record(scene)
     asked = [(sense, phase) for sense in ("forward", "backward") for phase in PHASES]
     for (sense, phase), found in zip(asked, said["drawn"], strict=True):
         pose = Pose(record, 2 * np.pi * phase * scene.output_turns, sense)

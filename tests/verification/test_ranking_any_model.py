@@ -15,6 +15,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.answer import RankingAnswer, rank
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
@@ -92,7 +93,7 @@ class Silent:
 
 
 def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
-    record, header = RunRecord(Silent(), model.outcomes), Header(name="links", model="", seed=1)
+    record, header = RunRecord(Silent(), portrait_of(model).outcomes), Header(name="links", model="", seed=1)
     asked = Measures(
         model=model,
         errors=ERRORS,

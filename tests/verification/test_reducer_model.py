@@ -22,6 +22,7 @@ from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
 from tolalloc.reducers.response.stiffness import StiffnessResponse
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 
 LOST_MOTION, RADIAL = "lost motion [arcmin]", "radial clearance at tip and root [µm]"
@@ -74,7 +75,7 @@ def test_settings_are_the_clearances_of_the_modification(model, x):
     assert [setting.value for setting in moved.settings] == [3.0, 12.0]
     other = model.kernel.with_modification(Modification.from_clearances(3.0 * 1e-6, 12.0 * 1e-6, stage))
     np.testing.assert_array_equal(moved.reading((PEAK_TO_PEAK,))(x).values, other(x).values)
-    assert moved.amounts(np.array([3.0, 12.0]))[flank.name] == 3.0
+    assert portrait_of(moved).amounts(np.array([3.0, 12.0]))[flank.name] == 3.0
     locked = replace(model, flank=None).settings[0]
     assert locked.lower == locked.upper == locked.value
 
@@ -174,7 +175,7 @@ def test_a_check_remarks_a_nominal_size_that_is_not_the_reducers():
         "The table and the reducer differ: nominal of pin.diameter is 8 mm in zones.csv, and twice its pin radius is "
         "4 mm in reducer "
     )
-    assert other.examined(np.zeros((1, len(other.columns)))).sentences[0] == said
+    assert portrait_of(other).examination(other.examined(np.zeros((1, len(other.columns))))).sentences[0] == said
     assert bound({"housing.groove.radius": {"nominal": 2.05e-3}}).mismatches[0].count("groove.radius is 2.05 mm") == 1
     for single, size in (("each_pin.diameter", "4 mm"), ("each_pin.groove", "2 mm")):
         (said,) = bound({single: {"nominal": 2e-2}}).mismatches

@@ -25,7 +25,7 @@ from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.scene.places import is_placed, place_of, places_of
 from tolalloc.reducers.scene.scene import Scene, scene_of
-from tolalloc.reports.picture.blocks import values_of
+from tolalloc.reports.picture.blocks import scene_record, values_of
 from tolalloc.reports.picture.pose import Pose
 
 CASES = range(12)
@@ -158,7 +158,7 @@ def test_both_directions_resist(scene, rv20e, table4):
     assert np.array_equal(scene.forward.transmission_error, forward[0])
     assert np.array_equal(scene.backward.transmission_error, backward[0])
     # Drawn where they act, the pins' forces hold what the torques on carrier and sun leave of each other.
-    record = scene.record()
+    record = scene_record(scene)
     for name, states in (("forward", scene.forward), ("backward", scene.backward)):
         for at, angle in enumerate(scene.carrier_angle):
             pose, moment = Pose(record, float(angle), name), 0.0
@@ -172,7 +172,7 @@ def test_both_directions_resist(scene, rv20e, table4):
 @pytest.mark.parametrize("carrier_angle", [0.0, 0.41, 2.0, 5.5])
 def test_the_gap_that_is_drawn_at_a_pin_is_the_magnified_one(scene, carrier_angle):
     """From a pin's centre the drawn outline is as far as its radius and the magnified gap; chords cut a little off."""
-    pose = Pose(scene.record(), carrier_angle)
+    pose = Pose(scene_record(scene), carrier_angle)
     for disc in range(2):
         outline, gap = pose.teeth(disc), 1e3 * scene.magnification * pose.state("gap")[disc]
         start, along = outline, np.roll(outline, -1) - outline
@@ -186,7 +186,7 @@ def test_the_gap_that_is_drawn_at_a_pin_is_the_magnified_one(scene, carrier_angl
 def test_bearings_are_drawn_open_by_their_magnified_ways(scene, rv20e, table4):
     """A journal is off its bore, and a shaft off the carrier's, by the ways of the model's springs between them."""
     groups = {group.name: group for group in spring_groups(rv20e.reducer, scene.carrier_angle, rv20e.orders)}
-    record = scene.record()
+    record = scene_record(scene)
 
     def ways(name):
         group = groups[name]
@@ -246,7 +246,7 @@ def test_a_source_of_no_part_is_refused_by_name():
 
 def read_back(scene: Scene, coarse: bool = False) -> dict:
     """Return what a program reads that was given the picture as JSON."""
-    return json.loads(json.dumps(scene.record(coarse), allow_nan=False))
+    return json.loads(json.dumps(scene_record(scene, coarse), allow_nan=False))
 
 
 def test_a_scene_travels_as_json_to_the_last_digit(scene):

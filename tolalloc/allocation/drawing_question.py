@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -37,7 +38,7 @@ from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, an
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.models.model import Examination, Model
+from tolalloc.models.model import Model
 from tolalloc.reports.header import Header
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
@@ -259,7 +260,7 @@ class DrawingQuestion:
         found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
         return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
 
-    def examined(self, design: VerifiedDesign) -> Examination:
+    def examined(self, design: VerifiedDesign) -> Mapping[str, float]:
         """Return what the model says of random units of a design."""
         units = design.space.units(design.design, self.seeds("examination"), _EXAMINED)
         return self.model.at(design.settings).examined(units)

@@ -53,10 +53,11 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
     from tolalloc.drawings.tolerance_table import doubts
     from tolalloc.reading.units import COST_UNITS
+    from tolalloc.reports.portrait import portrait_of
 
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
-    kinds = [question.kind for question in study.questions]
+    kinds, portrait = [question.kind for question in study.questions], portrait_of(model)
     summary = {
         "study": study.name,
         "model": model.name,
@@ -85,10 +86,10 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
         kinds_of = dict.fromkeys(map(_without_numbers, neglected))
         share = f"{len(neglected)} of {len(errors.sources)} rows"
         lines.append(f"Neglected, with a zone of 0: {', '.join(kinds_of)} ({share}).")
-    lines += [f"Neglected: {sentence}." for sentence in model.left_out]
-    examined = model.examined(_random_units(prepared))
+    lines += [f"Neglected: {sentence}." for sentence in portrait.left_out]
+    examined = portrait.examination(model.examined(_random_units(prepared)))
     lines += study.drawing.notes if study.drawing else ()
-    summary |= {"neglected": [*neglected, *model.left_out]}
+    summary |= {"neglected": [*neglected, *portrait.left_out]}
     summary |= {"examined": list(examined.sentences), "but": examined.but}
     doubted = len(doubts(errors.sources, errors.table))
     said = f"{doubted} of its rows {'is' if doubted == 1 else 'are'} doubted above" if doubted else ""

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models.model import Evaluation, Examination, Model, Observer, SettingDerivatives, unobserved
+from tolalloc.models.model import Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.user_function import UserFunction, identity
 from tolalloc.reading.units import MILLIMETRE
@@ -218,14 +218,9 @@ class BoundFunction(Model):
         return self.varied
 
     @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What a reader must know: inputs that the drawing gives no nominal size."""
-        bare = [name for name, offset in zip(self.source.inputs, self.offsets, strict=True) if offset == 0.0]
-        return (f"no nominal size on the drawing, taken as deviations from 0: {', '.join(bare)}",) if bare else ()
-
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
-        """Return which inputs have no nominal size: a size that was forgotten moves every output."""
-        return Examination(tuple(f"{said[0].upper()}{said[1:]}." for said in self.assumptions))
+    def without_nominal(self) -> tuple[str, ...]:
+        """Inputs that the drawing gives no nominal size: one that was forgotten moves every output."""
+        return tuple(name for name, offset in zip(self.source.inputs, self.offsets, strict=True) if offset == 0.0)
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -20,8 +20,6 @@ from tolalloc.running.chunks import Mapper
 if TYPE_CHECKING:
     from tolalloc.drawings.correlation import CorrelatedSource
     from tolalloc.drawings.error_model import ErrorModel
-    from tolalloc.reports.document import Section
-    from tolalloc.reports.figure import Figure
 
 Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
 """Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
@@ -53,16 +51,6 @@ class Evaluation:
     def good(self) -> Bool[np.ndarray, " sample"]:
         """Which samples may be used."""
         return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
-
-
-@dataclass(frozen=True)
-class Examination:
-    """What a check of a study says of a model and of some random units."""
-
-    sentences: tuple[str, ...] = ()
-    but: str = ""  # What speaks against the drawing, as the end of a sentence; empty if nothing
-    fault: str = ""  # Why units of the drawing cannot be built, a sentence for a first page; empty if they can
-    figures: Mapping[str, float] = field(default_factory=dict)  # What was counted, units in the names
 
 
 @runtime_checkable
@@ -145,17 +133,13 @@ class Model(ABC):
     """A model at the sources of one drawing: what every question asks.
 
     A subclass says what it varies and what it answers; everything else has a default that asks for nothing special.
+    Words and pictures are no part of it: `tolalloc.reports.portrait.Portrait`.
     """
 
     @property
     @abstractmethod
     def name(self) -> str:
         """What a report calls it."""
-
-    @property
-    def kind(self) -> str:
-        """What a summary calls such a model."""
-        return "model"
 
     @property
     @abstractmethod
@@ -181,11 +165,6 @@ class Model(ABC):
         if values.size:
             raise ValueError(f"{self.name} has no settings")
         return self
-
-    @property
-    def settings_word(self) -> str:
-        """What a sentence calls all settings together."""
-        return "settings"
 
     @property
     def exact(self) -> tuple[str, ...]:
@@ -215,11 +194,6 @@ class Model(ABC):
         return self
 
     @property
-    def outcomes(self) -> Mapping[int, str]:
-        """Status → outcome of a sample in words, the good one first."""
-        return {0: "answer found", 1: "no answer"}
-
-    @property
     def conditions(self) -> Mapping[str, float | str]:
         """Under which conditions it answers, units in the names."""
         return {}
@@ -227,21 +201,6 @@ class Model(ABC):
     @property
     def operating_conditions(self) -> tuple[Setting, ...]:
         """Those of its conditions that a user may vary, which change no part: a torque and not a name."""
-        return ()
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """What is worth knowing of the model itself, units in the names."""
-        return {}
-
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What no source of the model states."""
-        return ()
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """What the drawing does not state and the model takes as exact, a sentence each."""
         return ()
 
     @property
@@ -253,11 +212,6 @@ class Model(ABC):
     def uncertain(self) -> tuple[CorrelatedSource, ...]:
         """What is not known of the model itself and stands on no drawing; `with_uncertain` answers for it."""
         return ()
-
-    @property
-    def uncertain_name(self) -> str:
-        """What a summary calls `uncertain`."""
-        return "not known of the model"
 
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of these outputs with the columns of `uncertain` after its own."""
@@ -282,15 +236,6 @@ class Model(ABC):
         """
         return {}
 
-    @property
-    def spectra_note(self) -> str:
-        """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
-        return ""
-
-    def spoken(self, output: str) -> str:
-        """Return what a sentence calls an output, which has no unit."""
-        return output.split(" [")[0]
-
     def stand_ins(self) -> tuple[Any, ...]:
         """Return surrogates that know the model's structure, `tolalloc.sensitivity.surrogate.validation.Candidate`."""
         return ()
@@ -305,14 +250,6 @@ class Model(ABC):
             steps=tuple(setting.step for setting in settings),
         )
 
-    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
-        """Return what the settings mean on the drawing, units in the names."""
-        return {setting.name: float(value) for setting, value in zip(self.settings, values, strict=True)}
-
-    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:  # noqa: ARG002
-        """Return what a reader must know of these settings."""
-        return ()
-
     @property
     def ranked(self) -> tuple[str, ...]:
         """Outputs that every ranking looks at; others, that cost more than they tell, once they are limited."""
@@ -323,57 +260,12 @@ class Model(ABC):
         """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
         return {}
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What every report says of the model itself beside what is asked, in sentences."""
-        return ()
-
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:  # noqa: ARG002
-        """Return what a check of a study says of the model and of some random units."""
-        return Examination()
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:  # noqa: ARG002
+        """Return what is counted of some random units when a study is checked, units in the names."""
+        return {}
 
     def put_away(self) -> None:  # noqa: B027
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
-
-    def illustrated(
-        self,
-        units: Units,  # noqa: ARG002
-    ) -> tuple[Section, ...]:
-        """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
-        return ()
-
-    def pictured(
-        self,
-        units: Units,  # noqa: ARG002
-    ) -> tuple[Figure, ...]:
-        """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
-        return ()
-
-    def scene(
-        self,
-        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
-        x: Float[np.ndarray, " column"],  # noqa: ARG002
-        unit: str,  # noqa: ARG002
-        sources: tuple[str, ...],  # noqa: ARG002
-    ) -> dict[str, Any] | None:
-        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one.
-
-        Raises
-        ------
-        SolveError
-            The unit does not come to rest somewhere.
-        """
-        return None
-
-    def moving(
-        self,
-        errors: ErrorModel,  # noqa: ARG002
-        x: Float[np.ndarray, " column"],  # noqa: ARG002
-        shares: Mapping[str, float],  # noqa: ARG002
-        unit: str,  # noqa: ARG002
-    ) -> tuple[Section, ...]:
-        """Return a picture of one unit's columns whose places show the sources' shares; nothing unless there is one."""
-        return ()
 
 
 @runtime_checkable

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,16 +11,14 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.correlation import CorrelatedSource
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models.model import Examination, Model, Observer, Response, SettingDerivatives, Units
+from tolalloc.models.model import Model, Observer, Response, SettingDerivatives
 from tolalloc.models.settings import DrawnAmounts, Setting
-from tolalloc.reading.units import ARCMINUTE, MICROMETRE
-from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD, TORQUE
-from tolalloc.reducers.cycloid.clearance import linear_model_warnings
-from tolalloc.reducers.equivalent.answers import OUTCOMES, Equilibria
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
+from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.equivalent.preload import preload
 from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.reducer.unit_file import BuiltUnit
@@ -35,10 +33,8 @@ from tolalloc.reducers.response.outputs import (
     with_orders,
 )
 from tolalloc.reducers.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
-from tolalloc.reducers.rigidity import against_catalogue, rated_pin_force
-from tolalloc.reducers.settings import FLANK, RADIAL, clearance_settings, torque_condition
-from tolalloc.reports.document import Section
-from tolalloc.reports.figure import Figure
+from tolalloc.reducers.rigidity import rated_pin_force
+from tolalloc.reducers.settings import clearance_settings, torque_condition
 from tolalloc.running.chunks import Mapper
 
 _MULTIPLES = 4
@@ -80,11 +76,6 @@ class ReducerModel(Model):
     def name(self) -> str:
         """The reducer's."""
         return self.reducer.name
-
-    @property
-    def kind(self) -> str:
-        """A reducer."""
-        return "reducer"
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -150,11 +141,6 @@ class ReducerModel(Model):
         return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
 
     @property
-    def settings_word(self) -> str:
-        """Both clearances are those of the tooth modification."""
-        return "modification"
-
-    @property
     def exact(self) -> tuple[str, ...]:
         """The peak-to-peak alone."""
         return (PEAK_TO_PEAK,)
@@ -203,11 +189,6 @@ class ReducerModel(Model):
         self.kernel.put_away()
 
     @property
-    def outcomes(self) -> Mapping[int, str]:
-        """Status → outcome of an equilibrium in words."""
-        return OUTCOMES
-
-    @property
     def conditions(self) -> Mapping[str, float | str]:
         """Torque on the carrier."""
         return {TORQUE: self.kernel.torque}
@@ -217,31 +198,8 @@ class ReducerModel(Model):
         """The torque."""
         return (torque_condition(self.kernel.torque, self.reducer.load.rated_torque),)
 
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """Those of the reducer, of the built unit and of what the drawing leaves out."""
-        clearances = [name for name, value in asdict(self.reducer.clearances).items() if value == 0.0]
-        without = (f"without clearance: {', '.join(clearances).replace('_', ' ')}",) if clearances else ()
-        return (
-            *self.reducer.assumptions,
-            *(self.unit.assumptions if self.unit else ()),
-            *self.left_out,
-            *without,
-        )
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
-        stiffness = self._perfect_loop.torsional_stiffness[0] * ARCMINUTE
-        return {"torsional stiffness of the perfect reducer [N·m/arcmin]": float(stiffness)}
-
     @cached_property
-    def _perfect_loop(self) -> HysteresisLoop:
-        """Torque against twist of the reducer without any error."""
-        return hysteresis_loop(self.kernel.model, np.zeros((1, len(self.kernel.model.columns))), TURN_ANGLES)
-
-    @cached_property
-    def _exact_loop(self) -> HysteresisLoop:
+    def exact_loop_in_force(self) -> HysteresisLoop:
         """Torque against twist of the unit whose parts are exact and whose teeth have the modification in force."""
         return exact_loop(self.reducer_in_force)
 
@@ -256,46 +214,6 @@ class ReducerModel(Model):
             convention=MODIFICATION_CONVENTION,
         )
 
-    def illustrated(self, units: Units) -> tuple[Section, ...]:
-        """Return curves and orders of units, and how exact teeth carry the rated torque."""
-        from tolalloc.reducers.illustration import illustrated
-
-        return illustrated(self, units)
-
-    @cached_property
-    def built_curve(self) -> Equilibria | None:
-        """Equilibria of the built unit over one output turn, if there is such a unit."""
-        if self.unit is None:
-            return None
-        own = self.unit.errors(self.kernel.model.columns, self.reducer.modification.deviations)
-        return self.kernel.model.equilibria(own, self.kernel.torque)
-
-    def pictured(self, units: Units) -> tuple[Figure, ...]:
-        """Return curves and orders of units."""
-        from tolalloc.reducers.illustration import pictured
-
-        return pictured(self, units)
-
-    def scene(
-        self,
-        settings: Float[np.ndarray, " setting"],
-        x: Float[np.ndarray, " column"],
-        unit: str,
-        sources: tuple[str, ...],
-    ) -> dict[str, Any]:
-        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once."""
-        from tolalloc.reducers.scene.section import scene_at
-
-        return scene_at(self.at(settings), x, unit, sources).record(coarse=True)
-
-    def moving(
-        self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
-    ) -> tuple[Section, ...]:
-        """Return the moving picture of a unit; nothing of one that has no equilibrium at some angle."""
-        from tolalloc.reducers.scene.section import moving
-
-        return moving(self, errors, x, shares, unit)
-
     @property
     def content(self) -> Any:
         """Reducer, identified stiffnesses and torque."""
@@ -305,11 +223,6 @@ class ReducerModel(Model):
     def uncertain(self) -> tuple[CorrelatedSource, ...]:
         """What is not known of identified stiffnesses."""
         return (stiffness_source(self.identified, self.reducer),) if self.identified else ()
-
-    @property
-    def uncertain_name(self) -> str:
-        """Identified stiffness."""
-        return "identified stiffness"
 
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of the outputs with the stiffnesses as further columns, to first order in ln K."""
@@ -348,35 +261,12 @@ class ReducerModel(Model):
         multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
         return {order: wave_outputs(order) for order in sorted({1, 2, *multiples})}
 
-    @property
-    def spectra_note(self) -> str:
-        """Which errors show at multiples of teeth or pins."""
-        stage = self.reducer.cycloid_stage
-        return (
-            f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
-            f"disc or carrier at multiples of {stage.pin_count}"
-        )
-
-    def spoken(self, output: str) -> str:
-        """Return what a sentence calls an output; there is one peak-to-peak."""
-        return super().spoken(output).removesuffix(" transmission error")
-
     def stand_ins(self) -> tuple[Any, ...]:
         """Return the contact at fewer angles and, for few columns, a regression of the curve."""
         from tolalloc.reducers.stand_ins import ContactCandidate, CurveCandidate
 
         contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
         return contact if len(self.columns) > _MOST_COLUMNS else (*contact, CurveCandidate(kernel=self.kernel))
-
-    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
-        """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
-        modification = self.modification(values)
-        return {
-            "equidistant Δr_rp [µm]": modification.equidistant / MICROMETRE,
-            "shift Δr_p [µm]": modification.shift / MICROMETRE,
-            FLANK: float(values[0]),
-            RADIAL: float(values[1]),
-        }
 
     @cached_property
     def own_limits(self) -> Mapping[str, float]:
@@ -391,19 +281,25 @@ class ReducerModel(Model):
         """Largest pin force of the perfect reducer under its rated torque [N]."""
         return rated_pin_force(self.reducer)
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Rigidity and lost motion beside the catalogue's."""
-        sentence, _ = against_catalogue(self.reducer, self._exact_loop)
-        return (sentence,) if sentence else ()
+    def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:
+        """Return how many random units are preloaded or have no radial clearance, and by how much.
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Examination:
-        """Return nominal clearances, how many random units are preloaded, and what is said of the catalogue."""
-        from tolalloc.reducers.examination import examined
-
-        return examined(self, x)
-
-    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
-        """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
-        _, far = against_catalogue(self.reducer, self.at(values)._exact_loop)
-        return (*linear_model_warnings(self.reducer.cycloid_stage, self.modification(values)), *far)
+        Parameters
+        ----------
+        x
+            Deviations of the random units [m, angles rad].
+        """
+        found, rated = preload(self.kernel.model, self.kernel.errors(x)), self.rated_pin_force
+        solved = found.status == 0
+        counted = {"units [-]": len(x), "units in equilibrium [-]": int(solved.sum())}
+        if not solved.any():
+            return counted
+        left = self.reading((RADIAL_CLEARANCE,))(x)
+        radial = left.values[left.good, 0]
+        return counted | {
+            "share preloaded [-]": float((found.pin_force[solved] > rated).mean()),
+            "pin force of the rated torque [N]": rated,
+            "share without radial clearance [-]": float((radial < 0).mean()),
+            "least radial clearance [µm]": float(radial.min()),
+            "median pin force without torque [N]": float(np.median(found.pin_force[solved])),
+        }

@@ -17,6 +17,7 @@ from tolalloc.reading.units import unit_of
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import sign_of
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
@@ -91,7 +92,7 @@ class RankingAnswer(Answer):
     @property
     def spoken(self) -> str:
         """What a sentence calls the leading output."""
-        return self.model.spoken(self.leading)
+        return portrait_of(self.model).spoken(self.leading)
 
     @property
     def unit(self) -> str:
@@ -236,7 +237,7 @@ def rank(asked: Measures, record: RunRecord, header: Header) -> RankingAnswer:
             header,
             model=model.name,
             conditions=model.conditions,
-            assumptions=(*dict.fromkeys((*model.assumptions, *header.assumptions)),),
+            assumptions=(*dict.fromkeys((*portrait_of(model).assumptions, *header.assumptions)),),
             statuses=record.counts,
             stages=record.stages,
         ),

@@ -8,6 +8,7 @@ import pandas as pd
 
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reports.document import Section
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.sensitivity import driver_tables, figures, limit_tables
 
 if TYPE_CHECKING:
@@ -71,14 +72,15 @@ def _reducer(answer: RankingAnswer) -> tuple[Section, ...]:
     """Return the model's picture of the median unit, coloured by the drivers of the leading output; or nothing."""
     total = answer.indices.total
     shares = dict(zip(answer.indices.sources, (total / total.sum()).tolist(), strict=True))
-    return answer.model.moving(answer.errors, answer.sample.unit_at(0.5)[0], shares, "median unit")
+    return portrait_of(answer.model).moving(answer.errors, answer.sample.unit_at(0.5)[0], shares, "median unit")
 
 
 def _orders(answer: RankingAnswer) -> tuple[Section, ...]:
     """Return what makes each order; nothing for a model without spectra."""
     if answer.orders is None:
         return ()
-    note = f"{answer.model.spectra_note}; " if answer.model.spectra_note else ""
+    own = portrait_of(answer.model).spectra_note
+    note = f"{own}; " if own else ""
     return (
         Section(
             heading="Which error makes which order",

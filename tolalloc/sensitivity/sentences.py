@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import QUICK_RUN, quantity, sign_of
 from tolalloc.sensitivity.sobol import SobolIndices
 
@@ -35,7 +36,7 @@ def sentences(answer: RankingAnswer) -> tuple[str, ...]:
         *_beyond(answer),
         _opening(answer),
         answer.choice.reason,
-        *answer.model.remarks,
+        *portrait_of(answer.model).remarks,
     )
 
 
@@ -195,7 +196,7 @@ def warnings(answer: RankingAnswer) -> tuple[str, ...]:
             f"order is off by {error.root_mean_square:.2g}{answer.sign} where the effect is "
             f"{error.effect:.2g}{answer.sign}."
         )
-    found += answer.model.cautions(np.array([setting.value for setting in answer.model.settings]))
+    found += portrait_of(answer.model).cautions(np.array([setting.value for setting in answer.model.settings]))
     failed = answer.header.failed
     if failed:
         found.append(f"{failed} units have no answer; no figure uses them, and yields count them as outside.")
@@ -228,7 +229,7 @@ def summary(answer: RankingAnswer) -> dict[str, Any]:
     return {
         "study": answer.header.name,
         "study hash": answer.header.digest,
-        answer.model.kind: answer.header.model,
+        portrait_of(answer.model).kind: answer.header.model,
         **answer.header.conditions,
         **{f"{side}limit [{answer.unit}]": limit for side, limit in sides if limit is not None},
         "yield target [-]": answer.target,
@@ -255,7 +256,7 @@ def summary(answer: RankingAnswer) -> dict[str, Any]:
         "yield [-]": beyond.interval.estimate,
         "yield interval 95 % [-]": [beyond.interval.low, beyond.interval.high],
         "surrogate": answer.choice.reason,
-        **({answer.model.uncertain_name: _effect(answer)} if answer.effect else {}),
+        **({portrait_of(answer.model).uncertain_name: _effect(answer)} if answer.effect else {}),
         "statuses": dict(answer.header.statuses),
         "warnings": list(answer.warnings),
     }

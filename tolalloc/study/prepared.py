@@ -16,6 +16,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Model
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
 from tolalloc.study.limit import Limit
 
@@ -167,5 +168,8 @@ class Prepared:
             digest=self.digest,
             conditions=self.model.conditions,
             currency=self.currency,
-            assumptions=(*self.model.assumptions, *(self.study.drawing.notes if self.study.drawing else ())),
+            assumptions=(
+                *portrait_of(self.model).assumptions,
+                *(self.study.drawing.notes if self.study.drawing else ()),
+            ),
         )

@@ -9,6 +9,7 @@ from typing import Any
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Document, joined
 from tolalloc.reports.folder import claimed
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import Progress, RunRecord, Silent
 from tolalloc.running.result_cache import KeptUnits
@@ -56,7 +57,7 @@ def answered(
 
 
 def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:
-    outcomes = prepared.model.outcomes if "model" in question.reads else {}
+    outcomes = portrait_of(prepared.model).outcomes if "model" in question.reads else {}
     return RunRecord(progress or Silent(), outcomes)
 
 

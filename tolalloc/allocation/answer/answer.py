@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,10 +27,11 @@ from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
-from tolalloc.models.model import Examination, Model
+from tolalloc.models.model import Model
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section
+from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.wording import short
 from tolalloc.sensitivity.sobol import SobolIndices
 
@@ -95,12 +97,12 @@ class AllocationAnswer(Answer):
     prices: YieldLadder | None
     loss: QualityLoss | None
     error: float
-    examination: Examination
+    examination: Mapping[str, float]
 
     @property
     def free_label(self) -> str:
         """What the search that frees everything may choose."""
-        return f"tolerances and {self.model.settings_word}" if self.space.settings else "tolerances"
+        return f"tolerances and {portrait_of(self.model).settings_word}" if self.space.settings else "tolerances"
 
     @property
     def leading(self) -> str:
@@ -172,6 +174,11 @@ class AllocationAnswer(Answer):
         return dimensions_table(self)
 
     @cached_property
+    def examined(self) -> Examination:
+        """What is said of the random units of the chosen drawing."""
+        return portrait_of(self.model.at(self.chosen.settings)).examination(self.examination)
+
+    @cached_property
     def requirements_table(self) -> pd.DataFrame:
         """Every limited side with what each design was shown to keep, and what the limit costs."""
         return requirements_table(self)
@@ -181,7 +188,7 @@ class AllocationAnswer(Answer):
         """What the answer is about."""
         if not self.met:
             return f"No drawing shown to keep its limits, {self.header.model}: {self.header.name}"
-        if self.examination.fault:
+        if self.examined.fault:
             return f"A drawing that keeps its limits but cannot be built, {self.header.model}: {self.header.name}"
         if self.keeps_table:
             return f"Keep the drawing of {self.header.model}: {self.header.name}"
@@ -223,7 +230,7 @@ class AllocationAnswer(Answer):
         answered = {
             "study": self.header.name,
             "study hash": self.header.digest,
-            self.model.kind: self.header.model,
+            portrait_of(self.model).kind: self.header.model,
             **self.header.conditions,
             limit: free.limit,
             "yield target [-]": getattr(guarantee, "target", None),
@@ -251,9 +258,9 @@ class AllocationAnswer(Answer):
             "gap of the convex program [-]": free.optimum.gap,
             "blocking requirement": None if self.met else chosen.blocking.requirement.output,
             "beyond its limit by [unit of the output]": None if self.met else -chosen.blocking.slack,
-            "cannot be built because": self.examination.fault or None,
-            **self.examination.figures,
-            **self.model.amounts(chosen.settings),
+            "cannot be built because": self.examined.fault or None,
+            **self.examined.figures,
+            **portrait_of(self.model).amounts(chosen.settings),
             "requirements": _records(self.requirements_table),
             "drawing": _records(self.drawing_table),
             "zones that stay the same": [
@@ -261,7 +268,7 @@ class AllocationAnswer(Answer):
             ]
             if self.robustness
             else None,
-            **self.model.facts,
+            **portrait_of(self.model).facts,
             "statuses": dict(self.header.statuses),
             "warnings": list(self.warnings),
         }

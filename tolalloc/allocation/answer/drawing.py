@@ -21,6 +21,7 @@ from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.currency import in_currency
 from tolalloc.reports.excel import write_sheets
 from tolalloc.reports.feature_frame import write_frames
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.writer import write_csv
 
 if TYPE_CHECKING:
@@ -185,4 +186,4 @@ def _settings_sheet(answer: AllocationAnswer) -> dict[str, pd.DataFrame]:
         for name in names
     ]
     rows += [{"what": sentence} for sentence in amounts_convention(answer)]
-    return {answer.model.settings_word: pd.DataFrame(rows)}
+    return {portrait_of(answer.model).settings_word: pd.DataFrame(rows)}

@@ -14,6 +14,7 @@ from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amoun
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.document import Section
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.sensitivity.driver_tables import sobol_table
 
@@ -109,7 +110,7 @@ def _illustrated(answer: AllocationAnswer) -> tuple[Section, ...]:
         "median unit before": (before.settings, before.sample.unit_at(0.5)[0]),
         "median unit after": (after.settings, after.sample.unit_at(0.5)[0]),
     }
-    return answer.model.illustrated(units)
+    return portrait_of(answer.model).illustrated(units)
 
 
 def _optimality(answer: AllocationAnswer) -> Section:
@@ -141,7 +142,7 @@ def _what_if(answer: AllocationAnswer) -> tuple[Section, ...]:
     if answer.trade:
         found.append(
             Section(
-                heading=f"{answer.model.settings_word.capitalize()} against tolerances",
+                heading=f"{portrait_of(answer.model).settings_word.capitalize()} against tolerances",
                 paragraphs=_cheapest_settings(answer),
                 figures=figures.trade_figures(answer, answer.trade),
                 tables=(("modification", what_if_tables.trade_table(answer.trade)),),

@@ -11,6 +11,7 @@ from tolalloc.allocation.front.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.feature_frame import callout_assumptions
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import QUICK_RUN, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
@@ -31,7 +32,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
     chosen = answer.chosen
     achieved = chosen.achieved
     found = [
-        *([answer.examination.fault] if answer.examination.fault else ()),
+        *([answer.examined.fault] if answer.examined.fault else ()),
         f"{'Met' if answer.met else 'NOT met'}: {achieved.estimate:.2%} of {achieved.units:,} fresh units keep "
         f"{_limits(answer)} (95 % interval {achieved.low:.2%}…{achieved.high:.2%}).",
     ]
@@ -52,7 +53,7 @@ def sentences(answer: AllocationAnswer) -> tuple[str, ...]:
         *_prices(answer),
         *_good_unit(answer),
         *_settled(answer),
-        *answer.model.at(chosen.settings).remarks,
+        *portrait_of(answer.model.at(chosen.settings)).remarks,
     )
 
 
@@ -67,7 +68,7 @@ def drawn_amounts(answer: AllocationAnswer) -> tuple[str, ...]:
         f"{short(name)} {with_unit(_signed(new), name)}{'' if same else f' (was {_signed(was)})'}"
         for name, was, new in zip(drawn.names, today, chosen, strict=True)
     )
-    word = answer.model.settings_word
+    word = portrait_of(answer.model).settings_word
     return (f"The drawing holds with {'these' if word.endswith('s') else 'this'} {word} only: {amounts}.",)
 
 
@@ -127,7 +128,7 @@ def _cost(answer: AllocationAnswer) -> str:
     """Return what the drawing costs, and what proportional scaling does."""
     chosen, hand = answer.chosen, answer.free.proportional
     used = "" if hand.met else ", which missed a limit"
-    as_it_is = f" with the {answer.model.settings_word} as it is" if answer.space.settings else ""
+    as_it_is = f" with the {portrait_of(answer.model).settings_word} as it is" if answer.space.settings else ""
     if hand.met and answer.requirements[0].limits.lower is None:
         unit = unit_of(answer.leading).replace("arcsec", "arcsecond")
         least = chosen.cost / (1 - answer.least_saving)
@@ -201,7 +202,7 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what the modification buys."""
     if answer.fixed is None:
         return () if answer.free.chosen.met else (f"No design was verified: {missed(answer.free.chosen)}.",)
-    alone, joint, freed = answer.fixed.chosen, answer.free.chosen, answer.model.settings_word
+    alone, joint, freed = answer.fixed.chosen, answer.free.chosen, portrait_of(answer.model).settings_word
     if not joint.met:
         said = (f"With {answer.free_label} free no design was verified: {missed(joint)}.",)
         return said if alone.met else (*said, f"Nor with tolerances alone: {missed(alone)}.")
@@ -292,7 +293,7 @@ def warnings(answer: AllocationAnswer) -> tuple[str, ...]:
             "zones are no longer shown to keep every limit."
         )
     found += [f"{own.sentence}." for own in answer.space.settings if own.strays]
-    found += answer.model.cautions(chosen.settings)
+    found += portrait_of(answer.model).cautions(chosen.settings)
     found += _fronts(answer)
     return (*found, *_failed(answer))
 

@@ -28,6 +28,7 @@ from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.charts import chart, numbers, shares
 from tolalloc.reports.figure import BINS, Figure, Series
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import short
 from tolalloc.study.prepared import Prepared
 
@@ -311,7 +312,8 @@ class Session:
         chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
         beyond = [f"{own.sentence}." for own in chosen if own.strays]
         beyond += [sentence for own in self.sources(design) if (sentence := outside_range(own))]
-        return [*beyond, *model.examined(self.deviations(design, slice(0, FIRST))).sentences]
+        counted = model.examined(self.deviations(design, slice(0, FIRST)))
+        return [*beyond, *portrait_of(model).examination(counted).sentences]
 
     @property
     def described(self) -> dict[str, Any]:
@@ -328,7 +330,7 @@ class Session:
                 _described(own, self.prepared.space.processes.get(own.name, ())) for own in self.prepared.errors.active
             ],
             "settings": [
-                *(_setting(own, model.settings_word) for own in model.settings),
+                *(_setting(own, portrait_of(model).settings_word) for own in model.settings),
                 # an odd number of steps leaves out the middle, a torque of 0, at which play leaves all undetermined
                 *(_setting(own, "operating condition", _STEPS + 1) for own in model.operating_conditions),
             ],
@@ -382,7 +384,7 @@ class LiveUnits:
         x = self._columns(design, number)
         values = self._values(design, x[np.newaxis])[0]
         label = f"unit {number}" if number else "exact parts"
-        figures = self.session.model(design).pictured({label: (np.array(design.settings), x)})
+        figures = portrait_of(self.session.model(design)).pictured({label: (np.array(design.settings), x)})
         return {
             "unit": number,
             "values": [
@@ -418,7 +420,7 @@ class LiveUnits:
             if not (is_number(share) and abs(share) <= 1):
                 raise InputError.at("page", "share", share, "a number from -1 to 1")
             x, label = self._at_shares(design, number, source, np.array([share]))[0], f"{label}, {source} moved"
-        return {"scene": self.session.model(design).scene(np.array(design.settings), x, label, names)}
+        return {"scene": portrait_of(self.session.model(design)).scene(np.array(design.settings), x, label, names)}
 
     def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
         """Return the leading output of a unit while one of its errors goes from one end of its zone to the other.
@@ -431,9 +433,9 @@ class LiveUnits:
         shares = np.linspace(-1.0, 1.0, _SWEPT)
         tried = self._at_shares(design, number, source, shares)
         values = self._values(design, tried)[:, 0]
-        model, settings = self.session.model(design), np.array(design.settings)
+        portrait, settings = portrait_of(self.session.model(design)), np.array(design.settings)
         labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
-        curves = [model.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
+        curves = [portrait.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
         leading = self.session.outputs[0]
         figure = Figure(
             name="sweep",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import gcd, pi
 from typing import Any
@@ -18,10 +18,7 @@ from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.scene.outlines import outlines, tooth
 from tolalloc.reducers.scene.places import Place, places_of
 from tolalloc.reducers.scene.states import States, solved_states, turn_of
-from tolalloc.reports.picture.blocks import block, coarse_block
 
-VERSION = 1
-"""Of the JSON; a picture refuses another one [-]."""
 PER_CRANK_TURN = 12
 """Angles of a picture per turn of the cranks; between them it goes straight from one to the next [-]."""
 _NICE = (1.0, 2.0, 5.0)
@@ -60,19 +57,6 @@ class Scene:
     def angle(self, part: str, carrier_angle: float, number: int = 0) -> float:
         """Return where a part stands at a carrier angle: an entry of `start`, its number from 0 [rad]."""
         return float(self.start[part][number] + self.turns[part] * carrier_angle)
-
-    def record(self, coarse: bool = False) -> dict[str, Any]:
-        """Return the scene as JSON knows it; a coarse one is small, 255 steps for all pins or parts."""
-        found = {field.name: getattr(self, field.name) for field in fields(self)}
-        for name in ("forward", "backward"):
-            found[name] = {
-                key: (coarse_block if coarse and value.ndim > 1 else block)(value)
-                if isinstance(value, np.ndarray)
-                else value
-                for key, value in asdict(found[name]).items()
-            }
-        found["places"] = [asdict(place) | {"sources": list(place.sources)} for place in self.places]
-        return {"version": VERSION, **found, "carrier_angle": block(self.carrier_angle)}
 
 
 def scene_of(

@@ -1,14 +1,19 @@
-"""Arrays of numbers inside JSON, to the last digit: their bytes in base64, read by Python and by a browser alike."""
+"""A scene as JSON, its arrays to the last digit: their bytes in base64, read by Python and by a browser alike."""
 
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.reducers.scene.scene import Scene
+
+VERSION = 1
+"""Of the JSON; a picture refuses another one [-]."""
 LEVELS = 255
 """Steps between the smallest and the largest number of a coarse block [-]."""
 
@@ -51,3 +56,17 @@ def values_of(entry: Mapping[str, Any]) -> Float[np.ndarray, "..."]:
         steps = np.frombuffer(content, np.uint8).reshape(shape)
         return np.asarray(entry["low"] + entry["step"] * steps)
     return np.asarray(np.frombuffer(content, "<f8").reshape(shape), float)
+
+
+def scene_record(scene: Scene, coarse: bool = False) -> dict[str, Any]:
+    """Return a scene as JSON knows it; a coarse one is small, 255 steps for all pins or parts."""
+    found = {field.name: getattr(scene, field.name) for field in fields(scene)}
+    for name in ("forward", "backward"):
+        found[name] = {
+            key: (coarse_block if coarse and value.ndim > 1 else block)(value)
+            if isinstance(value, np.ndarray)
+            else value
+            for key, value in asdict(found[name]).items()
+        }
+    found["places"] = [asdict(place) | {"sources": list(place.sources)} for place in scene.places]
+    return {"version": VERSION, **found, "carrier_angle": block(scene.carrier_angle)}

@@ -23,7 +23,7 @@ class MovingPicture(Figure):
     Parameters
     ----------
     record
-        The scene as `tolalloc.reducers.scene.scene.Scene.record` says it.
+        The scene as `tolalloc.reports.picture.blocks.scene_record` says it.
     shares
         Place → how strongly it is coloured, from 0 to 1 [-].
     pictures

@@ -1,0 +1,173 @@
+"""What is said and shown of a model beside its numbers: words, pictures and a unit that moves, all of them optional."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.models.model import Model, Units
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure
+
+if TYPE_CHECKING:
+    from tolalloc.drawings.error_model import ErrorModel
+
+Own = TypeVar("Own", bound=Model)
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What a check of a study says of a model and of some random units."""
+
+    sentences: tuple[str, ...] = ()
+    but: str = ""  # What speaks against the drawing, as the end of a sentence; empty if nothing
+    fault: str = ""  # Why units of the drawing cannot be built, a sentence for a first page; empty if they can
+    figures: Mapping[str, float] = field(default_factory=dict)  # What was counted, units in the names
+
+
+class Portrait(Generic[Own]):
+    """What is said and shown of any model; a subclass with ``of=`` says more of its models.
+
+    Parameters
+    ----------
+    model
+        The model at the sources of its drawing.
+
+    Examples
+    --------
+    >>> class Stack(Model): ...
+    >>> class StackPortrait(Portrait[Stack], of=Stack):
+    ...     kind = "stack"
+    """
+
+    kind: ClassVar[str] = "model"
+    """What a summary calls such a model."""
+    settings_word: ClassVar[str] = "settings"
+    """What a sentence calls all settings together."""
+    uncertain_name: ClassVar[str] = "not known of the model"
+    """What a summary calls what is uncertain of the model."""
+
+    def __init__(self, model: Own) -> None:
+        self.model = model
+
+    def __init_subclass__(cls, of: type[Model] | None = None) -> None:
+        if of is not None:
+            _PORTRAITS[of] = cls
+
+    @property
+    def outcomes(self) -> Mapping[int, str]:
+        """Status → outcome of a sample in words, the good one first."""
+        return {0: "answer found", 1: "no answer"}
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """What is worth knowing of the model itself, units in the names."""
+        return {}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source of the model states."""
+        return ()
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the drawing does not state and the model takes as exact, a sentence each."""
+        return ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What every report says of the model itself beside what is asked, in sentences."""
+        return ()
+
+    @property
+    def spectra_note(self) -> str:
+        """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
+        return ""
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output, which has no unit."""
+        return output.split(" [")[0]
+
+    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
+        """Return what the settings mean on the drawing, units in the names."""
+        return {setting.name: float(value) for setting, value in zip(self.model.settings, values, strict=True)}
+
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:  # noqa: ARG002
+        """Return what a reader must know of these settings."""
+        return ()
+
+    def examination(self, figures: Mapping[str, float]) -> Examination:  # noqa: ARG002
+        """Return what a check says of the model and of what `Model.examined` counted of some random units."""
+        return Examination()
+
+    def illustrated(
+        self,
+        units: Units,  # noqa: ARG002
+    ) -> tuple[Section, ...]:
+        """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
+        return ()
+
+    def pictured(
+        self,
+        units: Units,  # noqa: ARG002
+    ) -> tuple[Figure, ...]:
+        """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
+        return ()
+
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+        sources: tuple[str, ...],  # noqa: ARG002
+    ) -> dict[str, Any] | None:
+        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one.
+
+        Raises
+        ------
+        SolveError
+            The unit does not come to rest somewhere.
+        """
+        return None
+
+    def moving(
+        self,
+        errors: ErrorModel,  # noqa: ARG002
+        x: Float[np.ndarray, " column"],  # noqa: ARG002
+        shares: Mapping[str, float],  # noqa: ARG002
+        unit: str,  # noqa: ARG002
+    ) -> tuple[Section, ...]:
+        """Return a picture of one unit's columns whose places show the sources' shares; nothing unless there is one."""
+        return ()
+
+
+_PORTRAITS: dict[type[Model], type[Portrait[Any]]] = {}
+_SHIPPED = {
+    "tolalloc.models.function_model": "tolalloc.reports.portraits.own_function",
+    "tolalloc.reducers.model": "tolalloc.reports.portraits.reducer",
+}
+"""Module of a model → module of its portrait, which is imported when it is first asked for."""
+
+
+def portrait_of(model: Model) -> Portrait[Any]:
+    """Return the portrait of a model: its own, that of a base class, or the one of any model."""
+    for base in type(model).__mro__:
+        if base not in _PORTRAITS and base.__module__ in _SHIPPED:
+            import_module(_SHIPPED[base.__module__])
+        if base in _PORTRAITS:
+            return _PORTRAITS[base](model)
+    return Portrait(model)
+
+
+def sections_of(heading: str, made: Callable[[], tuple[Section, ...]]) -> tuple[Section, ...]:
+    """Return sections with pictures, or one that says why there are none: a picture never stops a report."""
+    try:
+        return made()
+    except Exception as error:
+        said = f"The pictures are left out: {str(error).rstrip('.') or type(error).__name__}."
+        return (Section(heading=heading, paragraphs=(said,)),)

@@ -1,0 +1,1 @@
+"""One portrait for each kind of model that has more to say than any model."""

@@ -1,0 +1,392 @@
+"""What is said and shown of a reducer: words, curves of single units, the unit that moves, and what a check says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.guarantee import USUAL_YIELD
+from tolalloc.exceptions import InputError
+from tolalloc.models.model import Units
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
+from tolalloc.reducers import PRELOAD
+from tolalloc.reducers.cycloid.assessment import assess
+from tolalloc.reducers.cycloid.clearance import linear_model_warnings
+from tolalloc.reducers.equivalent.answers import OUTCOMES, Equilibria
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.rigidity import against_catalogue
+from tolalloc.reducers.scene.places import is_placed
+from tolalloc.reducers.scene.scene import PER_CRANK_TURN, Scene, scene_of
+from tolalloc.reducers.settings import FLANK, RADIAL
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.picture.blocks import scene_record
+from tolalloc.reports.portrait import Examination, Portrait, sections_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolalloc.drawings.error_model import ErrorModel
+
+_ORDERS = 130
+"""Orders of the output turn that a report lists [-]."""
+_COARSE = 8
+"""Angles per turn of the cranks in a report, which stays small [-]."""
+_COUNTED = (
+    "share preloaded [-]",
+    "pin force of the rated torque [N]",
+    "share without radial clearance [-]",
+    "least radial clearance [µm]",
+)
+"""What a summary says of the random units of a check."""
+
+
+class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
+    """What is said and shown of a reducer at the sources of a drawing."""
+
+    kind = "reducer"
+    settings_word = "modification"
+    uncertain_name = "identified stiffness"
+
+    @property
+    def outcomes(self) -> Mapping[int, str]:
+        """Status → outcome of an equilibrium in words."""
+        return OUTCOMES
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
+        own = self.model.kernel.model
+        loop = hysteresis_loop(own, np.zeros((1, len(own.columns))), TURN_ANGLES)
+        stiffness = float(loop.torsional_stiffness[0] * ARCMINUTE)
+        return {"torsional stiffness of the perfect reducer [N·m/arcmin]": stiffness}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Those of the reducer, of the built unit and of what the drawing leaves out."""
+        model = self.model
+        clearances = [name for name, value in asdict(model.reducer.clearances).items() if value == 0.0]
+        without = (f"without clearance: {', '.join(clearances).replace('_', ' ')}",) if clearances else ()
+        unit = model.unit.assumptions if model.unit else ()
+        return (*model.reducer.assumptions, *unit, *self.left_out, *without)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What binding the drawing to the reducer assumed."""
+        return self.model.left_out
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Rigidity and lost motion beside the catalogue's."""
+        sentence, _ = against_catalogue(self.model.reducer, self.model.exact_loop_in_force)
+        return (sentence,) if sentence else ()
+
+    @property
+    def spectra_note(self) -> str:
+        """Which errors show at multiples of teeth or pins."""
+        stage = self.model.reducer.cycloid_stage
+        return (
+            f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
+            f"disc or carrier at multiples of {stage.pin_count}"
+        )
+
+    def spoken(self, output: str) -> str:
+        """Return what a sentence calls an output; there is one peak-to-peak."""
+        return super().spoken(output).removesuffix(" transmission error")
+
+    def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
+        """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
+        modification = self.model.modification(values)
+        return {
+            "equidistant Δr_rp [µm]": modification.equidistant / MICROMETRE,
+            "shift Δr_p [µm]": modification.shift / MICROMETRE,
+            FLANK: float(values[0]),
+            RADIAL: float(values[1]),
+        }
+
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
+        """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
+        model = self.model
+        _, far = against_catalogue(model.reducer, model.at(values).exact_loop_in_force)
+        return (*linear_model_warnings(model.reducer.cycloid_stage, model.modification(values)), *far)
+
+    def examination(self, figures: Mapping[str, float]) -> Examination:
+        """Return sizes that differ, clearances, how many random units are preloaded, and what frees them."""
+        return _examination(self, figures)
+
+    def illustrated(self, units: Units) -> tuple[Section, ...]:
+        """Return the curves and orders of units, with the built unit first, and how exact teeth carry rated torque."""
+        return sections_of("Single units over one output turn", lambda: _illustrated(self.model, units))
+
+    def pictured(self, units: Units) -> tuple[Figure, ...]:
+        """Return the curves and the orders of units."""
+        curves = _curves(self.model, units)
+        return _curve_figure(curves, self.model.kernel.torque), _order_figure(curves, self.model.reducer)
+
+    def scene(
+        self,
+        settings: Float[np.ndarray, " setting"],
+        x: Float[np.ndarray, " column"],
+        unit: str,
+        sources: tuple[str, ...],
+    ) -> dict[str, Any]:
+        """Return the reducer as it moves with this unit's errors, coarse enough to be sent at once."""
+        return scene_record(_scene(self.model.at(settings), x, unit, sources), coarse=True)
+
+    def moving(
+        self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
+    ) -> tuple[Section, ...]:
+        """Return the moving picture of a unit, coloured by its sources' shares."""
+        return sections_of("The reducer", lambda: _moving(self.model, errors, x, shares, unit))
+
+
+# What a check says
+
+
+def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Examination:
+    """Return what is said of the nominal clearances, of the counted random units and of the catalogue."""
+    model, count, solved = portrait.model, int(figures["units [-]"]), int(figures["units in equilibrium [-]"])
+    stage, (flank, radial) = model.reducer.cycloid_stage, model.present_clearances
+    if not solved:
+        none = f"None of {count} random units has an equilibrium without torque."
+        but = f"none of its units has an equilibrium: {_advice(model)}"
+        sentences = (*model.mismatches, none, *portrait.remarks)
+        return Examination(sentences, but, f"Cannot be built as drawn: {none}")
+    counted = {name: figures[name] for name in _COUNTED}
+    unsolved = "" if solved == count else f" ({count - solved} have no equilibrium)"
+    cautions = portrait.cautions(np.array(model.present_clearances))
+    sentences = (
+        *model.mismatches,
+        f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
+        f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
+        f"Of {count} random units {figures['share preloaded [-]']:.1%} are preloaded{unsolved}: without torque their "
+        f"pins press with more than the {model.rated_pin_force:.0f} N of the rated torque; half of all press with "
+        f"{figures['median pin force without torque [N]']:.2g} N or more.",
+        f"The radial clearance of a unit is {_true_minus(figures['least radial clearance [µm]'])} µm at least.",
+        *portrait.remarks,
+        *cautions,
+    )
+    reasons = _reasons(model, counted)
+    if not reasons:
+        return Examination(sentences, figures=counted)
+    trust = " ".join(own for own in cautions if "not trust" in own)
+    fault = f"Cannot be built as drawn: of {count:,} random reducers {' and '.join(reasons)}. {trust}".strip()
+    return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, counted)
+
+
+def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
+    """Return what keeps more units from being built than usually may miss a limit."""
+    found, allowed = [], 1 - USUAL_YIELD
+    if (share := figures["share preloaded [-]"]) > allowed:
+        by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
+        force = figures["pin force of the rated torque [N]"]
+        found.append(f"{share:.1%} are preloaded (a pin presses with more than the {force:.0f} N of rated torque{by})")
+    if (share := figures["share without radial clearance [-]"]) > allowed:
+        least = _true_minus(figures["least radial clearance [µm]"])
+        found.append(f"{share:.1%} have no radial clearance ({least} µm at worst)")
+    return found
+
+
+def _true_minus(number: float) -> str:
+    return f"{number:.2g}".replace("-", "−")
+
+
+def _advice(model: ReducerModel) -> str:
+    """Return what frees preloaded units, as the end of a sentence."""
+    flank, _ = model.present_clearances
+    freely = (
+        "flank_clearance of ta.reducer(...) lets the allocation open it, at present from "
+        f"{model.flank[0] / MICROMETRE:.3g} to {model.flank[1] / MICROMETRE:.3g} µm"
+        if model.flank
+        else "flank_clearance=(smallest, largest) of ta.reducer(...) would let the allocation open it"
+    )
+    return (
+        f"a tooth modification that leaves more than the present {flank:.3g} µm on the flank frees them; "
+        f"`tolalloc modify` proposes one, and {freely}"
+    )
+
+
+# Curves of single units
+
+
+def _illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
+    curves = _curves(model, units)
+    return (
+        Section(
+            heading="Single units over one output turn",
+            figures=(_curve_figure(curves, model.kernel.torque), _order_figure(curves, model.reducer)),
+            tables=(("orders of units", _order_table(curves)),),
+        ),
+        Section(
+            heading="How exact teeth carry the rated torque",
+            paragraphs=(
+                "Exact parts, Hertzian line contact, the most loaded disc by Li Lixing's share; a modification that "
+                "interferes before any load has no numbers.",
+            ),
+            tables=(("contact", _contact_table(model, units)),),
+        ),
+    )
+
+
+def _curves(model: ReducerModel, units: Units) -> dict[str, Equilibria]:
+    """Return the curve of every unit."""
+    kernel, curves = model.kernel, {}
+    if model.unit:
+        own = model.unit.errors(kernel.model.columns, model.reducer.modification.deviations)
+        curves[f"unit {model.unit.name}"] = kernel.model.equilibria(own, kernel.torque)
+    for label, (settings, x) in units.items():
+        errors = model.at(settings).kernel.errors(x[np.newaxis])
+        curves[label] = kernel.model.equilibria(errors, kernel.torque)
+    return curves
+
+
+def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
+    return Figure(
+        name="transmission_error",
+        title=f"Transmission error over one output turn at {torque:g} N·m",
+        x_label="carrier angle [°]",
+        y_label="transmission error, output side [arcsec]",
+        series=tuple(
+            Series(
+                label=label,
+                kind="line",
+                x=list(curve.carrier_angle / DEGREE),
+                y=list(curve.transmission_error[0] / ARCSECOND),
+            )
+            for label, curve in curves.items()
+        ),
+    )
+
+
+def _amplitudes(curve: Equilibria) -> Float[np.ndarray, " order"]:
+    """Return the amplitudes of the first orders [arcsec]."""
+    return np.asarray(order_spectrum(curve.transmission_error).amplitude[0, :_ORDERS] / ARCSECOND)
+
+
+def _order_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
+    stage = reducer.cycloid_stage
+    return Figure(
+        name="orders_of_units",
+        title=f"Orders: multiples of {stage.disc_teeth} stand still with the housing, of {stage.pin_count} turn with "
+        "disc or carrier",
+        x_label="order of the output turn [-]",
+        y_label="amplitude, output side [arcsec]",
+        series=tuple(
+            Series(label=label, kind="stems", x=list(range(1, _ORDERS + 1)), y=list(_amplitudes(curve)))
+            for label, curve in curves.items()
+        ),
+    )
+
+
+def _order_table(curves: Mapping[str, Equilibria]) -> pd.DataFrame:
+    import pandas as pd
+
+    found = {"order of the output turn [-]": np.arange(1, _ORDERS + 1)}
+    return pd.DataFrame(found | {f"{label} [arcsec]": _amplitudes(curve) for label, curve in curves.items()})
+
+
+def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
+    """Return amounts, clearances and how exact teeth carry, for the modification of every unit."""
+    import pandas as pd
+
+    columns: dict[str, dict[str, float]] = {}
+    for label, (settings, _) in units.items():
+        amounts = model.modification(settings)
+        columns[label] = {
+            "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
+            "shift Δr_p [µm]": amounts.shift / MICROMETRE,
+            "flank clearance, smallest nominal gap [µm]": amounts.flank_clearance(model.reducer.cycloid_stage)
+            / MICROMETRE,
+            "radial clearance at tip and root [µm]": amounts.radial_clearance / MICROMETRE,
+            **_carried(replace(model.reducer, modification=amounts)),
+        }
+    shown = {label: f"{label.removeprefix('median unit ')} [unit of the amount]" for label in columns}
+    frame = pd.DataFrame(columns).rename(columns=shown)
+    return frame.rename_axis("amount").reset_index()
+
+
+_CARRIED = (
+    "backlash of teeth and pins [arcmin]",
+    "fewest pins in contact on a disc at rated torque [-]",
+    "largest pin force at rated torque [N]",
+    "peak pressure at rated torque [MPa]",
+)
+
+
+def _carried(reducer: Reducer) -> dict[str, float]:
+    """Return how the parts without errors carry the rated torque; not a number where they interfere before any load."""
+    values, torque = [np.nan] * len(_CARRIED), -reducer.load.rated_torque
+    with suppress(InputError):
+        found = assess(reducer, torque, law=reducer.stiffness.pin_contact_law)
+        if reducer.modification.rotation == 0.0 and not found.clearance.exact:
+            solved = perfect_reducer(found.reducer, torque)
+            pins, pressed = solved.forces.pins[0], peak_line_load(solved.equilibria, solved.forces)
+            values = [
+                found.clearance.backlash / ARCMINUTE,
+                int((pins > 0).sum(axis=2).min()),
+                float(pins.max()),
+                float((unit_pressure(solved.equilibria) * np.sqrt(pressed)).max()) / MEGAPASCAL,
+            ]
+    return dict(zip(_CARRIED, values, strict=True))
+
+
+# The unit that moves
+
+
+def _scene(
+    model: ReducerModel,
+    x: Float[np.ndarray, " column"],
+    unit: str,
+    sources: tuple[str, ...],
+    per_crank_turn: int = PER_CRANK_TURN,
+) -> Scene:
+    """Return the scene of one unit's deviations [m, angles rad], with so many angles per turn of the cranks [-].
+
+    Raises
+    ------
+    SolveError
+        An angle without equilibrium.
+    """
+    kernel, placed = model.kernel, tuple(filter(is_placed, sources))
+    errors = kernel.errors(x[np.newaxis])[0]
+    return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=placed, per_crank_turn=per_crank_turn)
+
+
+def _moving(
+    model: ReducerModel, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
+) -> tuple[Section, ...]:
+    """Return the section with the moving picture of one unit [m, angles rad], coloured by its sources' shares [-]."""
+    from tolalloc.reports.picture.moving import MovingPicture, strongest
+
+    named = tuple(source.name for source in errors.sources)
+    elsewhere = ", ".join(name for name in named if not is_placed(name))
+    scene = _scene(model, x, unit, named, per_crank_turn=_COARSE)
+    return (
+        Section(
+            heading="The reducer",
+            paragraphs=(
+                f"The {unit} in true proportion, errors and gaps drawn larger. The stronger a place is coloured, the "
+                "more the sources that sit there drive together, over the place that drives most. Point at a place to "
+                "see its sources, and at a source in a table to see its place.",
+                *((f"The picture has no place for {elsewhere}.",) if elsewhere else ()),
+            ),
+            figures=(
+                MovingPicture(
+                    name="reducer",
+                    title=f"{model.name}, {unit}",
+                    record=scene_record(scene, coarse=True),
+                    shares=strongest(shares, scene.place_by_source),
+                ),
+            ),
+        ),
+    )
