@@ -5,7 +5,7 @@ A case is one folder and the commands that are typed in it, one after the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 SMALL_EFFORT = """ta.Effort(
         ranking=ta.RankingEffort(
@@ -75,6 +75,33 @@ study = ta.Study(
 BROKEN = "import tolalloc as ta\nstudy = ta.Study(ta.reducer('rv20e'), ta.drawing('nowhere.csv'), limits={})\n"
 
 
+def seat(name: str, half: float, gap: str = "housing - shaft") -> str:
+    """Return a study of the gap of a seat within ± half [mm]."""
+    return f"""import tolalloc as ta
+
+
+def gap(housing, shaft):
+    return {gap}
+
+
+ROW = {{"unit": "mm", "min": 0.005, "max": 0.1, "plus": 0.02, "minus": -0.02, "cost": 1}}
+study = ta.Study(
+    ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+    ta.Drawing.of_rows([{{"id": "housing", "nominal": 30.1, **ROW}}, {{"id": "shaft", "nominal": 30.0, **ROW}}]),
+    limits={{"gap [mm]": ta.Limit(lower=0.1 - {half}, upper=0.1 + {half})}},
+    questions=[ta.Allocation(front=False, what_if=False)],
+    name="{name}",
+    effort={SMALL_EFFORT},
+)
+"""
+
+
+COMMANDS = (
+    *("new", "check", "open", "run", "rank", "allocate", "whatif", "series", "compare", "costs", "te", "contact"),
+    *("modify", "identify", "diagnose", "assemble", "mount", "simulate", "schema", "doctor"),
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Case:
     """One folder and the commands that are typed in it.
@@ -86,47 +113,85 @@ class Case:
     files
         Name → text of each file that lies there first.
     commands
-        Words of each command; ``@`` before a word stands for the folder.
+        Each command as it is typed; ``@`` before a word stands for the folder.
     """
 
     name: str
-    files: dict[str, str]
-    commands: tuple[tuple[str, ...], ...]
+    files: dict[str, str] = field(default_factory=dict)
+    commands: tuple[str, ...]
 
 
-NEW = ("new", "@mine", "--like", "rv40e", "--cranks", "3", "--with", "all")
-MINE = ("--reducer", "@mine/reducer.toml")
+NEW = "new @mine --like rv40e --cranks 3 --with all"
+MINE = "--reducer @mine/reducer.toml"
 
 SMALL = (
     Case(
         name="own",
         files={"own.py": OWN, "broken.py": BROKEN},
         commands=(
-            ("check", "@own.py"),
-            ("run", "@own.py", "--out", "@run"),
-            ("allocate", "@own.py", "--grades", "--out", "@graded"),
-            ("compare", "@run", "@graded"),
-            ("rank", "@own.py", "--json", "--out", "@rank"),
-            ("whatif", "@own.py", "shaft=0.02"),
-            ("check", "@broken.py"),
+            "check @own.py",
+            "run @own.py --out @run",
+            "allocate @own.py --grades --out @graded",
+            "compare @run @graded",
+            "rank @own.py --json --out @rank",
+            "whatif @own.py shaft=0.02",
+            "check @broken.py",
         ),
     ),
     Case(
         name="reducer_questions",
-        files={},
         commands=(
             NEW,
-            ("check", "@mine/study.py"),
-            ("te", "--reducer", "rv20e", "--unit", "table4", "--attribute", "--out", "@te"),
-            ("te", *MINE),
-            ("contact", *MINE, "--out", "@contact"),
-            ("modify", "li2018", *MINE, "--radial", "15", "--out", "@modify"),
-            ("assemble", "@mine/chain.toml", "--measured", "@mine/angles.csv", "--out", "@assemble"),
-            ("assemble", "bx40e"),
-            ("costs", "@mine/shop.csv", "--out", "@costs"),
-            ("schema", "reducer"),
-            ("schema", "bench"),
-            ("te", "--reducer", "rv21e"),
+            "check @mine/study.py",
+            "te --reducer rv20e --unit table4 --attribute --out @te",
+            f"te {MINE}",
+            f"contact {MINE} --out @contact",
+            f"modify li2018 {MINE} --radial 15 --out @modify",
+            "assemble @mine/chain.toml --measured @mine/angles.csv --out @assemble",
+            "assemble bx40e",
+            "costs @mine/shop.csv --out @costs",
+            "schema reducer",
+            "schema bench",
+            "te --reducer rv21e",
+        ),
+    ),
+    Case(name="help", commands=("--help", *(f"{word} --help" for word in COMMANDS))),
+    Case(
+        name="start",
+        commands=(
+            "new @yours --cranks 2 --discs 1",
+            "check @yours/study.py",
+            "new @other --like rv80e --cranks 2 --with curve",
+            "new @yours",
+            *(f"schema {kind}" for kind in ("reducer", "unit", "stiffness", "bench", "chain", "drawing")),
+        ),
+    ),
+    Case(
+        name="series",
+        files={
+            "wide.py": seat("wide", 0.03),
+            "tight.py": seat("tight", 0.02),
+            "broken.py": seat("broken", 0.02, "float('nan')"),
+        },
+        commands=(
+            "series @wide.py @tight.py @broken.py --out @runs",
+            "compare @runs/wide @runs/tight --out @compare",
+            "series @wide.py @wide.py --out @twice",
+        ),
+    ),
+    Case(
+        name="profile",
+        commands=(
+            "contact --reducer rv20e --phases 4 --profile @teeth.csv --points 8",
+            "contact --reducer rv40e --law table2 --exact --width 9 --profile @teeth.dxf",
+            "contact --reducer rv20e --support 20 --profile @teeth.stl",
+        ),
+    ),
+    Case(
+        name="catalogue",
+        commands=(
+            "identify --catalogue --reducer rv40e --write @stiffness.toml --out @identify",
+            "te --reducer rv40e --stiffness @stiffness.toml",
         ),
     ),
 )
@@ -137,41 +202,30 @@ LONGER = (
         name="preset",
         files={"preset.py": PRESET},
         commands=(
-            ("check", "@preset.py"),
-            ("run", "@preset.py", "--out", "@run"),
-            ("whatif", "@preset.py", "pin.diameter=3", "disc*.pitch=10"),
+            "check @preset.py",
+            "run @preset.py --out @run",
+            "whatif @preset.py pin.diameter=3 disc*.pitch=10",
+        ),
+    ),
+    Case(name="three", files={"three.py": THREE}, commands=(NEW, "check @three.py", "run @three.py --out @run")),
+    Case(
+        name="bench",
+        commands=(
+            NEW,
+            f"identify @mine/bench.toml {MINE} --out @identify",
+            f"diagnose @mine/unit7.csv {MINE} --tolerances @mine/zones.xlsx --out @diagnose",
+            f"mount @mine/parts.csv {MINE} --out @mount",
+            "simulate --reducer rv40e_xi2015 --speed 5250 --ramp 0.02 --duration 0.06 --step 1e-5 --torque -572 "
+            "--out @simulate",
         ),
     ),
     Case(
-        name="three",
-        files={"three.py": THREE},
-        commands=(NEW, ("check", "@three.py"), ("run", "@three.py", "--out", "@run")),
-    ),
-    Case(
-        name="bench",
-        files={},
+        name="written_stiffness",
         commands=(
-            NEW,
-            ("identify", "@mine/bench.toml", *MINE, "--out", "@identify"),
-            ("diagnose", "@mine/unit7.csv", *MINE, "--tolerances", "@mine/zones.xlsx", "--out", "@diagnose"),
-            ("mount", "@mine/parts.csv", *MINE, "--out", "@mount"),
-            (
-                "simulate",
-                "--reducer",
-                "rv40e_xi2015",
-                "--speed",
-                "5250",
-                "--ramp",
-                "0.02",
-                "--duration",
-                "0.06",
-                "--step",
-                "1e-5",
-                "--torque",
-                "-572",
-                "--out",
-                "@simulate",
-            ),
+            "new @mine --with bench",
+            f"identify @mine/bench.toml {MINE} --parameter crank_disc_bearing --parameter bias=-5:5 --prior bias=1 "
+            "--write @stiffness.toml",
+            f"te {MINE} --stiffness @stiffness.toml",
         ),
     ),
 )
@@ -183,6 +237,4 @@ SHIPPED = "shipped_{}"
 
 def shipped(study: str) -> Case:
     """Return the case of a shipped study by its file's stem."""
-    return Case(
-        name=SHIPPED.format(study), files={}, commands=(("run", f"studies/{study}.py", "--quick", "--out", "@run"),)
-    )
+    return Case(name=SHIPPED.format(study), commands=(f"run studies/{study}.py --quick --out @run",))

@@ -85,11 +85,10 @@ def _recorded(case: Case, folder: Path) -> tuple[str, dict[str, object]]:
     for name, text in case.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     prose, numbers = "", dict[str, object]()
-    for at, words in enumerate(case.commands, start=1):
+    for at, typed in enumerate(case.commands, start=1):
         before = set(folder.rglob("*"))
-        typed = [f"{folder}/{word[1:]}" if word.startswith("@") else word for word in words]
-        done = tolalloc(*typed)
-        said = f"$ tolalloc {' '.join(words)}\n{done.stdout}"
+        done = tolalloc(*(f"{folder}/{word[1:]}" if word.startswith("@") else word for word in typed.split()))
+        said = f"$ tolalloc {typed}\n{done.stdout}"
         prose += said + (f"{done.stderr}" if done.returncode else "") + f"exit {done.returncode}\n"
         for path in sorted(set(folder.rglob("*")) - before):
             name = f"{at} {path.relative_to(folder).as_posix()}"

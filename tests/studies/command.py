@@ -56,6 +56,7 @@ def _as_in_a_process(words: list[str], variables: dict[str, str]) -> Iterator[No
     try:
         with (
             mock.patch.object(sys, "argv", words),
+            mock.patch.object(sys.modules["__main__"], "__package__", None, create=True),  # help says "tolalloc"
             mock.patch.object(sys, "path", list(sys.path)),
             mock.patch.dict(os.environ, {"COLUMNS": WIDTH, **variables}),
             warnings.catch_warnings(),
