@@ -19,8 +19,8 @@ from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.reducers.model import FLANK, RADIAL
 from tolalloc.reducers.reducer.files import load_identified_stiffness
+from tolalloc.reducers.settings import FLANK, RADIAL
 
 UNITS = 1152
 

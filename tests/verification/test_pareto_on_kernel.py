@@ -19,7 +19,7 @@ from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.problem import Stack
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.reducers.model import RADIAL
+from tolalloc.reducers.settings import RADIAL
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 POPULATION = 80

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.guarantee import USUAL_YIELD
+from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
