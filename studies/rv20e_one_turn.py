@@ -17,7 +17,6 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
-from tolalloc.reducers.transmission_error import transmission_error
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 
@@ -153,8 +152,8 @@ def build(quick: bool) -> Document:  # noqa: ARG001 (one turn has nothing to sho
     reducer, table4 = load_reducer("rv20e_liu2020"), load_unit("table4")
     model = EquivalentModel(reducer)
     unit = table4.errors(model.columns, reducer.modification.deviations)
-    answer = transmission_error(reducer, table4, TORQUE, attributed=True)
-    turn = replace(answer.curve_figure, name="one_turn")
+    answer = ta.te(reducer="rv20e_liu2020", unit="table4", torque=TORQUE, attributed=True)
+    turn = replace(answer.figures["transmission_error"], name="one_turn")
     return Document(
         title="One turn of the RV-20E of liu2020's Table 4",
         subtitle=f"{TORQUE:g} N·m on the carrier unless said otherwise",
@@ -164,13 +163,13 @@ def build(quick: bool) -> Document:  # noqa: ARG001 (one turn has nothing to sho
             Section(
                 heading="Transmission error",
                 figures=(turn, kink(model, unit), directions(model, unit)),
-                tables=(("one turn", answer.turn_table),),
+                tables=(("one turn", answer.tables["one turn"]),),
             ),
             Section(heading="Contact", figures=(contact(model, unit), pin_forces(model, unit), loop(model, unit))),
             Section(
                 heading="What makes it",
                 figures=(sources(model, unit),),
-                tables=(("attribution", answer.attribution_table),),
+                tables=(("attribution", answer.tables["attribution"]),),
             ),
         ),
         assumptions=answer.assumptions,

@@ -118,7 +118,7 @@ _WHERE = {
 }
 """Public name → where it stands, with its name there if that is another one."""
 
-_INQUIRIES = ("costs",)
+_INQUIRIES = ("costs", "te")
 """Questions that need no study, asked by a function of their own name and by the command of the same."""
 
 __all__ = sorted([*_WHERE, *_INQUIRIES])

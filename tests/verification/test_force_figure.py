@@ -6,9 +6,9 @@ import pytest
 
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved
-from tolalloc.reducers.force_figure import force_figure
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reports.tellers.transmission_error import force_figure
 
 
 def test_the_highest_points_of_the_force_figure_are_the_largest_forces():

@@ -12,7 +12,6 @@ from typing import Annotated, Any, get_args, get_type_hints
 import typer
 
 from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, shown_progress, tell, write_report
-from tolalloc.cli.options import named_reducer
 from tolalloc.study.inquiry import Inquiry, Word
 
 
@@ -23,9 +22,7 @@ def inquiry_command(name: str) -> Callable[..., None]:
     def command(out: Path | None, as_json: bool, **given: Any) -> None:
         from tolalloc.reports.folder import require_usable
 
-        if "reducer" in given:
-            given["reducer"] = named_reducer(given["reducer"], out, *(given[own] for own in inquiry.written))
-        asked = inquiry(**given)
+        asked = inquiry(**given).with_reducer(out, argument="--reducer")
         require_usable(out)
         prepared = asked.prepare()
         if inquiry.kernel:

@@ -27,7 +27,6 @@ from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.series import series
 from tolalloc.cli.simulate import simulate
-from tolalloc.cli.transmission_error import te
 from tolalloc.cli.whatif import whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 
@@ -61,7 +60,7 @@ _COMMANDS = (
     series,
     compare,
     inquiry_command("costs"),
-    te,
+    inquiry_command("te"),
     contact,
     modify,
     identify,

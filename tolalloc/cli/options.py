@@ -13,9 +13,8 @@ from typer.core import TyperGroup
 from typer.models import OptionInfo
 
 from tolalloc.exceptions import InputError
-
-DEFAULT_REDUCER = "rv20e"
-"""Preset of every command that writes no file."""
+from tolalloc.study.inquiry import DEFAULT_REDUCER
+from tolalloc.study.inquiry import named_reducer as named
 
 ReducerOption = Annotated[
     str | None,
@@ -40,26 +39,8 @@ StiffnessOption = Annotated[str, typer.Option(help="Identified stiffness: shippe
 
 
 def named_reducer(reducer: str | None, *written: Path | None) -> str:
-    """Return the reducer that was asked for, the default one unless given.
-
-    No file, of those that the command was asked to write, is about a reducer that nobody named.
-
-    Raises
-    ------
-    InputError
-        A file is to be written and no reducer was given.
-    """
-    if reducer is not None:
-        return reducer
-    if any(written):
-        from tolalloc.reducers.reducer.files import PRESETS
-
-        presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
-        raise InputError(
-            f"--reducer is missing: where a file is written the reducer must be named; allowed is a preset ({presets}) "
-            "or a TOML file."
-        )
-    return DEFAULT_REDUCER
+    """Return the reducer that was asked for, the default one unless given."""
+    return named(reducer, *written, argument="--reducer")
 
 
 def saying_options(command: Callable[..., None], word: str) -> Callable[..., None]:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields
-from typing import Any, ClassVar, Generic, Literal, TypeVar, get_type_hints
+from dataclasses import MISSING, dataclass, fields, replace
+from functools import cache
+from numbers import Integral
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, get_args, get_type_hints
 
-from tolalloc.reading.named_fields import NamedFields
+from tolalloc.exceptions import InputError
+from tolalloc.reading.named_fields import NamedFields, is_number
 from tolalloc.running.progress import Progress, Silent
 from tolalloc.study.answer import Answer
 
@@ -29,6 +34,49 @@ class Word:
 
     help: str
     option: str = ""
+
+
+DEFAULT_REDUCER = "rv20e"
+"""Preset of every inquiry that writes no file."""
+ReducerName = Annotated[
+    str | None,
+    Word(f"Preset name or TOML file; {DEFAULT_REDUCER} unless given, to be given where a file is written."),
+]
+UnitName = Annotated[str, Word("Shipped unit (exact, table4 of an RV-20E) or TOML file.")]
+StiffnessName = Annotated[str, Word("Identified stiffness: shipped name or TOML file.")]
+TestTorque = Annotated[
+    float | None,
+    Word(
+        "Torque on the carrier [N·m], negative where it resists the rotation; the reducer's test torque unless given."
+    ),
+]
+RatedTorque = Annotated[
+    float | None,
+    Word("Torque on the carrier [N·m], negative where it resists the rotation; minus the rated one unless given."),
+]
+
+
+def named_reducer(reducer: str | None, *written: Path | None, argument: str = "reducer") -> str:
+    """Return the reducer that was asked for, the default one unless given.
+
+    No file, of those that are to be written, is about a reducer that nobody named.
+
+    Raises
+    ------
+    InputError
+        A file is to be written and no reducer was given; the message says the argument, or the option of a command.
+    """
+    if reducer is not None:
+        return reducer
+    if any(written):
+        from tolalloc.reducers.reducer.files import PRESETS
+
+        presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
+        raise InputError(
+            f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
+            f"({presets}) or a TOML file."
+        )
+    return DEFAULT_REDUCER
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +100,17 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
     def __init_subclass__(cls) -> None:
         cls.called = f"tolalloc {getattr(cls, 'word', cls.__name__)}"
 
+    def __post_init__(self) -> None:
+        """Take every field as what its annotation says: a path also as text, a number also as a whole one.
+
+        Raises
+        ------
+        InputError
+            A field of another kind.
+        """
+        for name, kind in _kinds(type(self)).items():
+            object.__setattr__(self, name, _taken(self.called, name, kind, getattr(self, name)))
+
     @abstractmethod
     def prepare(self) -> Prepared:
         """Return what is solved, all files read and all values checked; nothing long runs.
@@ -70,11 +129,58 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         """Write the files that it names beside the report, and return a sentence for each."""
         return ()
 
+    def with_reducer(self, *written: Path | None, argument: str = "reducer") -> Self:
+        """Return it with the default reducer if it asks for one and none is given; see `named_reducer`.
+
+        Parameters
+        ----------
+        written
+            Files that are written besides its own, such as the report.
+        argument
+            What a message calls the reducer.
+        """
+        if not any(own.name == "reducer" for own in fields(self)):
+            return self
+        files = (*written, *(getattr(self, name) for name in self.written))
+        return replace(self, reducer=named_reducer(getattr(self, "reducer"), *files, argument=argument))  # noqa: B009
+
     def ask(self, progress: Progress | None = None) -> Answer[Any]:
         """Return the answer, the files that it names written."""
-        answer = self.solve(self.prepare(), progress or Silent())
-        self.write(answer)
+        asked = self.with_reducer()
+        answer = asked.solve(asked.prepare(), progress or Silent())
+        asked.write(answer)
         return answer
+
+
+def field_of(inquiry: type[Inquiry[Any]], argument: str) -> str:
+    """Return the field from which an argument comes, which may carry its unit besides; empty if there is none."""
+    names = [own.name for own in fields(inquiry)]
+    return next((name for name in names if argument == name or argument.startswith(f"{name}_")), "")
+
+
+@cache
+def _kinds(inquiry: type[Inquiry[Any]]) -> dict[str, tuple[Any, ...]]:
+    """Return what each field may be."""
+    hints = get_type_hints(inquiry)
+    return {own.name: get_args(hints[own.name]) or (hints[own.name],) for own in fields(inquiry)}
+
+
+def _taken(place: str, name: str, kinds: tuple[Any, ...], value: Any) -> Any:
+    """Return the value of a field as one of its kinds; a kind that no command line knows is taken as it is."""
+    if value is None and type(None) in kinds:
+        return value
+    for kind, takes, make, allowed in (
+        (bool, isinstance(value, bool), bool, "True or False"),
+        (int, isinstance(value, Integral) and not isinstance(value, bool), int, "a whole number"),
+        (float, is_number(value), float, "a number"),
+        (Path, isinstance(value, str | os.PathLike), Path, "a path"),
+        (str, isinstance(value, str), str, "a text"),
+    ):
+        if kind in kinds:
+            if not takes:
+                raise InputError.of_argument(place, name, value, allowed)
+            return make(value)
+    return value
 
 
 def door(inquiry: type[Inquiry[Any]]) -> Callable[..., Answer[Any]]:
@@ -82,7 +188,13 @@ def door(inquiry: type[Inquiry[Any]]) -> Callable[..., Answer[Any]]:
 
     def ask(*given: Any, progress: Progress | None = None, **named: Any) -> Answer[Any]:
         places = [own.name for own in fields(inquiry)][: inquiry.by_position]
-        return inquiry(**dict(zip(places, given, strict=False)), **named).ask(progress)
+        try:
+            if len(given) > len(places):
+                inquiry(*given, **named)  # the record refuses it, and says which field stands without its name
+            return inquiry(**dict(zip(places, given, strict=False)), **named).ask(progress)
+        except InputError as error:
+            field = field_of(inquiry, error.argument) if error.argument else ""
+            raise (error.as_option(f"ta.{inquiry.word}", field) if field else error) from None
 
     hints = get_type_hints(inquiry)
     empty = inspect.Parameter.empty
