@@ -51,7 +51,7 @@ def undercut(answer: AllocationAnswer) -> bool:
     What fresh units judged after its search, and did not confirm, is not verified.
     """
     tried = (*answer.free.tried, *(answer.graded.tried if answer.graded else ()))
-    refused = [own.design for own in tried if own.confirming is not None and not own.met]
+    refused = [own.design for own in tried if own.independent is not None and not own.met]
     found = [(answer.bound, own) for own in answer.candidates.admitted().values()]
     found += [(answer.free.bound, own) for own in answer.free.tried]
     if answer.graded:

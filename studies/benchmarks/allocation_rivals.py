@@ -65,7 +65,7 @@ class Compared:
                 raise TypeError(f"{own.output}: units do not show {own.guarantee.words}")
             of_output = values[:, outputs.index(own.output)]
             sample = LimitedSample(values=of_output, units=units, limits=own.limits)
-            for level in own.guarantee.levels(sample, _EVEN_ODDS):
+            for level in own.guarantee.bounds(sample, _EVEN_ODDS):
                 excess = max(excess, level.excess / abs(level.limit))
         return float(excess)
 

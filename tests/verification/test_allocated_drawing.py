@@ -146,11 +146,11 @@ def priced(tmp_path_factory):
         questions=(ta.Allocation(),),
     )
     chosen = results.free.chosen
-    first, (side,) = chosen.checks[0], chosen.checks[1].sides
+    first, (side,) = chosen.checks[0], chosen.checks[1].constraints
     root_sum_square = side.stack.root_sum_square
     more = float(root_sum_square @ chosen.design[:-2])
     stack = replace(side.stack, worst_case=root_sum_square, budget=side.stack.budget + more)
-    checks = (first, replace(chosen.checks[1], sides=(replace(side, stack=stack),)))
+    checks = (first, replace(chosen.checks[1], constraints=(replace(side, stack=stack),)))
     return replace(results, free=replace(results.free, chosen=replace(chosen, checks=checks)))
 
 
@@ -162,7 +162,7 @@ def drawn(request, tmp_path_factory):
 
 
 def cost_cell(results):
-    return f"D{2 + len(results.chosen.sides)}"
+    return f"D{2 + len(results.chosen.constraints)}"
 
 
 def scaled(results, workbook, position, factor):
@@ -178,7 +178,7 @@ def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
     results, folder = drawn
     workbook = Workbook(folder / "drawing.xlsx")
     assert workbook.value("requirements", cost_cell(results)) == pytest.approx(results.chosen.cost)
-    for row, side in enumerate(results.chosen.sides, start=2):
+    for row, side in enumerate(results.chosen.constraints, start=2):
         assert workbook.value("requirements", f"A{row}") == side.stack.name
         told = workbook.value("requirements", f"D{row}")
         assert told == pytest.approx(side.limit + side.sign * side.predicted(results.chosen.design))
@@ -205,7 +205,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
         design = scaled(results, workbook, position, factor)
         cost = space.problem(()).cost(design[:-2], made) + space.locked_cost
         assert workbook.value("requirements", cost_cell(results)) == pytest.approx(cost)
-        for row, side in enumerate(results.chosen.sides, start=2):
+        for row, side in enumerate(results.chosen.constraints, start=2):
             told = workbook.value("requirements", f"D{row}")
             assert told == pytest.approx(
                 side.limit + side.sign * (side.predicted(design) + relief(results, side, design))
@@ -227,7 +227,7 @@ def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
         for cell in row
         if isinstance(cell.value, str) and cell.value.startswith("=")
     ]
-    sides = len(results.chosen.sides)
+    sides = len(results.chosen.constraints)
     assert len(formulas) == 4 * len(results.drawn.groups) + 2 * sides + 1 + 3 * sides + 1
     assert not any("np." in formula or "e-" in formula or "nan" in formula for formula in formulas)
     zones = sheets["drawing"]

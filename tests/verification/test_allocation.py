@@ -16,7 +16,7 @@ from tolalloc.allocation.front.pareto_front import exact_front
 from tolalloc.allocation.search.zone_allocation import Programs, aimed, allocate, kept_stacks, scale_in_proportion
 from tolalloc.allocation.space.constraint import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.space.effort import SearchEffort
-from tolalloc.allocation.space.output_sample import OutputTrial
+from tolalloc.allocation.space.output_sample import OutputSample
 from tolalloc.allocation.space.requirement import AtCpk, AtYield, Requirement, WorstCase
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
@@ -44,7 +44,7 @@ def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int =
     )
 
 
-class KnownTrial(OutputTrial):
+class KnownSample(OutputSample):
     """A trial whose values are known."""
 
     design, groups, failed, confidence, law = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95, None
@@ -98,7 +98,7 @@ def test_at_a_yield_met_is_what_clopper_and_pearson_say(limits):
     for seed in range(60):
         values = np.random.default_rng(seed).standard_normal(1500)
         check = Requirement(output="x [mm]", limits=limits, guarantee=guarantee).check(
-            KnownTrial(values, failed=seed % 3)
+            KnownSample(values, failed=seed % 3)
         )
         rejected = limits.outside(values) + seed % 3
         assert check.met == (proportion(1500 + seed % 3, rejected).bound >= 0.995)
@@ -109,10 +109,10 @@ def test_at_a_yield_met_is_what_clopper_and_pearson_say(limits):
 
 def test_too_many_failed_units_never_show_a_yield():
     check = Requirement(output="x [mm]", limits=Limits(upper=1e9), guarantee=AtYield(target=0.995)).check(
-        KnownTrial(np.arange(1500.0), failed=12)
+        KnownSample(np.arange(1500.0), failed=12)
     )
     assert not check.met
-    assert np.isfinite(check.sides[0].stack.budget)
+    assert np.isfinite(check.constraints[0].stack.budget)
 
 
 def test_too_few_units_for_a_yield_are_refused(prepared):
@@ -125,7 +125,7 @@ def test_the_error_of_an_order_statistic_is_that_of_many_samples():
     """5,000 samples of 400: their standard deviation is known to 1 %, the bootstrap's mean to about 2 %."""
     samples = np.random.default_rng(1).standard_normal((5000, 400))
     requirement = Requirement(output="x [mm]", limits=Limits(upper=3.0), guarantee=AtYield(target=0.95))
-    sides = [requirement.check(KnownTrial(values)).sides[0] for values in samples[:300]]
+    sides = [requirement.check(KnownSample(values)).constraints[0] for values in samples[:300]]
     rank = int(np.sum(samples[0] <= sides[0].value))
     true = np.sort(samples, axis=1)[:, rank - 1].std()
     assert np.mean([side.standard_error for side in sides]) == pytest.approx(true, rel=0.1)
@@ -142,7 +142,7 @@ def test_a_cpk_just_at_its_target_is_shown_in_five_percent_of_samples(lean):
     assert not lean or kurtosis(values, axis=None) > 0.5
     limits = Limits(upper=float(mean + 3 * target * deviation))
     requirement = Requirement(output="x [mm]", limits=limits, guarantee=AtCpk(target=target))
-    shown = np.mean([requirement.check(KnownTrial(sample)).met for sample in values])
+    shown = np.mean([requirement.check(KnownSample(sample)).met for sample in values])
     assert shown == pytest.approx(0.05, abs=4 * 0.005 + 0.01)
 
 
@@ -150,7 +150,7 @@ def test_a_cpk_of_a_normal_sample_has_bissells_bound():
     """z·√(1/9n + Cpk²/2n) at 100,000 units, where skewness and kurtosis are uncertain by less than 2 % of it."""
     values = np.random.default_rng(5).standard_normal(100_000)
     limits = Limits(lower=-4.0, upper=4.5)
-    sides = AtCpk(target=1.0).judge(KnownTrial(values), limits)
+    sides = AtCpk(target=1.0).constraints(KnownSample(values), limits)
     for side in sides:
         needed = (side.sign * (side.value - values.mean())) / (3 * values.std(ddof=1))
         assert needed - 1 == pytest.approx(norm.ppf(0.95) * np.sqrt((1 / 9 + needed**2 / 2) / values.size), rel=0.05)
@@ -159,7 +159,7 @@ def test_a_cpk_of_a_normal_sample_has_bissells_bound():
 def test_the_bound_of_a_cpk_knows_which_way_a_sample_leans():
     """(c − target)²·n = z²·(1/9 + c·γ/3 + c²·(κ − 1)/4) with the skewness towards each limit."""
     values, target = np.random.default_rng(6).gumbel(size=3000), 1.1
-    for side in AtCpk(target=target).judge(KnownTrial(values), Limits(lower=-40.0, upper=40.0)):
+    for side in AtCpk(target=target).constraints(KnownSample(values), Limits(lower=-40.0, upper=40.0)):
         turned = side.sign * values
         needed = (side.sign * side.value - turned.mean()) / (3 * values.std(ddof=1))
         variance = 1 / 9 + needed * skew(turned) / 3 + needed**2 * (kurtosis(values, fisher=False) - 1) / 4
@@ -168,23 +168,23 @@ def test_the_bound_of_a_cpk_knows_which_way_a_sample_leans():
 
 def test_at_even_odds_a_guarantee_is_that_of_the_sample_itself():
     values, target = np.random.default_rng(7).standard_normal(1152), 0.9973
-    (shown,) = AtYield(target=target).judge(KnownTrial(values, confidence=0.95), Limits(upper=3.0))
-    (even,) = AtYield(target=target).judge(KnownTrial(values, confidence=0.5), Limits(upper=3.0))
+    (shown,) = AtYield(target=target).constraints(KnownSample(values, confidence=0.95), Limits(upper=3.0))
+    (even,) = AtYield(target=target).constraints(KnownSample(values, confidence=0.5), Limits(upper=3.0))
     assert shown.value == values.max()  # none of 1,152 may lie beyond
     assert even.value == np.sort(values)[-3]  # 3.1 of 1,152 do so on average
-    (cpk,) = AtCpk(target=1.2).judge(KnownTrial(values, confidence=0.5), Limits(upper=3.0))
+    (cpk,) = AtCpk(target=1.2).constraints(KnownSample(values, confidence=0.5), Limits(upper=3.0))
     assert cpk.value == pytest.approx(values.mean() + 3.6 * values.std(ddof=1), rel=1e-12)
     assert cpk.standard_error > 0
 
 
 def test_a_worst_case_adds_and_a_lower_limit_turns_it():
     requirement = Requirement(output="x [mm]", limits=Limits(lower=-5.0, upper=9.0), guarantee=WorstCase())
-    check = requirement.check(KnownTrial(np.zeros(3)))
-    upper, lower = check.sides
+    check = requirement.check(KnownSample(np.zeros(3)))
+    upper, lower = check.constraints
     assert (upper.excess, lower.excess) == (-2.0, 2.0)
     assert check.slack == -2.0
-    for side in check.sides:
-        assert side.predicted(KnownTrial(np.zeros(3)).design) == pytest.approx(side.excess)
+    for side in check.constraints:
+        assert side.predicted(KnownSample(np.zeros(3)).design) == pytest.approx(side.excess)
         np.testing.assert_allclose(side.stack.worst_case, [2.0, 1.5])
         np.testing.assert_allclose(side.stack.slopes, [0.5, -0.25])
 
@@ -242,7 +242,7 @@ def test_gradient_of_the_quantile_agrees_with_common_random_numbers(prepared):
     verifier = replace(verifier, requirements=(replace(verifier.requirements[0], guarantee=AtYield(target=0.95)),))
     design = space.uniform(0.6)
     here = verifier.verify(design, "gradient")
-    stack = here.sides[0].stack
+    stack = here.constraints[0].stack
     gradient = np.append(stack.root_sum_square**2 * design[:-2], stack.slopes)
     gradient[:-2] /= np.sqrt((stack.root_sum_square**2 * design[:-2] ** 2).sum())
     checked, differences = np.r_[0 : design.size - 2 : 3, design.size - 2, design.size - 1], []
@@ -277,13 +277,13 @@ def test_the_joint_yield_is_that_of_all_limits(three):
     kept &= (found.outputs[RADIAL] >= 2) & (found.outputs[RADIAL] <= 30)
     assert found.joint.rejected == np.count_nonzero(~kept)
     assert found.joint.estimate <= found.achieved.estimate
-    assert [side.sign for side in found.sides] == [1, 1, 1, -1]
+    assert [side.sign for side in found.constraints] == [1, 1, 1, -1]
 
 
 @pytest.mark.slow
 def test_a_clearance_moves_the_radial_clearance_one_to_one(three):
     _, found = three
-    upper, lower = found.sides[2:]
+    upper, lower = found.constraints[2:]
     np.testing.assert_allclose(upper.stack.slopes, [0.0, 1.0], atol=1e-6)
     np.testing.assert_allclose(lower.stack.slopes, [0.0, -1.0], atol=1e-6)
 
@@ -293,7 +293,7 @@ def test_a_requirement_more_changes_no_number_of_the_peak_to_peak(three, prepare
     verifier, found = three
     alone = replace(verifier, requirements=verifier.requirements[:1]).verify(found.design, "three")
     np.testing.assert_array_equal(alone.sample.values, found.sample.values)
-    assert alone.sides[0].value == found.sides[0].value
+    assert alone.constraints[0].value == found.constraints[0].value
 
 
 @pytest.mark.slow
@@ -336,9 +336,9 @@ def test_no_random_unit_is_worse_than_the_worst_case(prepared):
     verifier = verifier_of(prepared, requirement)
     verifier = replace(verifier, requirements=(replace(verifier.requirements[0], guarantee=WorstCase()), requirement))
     found = verifier.verify(prepared.space.uniform(0.5), "worst")
-    assert found.sides[0].value > found.outputs[PEAK_TO_PEAK].max()
-    assert found.sides[1].value < found.outputs[RADIAL].min()
-    for side in found.sides:
+    assert found.constraints[0].value > found.outputs[PEAK_TO_PEAK].max()
+    assert found.constraints[1].value < found.outputs[RADIAL].min()
+    for side in found.constraints:
         assert side.predicted(found.design) == pytest.approx(side.excess)
         assert (side.stack.root_sum_square == 0).all()
         assert (side.stack.worst_case > 0).any()

@@ -83,8 +83,8 @@ def costing(allocation: ZoneAllocation, cost: float) -> ZoneAllocation:
 def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
     """Return an allocation whose design keeps so much more than its limit."""
     first, *others = allocation.chosen.checks
-    side = replace(first.sides[0], value=first.sides[0].limit + beyond)
-    chosen = replace(allocation.chosen, checks=(replace(first, sides=(side,)), *others), confirmed=False)
+    side = replace(first.constraints[0], value=first.constraints[0].limit + beyond)
+    chosen = replace(allocation.chosen, checks=(replace(first, constraints=(side,)), *others), accepted=False)
     return replace(allocation, chosen=chosen)
 
 
@@ -217,7 +217,7 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
 
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
-    side = results.free.chosen.sides[0]
+    side = results.free.chosen.constraints[0]
     assert tables.limit_price(side, 0.9) == (0.9, "arcsec")
     assert tables.limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
     price = results.free.prices[side.stack.name]
@@ -276,7 +276,9 @@ def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched
     assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
-    assert front.series[0].label == f"cheapest by the local models (±{results.chosen.sides[0].standard_error:.2g}″)"
+    assert (
+        front.series[0].label == f"cheapest by the local models (±{results.chosen.constraints[0].standard_error:.2g}″)"
+    )
 
 
 def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_first_page(results):

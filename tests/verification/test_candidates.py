@@ -39,12 +39,12 @@ def at_cost(design: VerifiedDesign, cost: float) -> VerifiedDesign:
 
 def confirming(allocation: ZoneAllocation) -> ZoneAllocation:
     """Return an allocation whose design was confirmed."""
-    return replace(allocation, chosen=replace(allocation.chosen, confirmed=True))
+    return replace(allocation, chosen=replace(allocation.chosen, accepted=True))
 
 
 def with_table(answer: AllocationAnswer, cost: float) -> AllocationAnswer:
     """Return the answer with a table that keeps the limits at a cost."""
-    table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost, confirmed=True)
+    table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost, accepted=True)
     alike = answer.free.proportional_tried[1:]
     return replace(answer, free=replace(answer.free, proportional_tried=(table, *alike)))
 
@@ -95,8 +95,8 @@ def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
 
 def test_a_miss_is_titled_so(graded):
     (check,) = graded.chosen.checks
-    far = tuple(replace(side, value=side.limit + side.sign * 1.0) for side in check.sides)
-    lost = replace(graded.graded.chosen, checks=(replace(check, sides=far),), confirmed=False)
+    far = tuple(replace(side, value=side.limit + side.sign * 1.0) for side in check.constraints)
+    lost = replace(graded.graded.chosen, checks=(replace(check, constraints=far),), accepted=False)
     answer = replace(graded, graded=replace(graded.graded, chosen=lost))
     table = replace(answer.free.baseline, checks=lost.checks)
     answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))

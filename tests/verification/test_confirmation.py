@@ -13,7 +13,7 @@ from scipy.stats import binom, norm
 import tolalloc as ta
 from tolalloc.allocation.search.candidates import _still_kept
 from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, Judge, confidence_of_fewer, confirm
+from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, AcceptanceTest, accept_cheapest, confidence_of_fewer
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree
@@ -52,8 +52,8 @@ def designed(study: Prepared) -> VerifiedDesign:
     return own.verify(space.uniform(1.0), "table")
 
 
-def judge_of(study: Prepared, seed: int, units: int = UNITS) -> Judge:
-    return Judge(model=study.model, seeds=SeedTree(seed), units=units, error=ERROR)
+def acceptance_test_of(study: Prepared, seed: int, units: int = UNITS) -> AcceptanceTest:
+    return AcceptanceTest(model=study.model, seeds=SeedTree(seed), units=units, error=ERROR)
 
 
 def at(share: float) -> float:
@@ -84,11 +84,13 @@ def test_of_designs_just_at_their_limit_no_more_than_the_stated_error_are_drawn(
         return kind, replace(design, cost=float(next(costs)))
 
     answers = [
-        confirm(judge_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another, GAIN)
+        accept_cheapest(
+            acceptance_test_of(study, seed), {"table": design, "other": replace(design, cost=5.0)}, another, GAIN
+        )
         for seed in range(ANSWERS)
     ]
     drawn = sum(found.drawn is not None for found in answers)
-    assert max(len(found.judged) for found in answers) == ATTEMPTS
+    assert max(len(found.tested) for found in answers) == ATTEMPTS
     assert drawn <= ERROR * ANSWERS + 3 * np.sqrt(ERROR * (1 - ERROR) * ANSWERS)
     assert drawn > 0
 
@@ -103,9 +105,11 @@ def test_a_confirmed_design_gives_its_error_back_and_no_more_answers_are_wrong()
     def another(kind, judged, attempt, worth):
         return kind, replace(at_limit, cost=10.0 - attempt.number)
 
-    answers = [confirm(judge_of(study, seed), {"inside": inside}, another, GAIN) for seed in range(ANSWERS)]
-    assert all(found.judged[0][1].confirmed for found in answers)
-    second = {found.judged[1][1].confidence for found in answers if found.judged[1][1].confirmed}
+    answers = [
+        accept_cheapest(acceptance_test_of(study, seed), {"inside": inside}, another, GAIN) for seed in range(ANSWERS)
+    ]
+    assert all(found.tested[0][1].accepted for found in answers)
+    second = {found.tested[1][1].confidence for found in answers if found.tested[1][1].accepted}
     assert second == {1 - FIRST.error(ERROR)}
     wrong = sum(found.drawn[1].cost < inside.cost for found in answers)
     assert 0 < wrong <= ERROR * ANSWERS + 3 * np.sqrt(ERROR * (1 - ERROR) * ANSWERS)
@@ -115,7 +119,7 @@ def test_the_errors_of_designs_that_are_not_confirmed_add_up_to_less_than_the_on
     attempt, spent = FIRST, []
     for confirmed in (False, True, True, False, False, False):
         spent.append(0.0 if confirmed else attempt.error(ERROR))
-        attempt = attempt.after(confirmed=confirmed)
+        attempt = attempt.after(accepted=confirmed)
     assert 0.99 * ERROR < sum(spent) < ERROR
     assert (attempt.number, attempt.missed) == (7, 4)
 
@@ -123,15 +127,15 @@ def test_the_errors_of_designs_that_are_not_confirmed_add_up_to_less_than_the_on
 def test_a_design_well_inside_is_confirmed_and_one_far_beyond_given_up_early():
     inside = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
     beyond = prepared({GAP: ta.Limit(upper=at(0.85), show=SHOWN)})
-    found, lost = (judge_of(study, 1).judge(designed(study), FIRST) for study in (inside, beyond))
-    assert (found.confirmed, lost.confirmed) == (True, False)
+    found, lost = (acceptance_test_of(study, 1).run(designed(study), FIRST) for study in (inside, beyond))
+    assert (found.accepted, lost.accepted) == (True, False)
     # Few units are near the wide limit, so as many are drawn as may be; a quarter of all finds the other one hopeless.
     assert found.achieved.units == 8 * UNITS
     assert (len(found.sample.redraw()), len(lost.sample.redraw())) == (308, 77)
     assert found.confidence == 1 - FIRST.error(ERROR)
     assert lost.confidence == confidence_of_fewer(found.confidence, 77, 308)
     assert lost.confidence == pytest.approx(norm.cdf(norm.ppf(found.confidence) / 2))
-    for side in (*found.sides, *lost.sides):
+    for side in (*found.constraints, *lost.constraints):
         assert side.predicted(found.design) == pytest.approx(side.excess)
 
 
@@ -142,7 +146,9 @@ def test_with_the_full_effort_designs_two_percent_inside_are_confirmed_in_most_c
     limit = at(target) / 0.98
     study = prepared({GAP: ta.Limit(upper=limit, show=ta.AtYield(target))})
     design = designed(study)
-    confirmed = [judge_of(study, seed, effort.confirmation_units).judge(design, FIRST).confirmed for seed in range(100)]
+    confirmed = [
+        acceptance_test_of(study, seed, effort.confirmation_units).run(design, FIRST).accepted for seed in range(100)
+    ]
     assert np.mean(confirmed) > 0.8
 
 
@@ -154,14 +160,16 @@ def test_after_a_confirmed_design_cheaper_ones_are_tried_and_a_miss_costs_nothin
     asked = []
 
     def cheaper(kind, judged, attempt, worth):
-        asked.append((judged.confirmed, worth / design.cost))
+        asked.append((judged.accepted, worth / design.cost))
         following = {2: beyond, 3: between}.get(attempt.number)
         return (kind, following) if following else None
 
-    found = confirm(judge_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper, GAIN)
-    assert [(kind, own.confirmed) for kind, own in found.judged] == [("table", True), ("table", False), ("table", True)]
-    assert found.drawn == found.judged[2]
-    assert found.last("table") is found.judged[2][1]
+    found = accept_cheapest(
+        acceptance_test_of(study, 1), {"table": design, "dearer": replace(design, cost=9.0)}, cheaper, GAIN
+    )
+    assert [(kind, own.accepted) for kind, own in found.tested] == [("table", True), ("table", False), ("table", True)]
+    assert found.drawn == found.tested[2]
+    assert found.last("table") is found.tested[2][1]
     assert asked == [(True, 1 - GAIN), (False, 1 - GAIN), (True, pytest.approx(0.9 * (1 - GAIN)))]
 
 
@@ -183,7 +191,7 @@ def test_a_joint_requirement_judges_what_all_limits_together_do():
     np.testing.assert_array_equal(joint.read(design.outputs) <= 0, kept)
     assert design.joint.rejected == np.count_nonzero(~kept)
     assert [check.requirement.guarantee.target for check in design.checks] == [0.95] * 3
-    (side,) = design.checks[-1].sides
+    (side,) = design.checks[-1].constraints
     assert (side.excess <= 0) == (design.joint.rejected <= allowed_rejections(1200, 0.95))
     step, own = 1e-4, study.space
     ends = []
@@ -246,6 +254,6 @@ def test_after_a_miss_a_design_counts_that_stays_inside_with_what_the_missed_one
     assert (inside.met, wider.met) == (True, False)
     assert _still_kept((inside, wider, cheap), cheap) == (inside,)  # and never the judged one again
     # What a judged one says with a small error, that all near it lie far beyond the limit, counts more.
-    (side,) = cheap.sides
+    (side,) = cheap.constraints
     beyond = replace(side, stack=replace(side.stack, budget=side.stack.budget - 100.0), standard_error=1e-6)
-    assert not _still_kept((inside,), replace(cheap, checks=(replace(cheap.checks[0], sides=(beyond,)),)))
+    assert not _still_kept((inside,), replace(cheap, checks=(replace(cheap.checks[0], constraints=(beyond,)),)))

@@ -172,7 +172,7 @@ def test_a_changed_zone_moves_cost_and_limits_as_the_model_does(answer, folder, 
     design = answer.chosen.design.copy()
     design[:groups] *= 1.03
     assert rows["cost [cost units]"][3] == pytest.approx(float(space.cost(design)), rel=1e-6)
-    for side in answer.chosen.sides:
+    for side in answer.chosen.constraints:
         predicted = side.limit + side.sign * float(side.predicted(design))
         assert rows[side.stack.name][3] == pytest.approx(predicted, abs=2e-5)
         assert rows[side.stack.name][4] == ("yes" if side.sign * (predicted - side.limit) <= 0 else "no")

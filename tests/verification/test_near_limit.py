@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.stats import multinomial
 
-from tests.verification.test_confirmation import GAP, SHOWN, TARGET, at, designed, judge_of, prepared
-from tolalloc.allocation.verify import acceptance
+from tests.verification.test_confirmation import GAP, SHOWN, TARGET, acceptance_test_of, at, designed, prepared
+from tolalloc.allocation.verify import independent_sample
 from tolalloc.allocation.verify.acceptance import FIRST
-from tolalloc.allocation.verify.screen import Screen
+from tolalloc.allocation.verify.independent_sample import Screen
 from tolalloc.capability.monte_carlo import allowed_rejections, proportion
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 
@@ -68,10 +68,15 @@ def test_what_is_left_out_is_what_lies_furthest_beyond_the_limit(generator):
     assert SolvedUnits.all_of(20).kept_excess(excess[:20], 0.9973, 0.95) == np.inf
 
 
+def screen_of(design):
+    requirements = tuple(check.requirement for check in design.checks)
+    return Screen.through(requirements, design.outputs, design.sample.redraw)
+
+
 def test_a_screen_calls_those_near_that_lie_beyond_the_limit():
     study = prepared({GAP: ta.Limit(upper=at(0.99), show=ta.AtYield(0.99))})
     design = designed(study)
-    screen = Screen.of(design)
+    screen = screen_of(design)
     assert screen is not None
     x = np.random.default_rng(2).standard_normal((4000, 2)) * design.sample.redraw().std(axis=0)
     beyond = study.model.reading((GAP,))(x).values[:, 0] > at(0.99)
@@ -85,10 +90,10 @@ def test_a_screen_that_knows_nothing_fools_nobody(call, monkeypatch):
     """Of 400 designs just at the limit, each judged once; three standard errors of room."""
     study = prepared({GAP: ta.Limit(upper=at(TARGET), show=SHOWN)})
     design, share = designed(study), 0.001 if call == "nothing near" else 0.1
-    blind = replace(Screen.of(design), share=share)
+    blind = replace(screen_of(design), share=share)
     called = (lambda x: np.zeros(len(x), bool)) if call == "nothing near" else (lambda x: (x[:, 1] * 1e7) % 1 < share)
-    monkeypatch.setattr(acceptance.Screen, "of", lambda _: blind)
-    monkeypatch.setattr(acceptance.Screen, "__call__", lambda _, x: called(x))
-    confirmed = sum(judge_of(study, seed).judge(design, FIRST).confirmed for seed in range(400))
+    monkeypatch.setattr(independent_sample.Screen, "through", lambda *_: blind)
+    monkeypatch.setattr(independent_sample.Screen, "__call__", lambda _, x: called(x))
+    confirmed = sum(acceptance_test_of(study, seed).run(design, FIRST).accepted for seed in range(400))
     error = FIRST.error(0.05)
     assert confirmed <= 400 * error + 3 * np.sqrt(400 * error * (1 - error))

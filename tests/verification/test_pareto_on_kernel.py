@@ -10,11 +10,11 @@ import pytest
 
 from tests.prepared import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
-from tolalloc.allocation.front.checkpoint import Checkpoint, RememberedResponse
+from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import pareto_front
 from tolalloc.allocation.front.pareto_problem import DesignProblem, nondominated
 from tolalloc.allocation.front.trade import QuantileResponse
-from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.problem import Stack
 from tolalloc.drawings.seeds import SeedTree
@@ -82,8 +82,8 @@ def test_other_requirements_are_violated_by_what_their_models_say(prepared, quan
         budget=2.0,
         slopes=np.array([0.0, 0.1]),
     )
-    side = Side(sign=1, limit=0.5, value=0.4, standard_error=0.01, scale=0.5, stack=stack)
-    problem = DesignProblem(space=space, quantile=quantile, large=(RADIAL,), sides=(side,))
+    side = OneSidedConstraint(sign=1, limit=0.5, value=0.4, standard_error=0.01, scale=0.5, stack=stack)
+    problem = DesignProblem(space=space, quantile=quantile, large=(RADIAL,), others=(side,))
     answers = problem(problem.genes_of(design[np.newaxis]))
     assert problem.constraints == ("lost motion",)
     assert answers.values[0, 0] == pytest.approx(space.cost(design[np.newaxis])[0])
@@ -102,7 +102,7 @@ EFFORT = FrontEffort(
 
 
 def kernel_front(prepared, quantile, checkpoint=None, **options):
-    space, kernel = prepared.space, RememberedResponse(quantile, checkpoint)
+    space, kernel = prepared.space, CachedResponse(quantile, checkpoint)
     unit = np.random.default_rng(1).random((14, space.lower.size))
     designs = space.lower * (space.upper / space.lower) ** unit
     return pareto_front(space, kernel, rough, 1.0, designs[:10], designs[10:], SeedTree(4), EFFORT, **options)
@@ -135,8 +135,8 @@ def test_the_front_on_the_kernel_goes_on_from_its_checkpoint_with_the_same_bits(
     resumed, _ = kernel_front(prepared, quantile, checkpoint=checkpoint)
     for name in ("designs", "cost", "quantile", "on_kernel"):
         np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
-    remembered = RememberedResponse(quantile, checkpoint)
-    assert remembered.outputs == quantile.outputs
+    cached = CachedResponse(quantile, checkpoint)
+    assert cached.outputs == quantile.outputs
 
 
 @pytest.mark.slow

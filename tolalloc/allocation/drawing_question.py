@@ -12,11 +12,11 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
-from tolalloc.allocation.front.checkpoint import Checkpoint, RememberedResponse
+from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
 from tolalloc.allocation.front.robustness import Robustness, robustness
 from tolalloc.allocation.front.trade import QuantileResponse, SettingTrade, cost_at_yield, setting_trade
-from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextDesign
+from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import (
     GradedAllocation,
     allocate_grades,
@@ -33,8 +33,14 @@ from tolalloc.allocation.search.zone_allocation import (
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.requirement import Requirement
-from tolalloc.allocation.verify.acceptance import AS_GOOD_AS, FIRST, Judge, confidence_of_fewer, confirm
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.allocation.verify.acceptance import (
+    AS_GOOD_AS,
+    FIRST,
+    AcceptanceTest,
+    accept_cheapest,
+    confidence_of_fewer,
+)
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
@@ -161,7 +167,7 @@ class DrawingQuestion:
         found = [allocate_grades(self.verifier("graded", self.space), free.chosen, steps)]
         if fixed and self.space.holds_present_settings:
             found.append(allocate_grades(self.verifier("graded alone", self.space.fixed), fixed.chosen, steps))
-        best = answer(tuple(own.chosen for own in found))
+        best = cheapest_met(tuple(own.chosen for own in found))
         return next(own for own in found if own.chosen is best)
 
     def beside_grades(self, free: ZoneAllocation, graded: GradedAllocation) -> ZoneAllocation:
@@ -174,9 +180,9 @@ class DrawingQuestion:
             return found
         return found.with_chosen(graded.chosen, (graded.chosen,))
 
-    def confirmed(self, found: Candidates) -> Candidates:
-        """Return what the searches found with the drawing that fresh units confirm."""
-        judge = Judge(
+    def accepted(self, found: Candidates) -> Candidates:
+        """Return what the searches found with the cheapest drawing that an acceptance test passes."""
+        test = AcceptanceTest(
             model=self.model,
             seeds=self.seeds("confirmation"),
             units=self.effort.confirmation_units,
@@ -188,15 +194,15 @@ class DrawingQuestion:
         promising = {name: own for name, own in admitted.items() if own.met} or {
             name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
         }
-        following = NextDesign(
+        next_candidate = NextCandidate(
             found=found,
-            judge=judge,
+            test=test,
             drawn=self.model.drawn_amounts,
             space=self.space,
             verifier=partial(self.verifier, "confirmation"),
         )
-        result = confirm(judge, promising, following, self.effort.gain)
-        return found.with_confirmed(result, self.model.drawn_amounts)
+        result = accept_cheapest(test, promising, next_candidate, self.effort.gain)
+        return found.with_acceptance(result, self.model.drawn_amounts)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -214,11 +220,11 @@ class DrawingQuestion:
         space, ladders = (graded.space, graded.scales) if graded else (self.space, {})
         effort = self.effort.search.front
         # Where the limit is out of reach, the front lies around what is kept instead.
-        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.sides[0].limit)
+        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.constraints[0].limit)
         stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
-        exact = exact_front(space, stacks, around * drawn.sides[0].limit, shares)
+        exact = exact_front(space, stacks, around * drawn.constraints[0].limit, shares)
         # The searches begin with the same designs, and share what the kernel says of them.
-        kernel = RememberedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
+        kernel = CachedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
         further = [()] if not space.settings else [(), (space.settings[-1].name,)]
         searched = [
             searched_front(space, kernel, drawn, stacks, exact, self.seeds("front"), effort, ladders, own)
@@ -310,7 +316,7 @@ def allocate_drawing(
             with record.stage("grades"):
                 graded = question.graded(free, fixed)
         with record.stage("confirmation"):
-            found = question.confirmed(Candidates(fixed=fixed, free=free, graded=graded))
+            found = question.accepted(Candidates(fixed=fixed, free=free, graded=graded))
             fixed, free, graded = found.fixed, found.free, found.graded
         if graded:
             with record.stage("free zones beside grades"):

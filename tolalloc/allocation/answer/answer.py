@@ -132,7 +132,7 @@ class AllocationAnswer(Answer):
     @property
     def met(self) -> bool:
         """Whether fresh units that no search has seen show every requirement to be kept, with the stated error."""
-        return self.chosen.confirmed
+        return self.chosen.accepted
 
     @property
     def cost(self) -> float:

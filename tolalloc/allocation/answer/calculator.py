@@ -22,7 +22,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
-from tolalloc.allocation.space.constraint import Side as LimitedSide
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.currency import in_currency
 from tolalloc.reports.excel import Formula, keep_values
@@ -88,7 +88,7 @@ def _drawing(answer: AllocationAnswer) -> pd.DataFrame:
             "datum": [" ".join(own.datums) for own in callouts],
         }
     )
-    for side in chosen.sides:
+    for side in chosen.constraints:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + _relief(
             side
         )
@@ -96,7 +96,7 @@ def _drawing(answer: AllocationAnswer) -> pd.DataFrame:
     return table
 
 
-def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
+def _relief(side: OneSidedConstraint) -> Float[np.ndarray, " group"]:
     """Return by how much a larger zone relieves a limit, 0 or below, which no model of a search rewards.
 
     Per scale and to first order [unit of the output]; a smaller zone then costs as much.
@@ -109,7 +109,7 @@ def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
 
 def _without_weight(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
-    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in answer.chosen.sides], axis=0)
+    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in answer.chosen.constraints], axis=0)
     names = [group for group, weight in zip(answer.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
     if not names:
         return ()
@@ -129,7 +129,7 @@ def _requirements(answer: AllocationAnswer) -> pd.DataFrame:
     space, chosen = answer.drawn, answer.chosen
     first, last = _FIRST, _FIRST + len(space.groups) - 1
     scales, watched = f"drawing!$D${first}:$D${last}", []
-    for at, side in enumerate(chosen.sides):
+    for at, side in enumerate(chosen.constraints):
         adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
         load = (
             f"SUMPRODUCT(drawing!${adds}${first}:${adds}${last},{scales})"

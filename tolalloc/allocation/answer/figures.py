@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def front_figure(answer: AllocationAnswer, fronts: Fronts) -> Figure:
     """Return cost against what is kept of the leading output."""
     limit, unit = answer.free.limit, unit_of(answer.leading)
-    error = with_unit(f"{answer.chosen.sides[0].standard_error:.2g}", answer.leading)
+    error = with_unit(f"{answer.chosen.constraints[0].standard_error:.2g}", answer.leading)
     guarantee = answer.requirements[0].guarantee
     by = f" by {guarantee.target:.2%} of units" if isinstance(guarantee, AtYield) else ""
     searched, exact = fronts.searched, fronts.exact

@@ -172,14 +172,15 @@ def _quantiles(answer: AllocationAnswer) -> tuple[str, ...]:
     for check in answer.chosen.checks:
         kept, value, guarantee = (
             tables.unit_quantile(answer.chosen, check),
-            check.sides[0].value,
+            check.constraints[0].value,
             check.requirement.guarantee,
         )
         if isinstance(guarantee, AtYield) and np.isfinite(kept) and np.isfinite(value):
             unit = unit_of(check.requirement.output)
+            end = "at most" if check.constraints[0].sign > 0 else "at least"
             said.append(
                 f"{quantity(check.requirement.output)}: {guarantee.target:.2%} of these units keep "
-                f"{'at most' if check.sides[0].sign > 0 else 'at least'} {kept:.4g} {unit}; {value:.4g} {unit} is what "
+                f"{end} {kept:.4g} {unit}; {value:.4g} {unit} is what "
                 f"{answer.chosen.joint.units:,} units show with {answer.chosen.confidence:.1%} confidence."
             )
     return tuple(said)

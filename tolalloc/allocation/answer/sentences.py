@@ -85,7 +85,7 @@ def _signed(amount: float) -> str:
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:
     """Return which of the fresh units were solved, where that were not all of them."""
-    units = design.confirming.units if design.confirming else None
+    units = design.independent.units if design.independent else None
     if units is None or units.near.all():
         return ()
     return (
@@ -223,7 +223,7 @@ def _modification(answer: AllocationAnswer) -> tuple[str, ...]:
 def _prices(answer: AllocationAnswer) -> tuple[str, ...]:
     """Return what the limits cost, to first order."""
     joint, said = answer.free, []
-    for side in joint.chosen.sides if joint.chosen.met else ():
+    for side in joint.chosen.constraints if joint.chosen.met else ():
         price = joint.prices[side.stack.name]
         if price * abs(side.limit) > _NOTHING * joint.chosen.cost:
             cost, per = limit_price(side, price)

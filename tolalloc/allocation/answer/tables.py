@@ -9,7 +9,7 @@ import pandas as pd
 
 from tolalloc.allocation.search.candidates import ALONE, GRADES
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
-from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.problem import Solution
 from tolalloc.allocation.space.requirement import AtYield, Check
 from tolalloc.allocation.verify.verification import VerifiedDesign
@@ -39,7 +39,7 @@ def searches(answer: AllocationAnswer) -> dict[str, ZoneAllocation]:
     return {ALONE: answer.fixed, **free} if answer.fixed else free
 
 
-def limit_price(side: Side, price: float) -> tuple[float, str]:
+def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1."""
     unit = unit_of(side.stack.name)
     return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
@@ -61,9 +61,9 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
         Not a number unless the requirement is a yield with one limit; two share the units beyond.
     """
     guarantee = check.requirement.guarantee
-    if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
+    if not isinstance(guarantee, AtYield) or len(check.constraints) > 1:
         return float("nan")
-    side, confirming = check.sides[0], design.confirming
+    side, confirming = check.constraints[0], design.independent
     if confirming and not confirming.units.near.all():
         excess = side.sign * (check.requirement.read(confirming.outputs) - side.limit)
         beyond = confirming.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
@@ -109,8 +109,8 @@ def requirements_table(answer: AllocationAnswer) -> pd.DataFrame:
     """Return every limited side with what each design was shown to keep, and what the limit costs."""
     prices, compared, noise = answer.free.prices, designs(answer), solver_noise(answer.free.optimum)
     rows = []
-    for number, side in enumerate(answer.chosen.sides):
-        check = next(check for check in answer.chosen.checks if side in check.sides)
+    for number, side in enumerate(answer.chosen.constraints):
+        check = next(check for check in answer.chosen.checks if side in check.constraints)
         unit = unit_of(check.requirement.output)
         price = prices[side.stack.name]
         price, per = limit_price(side, price if price * side.scale > noise else 0.0)
@@ -120,7 +120,10 @@ def requirements_table(answer: AllocationAnswer) -> pd.DataFrame:
             "shown for": check.requirement.guarantee.words,
             "quantile of the units [unit of the output]": unit_quantile(answer.chosen, check),
         }
-        row |= {f"kept: {label} [unit of the output]": design.sides[number].value for label, design in compared.items()}
+        row |= {
+            f"kept: {label} [unit of the output]": design.constraints[number].value
+            for label, design in compared.items()
+        }
         rows.append(
             {
                 **row,

@@ -72,7 +72,7 @@ class Checkpoint:
         return InputError(f"{self.path}: the checkpoint is of another problem; remove it or name another file.")
 
 
-class RememberedAnswers:
+class CachedAnswers:
     """Everything that has been answered so far.
 
     Parameters
@@ -154,12 +154,12 @@ class RememberedAnswers:
         self._known = {design.tobytes(): row for design, row in zip(designs, numbers, strict=True)}
 
 
-class RememberedResponse:
+class CachedResponse:
     """A response that answers every sample once, beyond this process if there is a checkpoint."""
 
     def __init__(self, response: Response, checkpoint: Checkpoint | None = None) -> None:
         self.response = response
-        self.answers = RememberedAnswers(self._ask, repr((response.columns, response.outputs)), checkpoint)
+        self.answers = CachedAnswers(self._ask, repr((response.columns, response.outputs)), checkpoint)
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from pymoo.optimize import minimize
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
-from tolalloc.allocation.front.checkpoint import Checkpoint, RememberedAnswers
+from tolalloc.allocation.front.checkpoint import CachedAnswers, Checkpoint
 from tolalloc.allocation.front.pareto_problem import Genes, Objectives, ParetoProblem, SearchedDesigns, spread_over
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
@@ -36,7 +36,7 @@ class _Searched(Problem):  # type: ignore[misc]
         self.signs = np.array([objective.sign for objective in problem.objectives])
         bounds = np.array([genes.lower, genes.upper, genes.integer]).tolist()
         identity = repr((genes.names, bounds, problem.objectives, problem.constraints))
-        self.remembered = RememberedAnswers(self._ask, identity, checkpoint)
+        self.remembered = CachedAnswers(self._ask, identity, checkpoint)
         margin = _MARGIN * genes.integer
         super().__init__(
             n_var=genes.lower.size,

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from tolalloc.allocation.front.checkpoint import RememberedResponse
+from tolalloc.allocation.front.checkpoint import CachedResponse
 from tolalloc.allocation.front.pareto_problem import (
     DesignProblem,
     Ladders,
@@ -21,7 +21,7 @@ from tolalloc.allocation.front.pareto_problem import (
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import front
 from tolalloc.allocation.search.zone_allocation import Programs
-from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.problem import Solution, Stack
@@ -74,7 +74,7 @@ def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front
 
 def pareto_front(
     space: DesignSpace,
-    kernel: RememberedResponse,
+    kernel: CachedResponse,
     baseline: Baseline,
     floor: float,
     designs: Float[np.ndarray, "design variable"],
@@ -83,7 +83,7 @@ def pareto_front(
     effort: FrontEffort,
     ladders: Ladders | None = None,
     large: tuple[str, ...] = (),
-    sides: tuple[Side, ...] = (),
+    others: tuple[OneSidedConstraint, ...] = (),
     largest_failed_share: float = 0.05,
 ) -> tuple[Front, Score]:
     """Return the front, improved by kernel runs along it, and what the surrogate that it was found on is worth.
@@ -122,7 +122,7 @@ def pareto_front(
     """
     from tolalloc.allocation.front.genetic import search
 
-    problem = DesignProblem(space=space, quantile=kernel, ladders=ladders or {}, large=large, sides=sides)
+    problem = DesignProblem(space=space, quantile=kernel, ladders=ladders or {}, large=large, others=others)
     known = problem.genes_of(convex_front)
     asked = np.concatenate([designs, problem.designs_of(known)])
     candidate = RegressionCandidate(
@@ -218,7 +218,7 @@ def _designs_around(
 
 def searched_front(
     space: DesignSpace,
-    kernel: RememberedResponse,
+    kernel: CachedResponse,
     best: VerifiedDesign,
     stacks: tuple[Stack, ...],
     exact: ConvexFront,
@@ -251,20 +251,22 @@ def searched_front(
         Settings that shall be large, further objectives.
     """
     # A load that is its own budget may lie beyond it by rounding.
-    others = zip(best.sides[1:], stacks[1:], strict=True)
-    sides = tuple(replace(side, stack=replace(own, budget=own.budget + 1e-9 * side.scale)) for side, own in others)
+    others = tuple(
+        replace(other, stack=replace(own, budget=own.budget + 1e-9 * other.scale))
+        for other, own in zip(best.constraints[1:], stacks[1:], strict=True)
+    )
     return pareto_front(
         space,
         kernel,
-        best.sides[0].predicted_value,
-        best.sides[0].limit / 60,
+        best.constraints[0].predicted_value,
+        best.constraints[0].limit / 60,
         _designs_around(space, best.design, effort.designs, seeds.child("designs")),
         np.concatenate([best.design[np.newaxis], exact.designs[spread_over(len(exact.designs), effort.points)]]),
         seeds.child("pareto"),
         effort,
         ladders=ladders,
         large=large,
-        sides=sides,
+        others=others,
     )
 
 

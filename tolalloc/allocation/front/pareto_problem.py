@@ -10,7 +10,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.model import Response
@@ -142,7 +142,7 @@ class DesignProblem:
     # Group → the scales that it may have, rising; other groups have every scale within their bounds [-]
     ladders: Ladders = field(default_factory=dict)
     large: tuple[str, ...] = ()  # Settings that shall be large, further objectives
-    sides: tuple[Side, ...] = ()  # Limited sides of other requirements, kept by their local models
+    others: tuple[OneSidedConstraint, ...] = ()  # Limited sides of other requirements, kept by their local models
 
     def __post_init__(self) -> None:
         for group, ladder in self.ladders.items():
@@ -164,7 +164,7 @@ class DesignProblem:
     @property
     def constraints(self) -> tuple[str, ...]:
         """Names of the other limits."""
-        return tuple(side.stack.name for side in self.sides)
+        return tuple(constraint.stack.name for constraint in self.others)
 
     @cached_property
     def genes(self) -> Genes:
@@ -201,7 +201,7 @@ class DesignProblem:
         evaluation = self.quantile(designs)
         settings = [designs[:, self.space.columns.index(setting)] for setting in self.large]
         values = np.column_stack([self.space.cost(designs), evaluation.values[:, 0], *settings])
-        violation = np.array([side.predicted(designs) / side.scale for side in self.sides]).T
+        violation = np.array([constraint.predicted(designs) / constraint.scale for constraint in self.others]).T
         return Objectives(values=values, violation=violation.reshape(len(designs), -1), status=evaluation.status)
 
 

@@ -139,17 +139,19 @@ def _with_model(verifier: Verifier, allocation: ZoneAllocation, undisturbed: Ver
     judged = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units
     rises = [
         float(now.predicted(chosen.design) - before.predicted(chosen.design))
-        for now, before in zip(judged.sides, undisturbed.sides, strict=True)
+        for now, before in zip(judged.constraints, undisturbed.constraints, strict=True)
     ]
-    for side, aimed, rise in zip(judged.sides, allocation.stacks, rises, strict=True):
-        loads = [float(stack.load(chosen.scales, chosen.settings)) for stack in (side.stack, aimed)]
-        stacks.append(replace(side.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
+    for constraint, aimed, rise in zip(judged.constraints, allocation.stacks, rises, strict=True):
+        loads = [float(stack.load(chosen.scales, chosen.settings)) for stack in (constraint.stack, aimed)]
+        stacks.append(replace(constraint.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
     problem = verifier.space.problem(tuple(stacks))
     found = process_choice.allocate(problem)
     cost = problem.cost(found.zones, found.processes) + allocation.locked_cost
     before = optimum.cost + allocation.locked_cost
-    kept = all(side.excess + rise <= 0 for side, rise in zip(chosen.sides, rises, strict=True))
-    kept = kept and all(np.isfinite(side.value) for side in judged.sides)  # or so many units fail that none shows it
+    kept = all(constraint.excess + rise <= 0 for constraint, rise in zip(chosen.constraints, rises, strict=True))
+    kept = kept and all(
+        np.isfinite(constraint.value) for constraint in judged.constraints
+    )  # or so many units fail that none shows it
     return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1 if kept else np.nan, kept=kept)
 
 

@@ -166,7 +166,7 @@ def _cheapest(
 ) -> tuple[float, float]:
     """Return the least cost at given settings, and what the model last missed there [unit of the output]."""
     space, chosen, (first, *others) = response.space, allocation.chosen, allocation.asked_stacks
-    model, missed, cost, error = chosen.sides[0], 0.0, np.nan, np.inf
+    model, missed, cost, error = chosen.constraints[0], 0.0, np.nan, np.inf
     processes = space.process_positions(chosen.design)
     for number in range(_CORRECTIONS):
         corrected = (replace(first, budget=first.budget - missed), *others)

@@ -10,8 +10,8 @@ import numpy as np
 from tolalloc.allocation.search.discrete import GradedAllocation, choice_beside
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation, step_from
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.verify.acceptance import Attempt, Confirmed, Judge
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.allocation.verify.acceptance import Acceptance, AcceptanceTest, AlphaSpending
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.models.settings import DrawnAmounts
 
 _ROUNDING = 1e-9
@@ -54,17 +54,17 @@ class Candidates:
 
     @property
     def drawn(self) -> VerifiedDesign:
-        """The cheapest admitted design that was confirmed; the least violating one if none was."""
+        """The cheapest admitted design that was accepted; the least violating one if none was."""
         admitted = tuple(self.admitted().values())
-        confirmed = tuple(own for own in admitted if own.confirmed)
-        return answer(confirmed or tuple(own for own in admitted if not own.met) or admitted)
+        accepted = tuple(own for own in admitted if own.accepted)
+        return cheapest_met(accepted or tuple(own for own in admitted if not own.met) or admitted)
 
-    def with_confirmed(self, found: Confirmed, drawn_amounts: DrawnAmounts) -> Candidates:
-        """Return the candidates with what became of those that were judged."""
-        free, last = self.free, {name: found.last(name) for name, _ in found.judged}
+    def with_acceptance(self, found: Acceptance, drawn_amounts: DrawnAmounts) -> Candidates:
+        """Return the candidates with what became of those that were tested."""
+        free, last = self.free, {name: found.last(name) for name, _ in found.tested}
         hands = {id(own): last[name] for name, own in self.designs().items() if name in (TABLE, ALIKE) and name in last}
         free = replace(free, proportional_tried=tuple(hands.get(id(own)) or own for own in free.proportional_tried))
-        tried = {name: tuple(own for kind, own in found.judged if kind == name) for name in last}
+        tried = {name: tuple(own for kind, own in found.tested if kind == name) for name in last}
         fixed = self.fixed
         if fixed and (design := last.get(ALONE)):
             fixed = fixed.with_chosen(design, tried[ALONE])
@@ -110,36 +110,36 @@ def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:
 
 
 _REACH = 1.1
-"""Factor by which a variable may change from a judged design to the next one [-]."""
+"""Factor by which a variable may change from a tested design to the next one [-]."""
 _MARGIN = 1.0
-"""How far inside what must be shown the next design is aimed while nothing is confirmed, half as far again after each
-miss but the first [standard errors of what its units and those of the judged one say]."""
+"""How far inside what must be shown the next design is aimed while nothing is accepted, half as far again after each
+miss but the first [standard errors of what its units and those of the tested one say]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class NextDesign:
-    """Makes the design that follows a judged one, for `tolalloc.allocation.verify.acceptance.confirm`."""
+class NextCandidate:
+    """Makes the design that follows a tested one, for `tolalloc.allocation.verify.acceptance.accept_cheapest`."""
 
     found: Candidates  # What the searches found
-    judge: Judge  # Judges the designs
+    test: AcceptanceTest  # Tests the designs
     drawn: DrawnAmounts  # What the drawing says of the settings
     space: DesignSpace  # Design variables with every setting free
     verifier: Callable[[DesignSpace], Verifier]  # Returns what makes the models of a design
 
     def __call__(
-        self, kind: str, judged: VerifiedDesign, attempt: Attempt, worth: float
+        self, kind: str, tested: VerifiedDesign, spending: AlphaSpending, worth: float
     ) -> tuple[str, VerifiedDesign] | None:
-        """Return the design that the search of a judged one would try next, none where it would try no other.
+        """Return the design that the search of a tested one would try next, none where it would try no other.
 
         After a miss that may be one that the search has tried, where it is cheaper than what the models make. From a
         drawing that no search made and that is not good enough, the search for free zones goes on.
         """
         found = self.found
         searches = {ALONE: found.fixed, FREE: found.free}
-        if kind in (TABLE, ALIKE) and not judged.confirmed and not found.graded:
+        if kind in (TABLE, ALIKE) and not tested.accepted and not found.graded:
             kind = FREE
-        margin = self.judge.margin(judged, self._errors_inside(judged, attempt, worth))
-        seen = self.judge.foreseen(judged, attempt)
+        margin = self.test.margin(tested, self._errors_inside(tested, spending, worth))
+        seen = self.test.foreseen(tested, spending)
         if kind == GRADES and found.graded:
             tried = found.graded.tried[1:]
             design = choice_beside(self.drawn, seen, tried, margin)
@@ -148,36 +148,37 @@ class NextDesign:
             design = step_from(seen, tried, margin, _REACH)
         else:
             return None
-        known = () if judged.confirmed else _still_kept(tried, seen)
+        known = () if tested.accepted else _still_kept(tried, seen)
         cheapest = min(known, key=lambda own: own.cost, default=None)
-        if cheapest and cheapest.cost <= worth and (design is None or cheapest.cost < judged.space.cost(design)):
+        if cheapest and cheapest.cost <= worth and (design is None or cheapest.cost < tested.space.cost(design)):
             return kind, cheapest
-        if design is None or judged.space.cost(design) > worth:
+        if design is None or tested.space.cost(design) > worth:
             return None
-        space = self.space if kind == FREE else judged.space
-        return kind, self.verifier(space).verify(design, f"attempt {attempt.number}")
+        space = self.space if kind == FREE else tested.space
+        return kind, self.verifier(space).verify(design, f"attempt {spending.number}")
 
-    def _errors_inside(self, judged: VerifiedDesign, attempt: Attempt, worth: float) -> float:
+    def _errors_inside(self, tested: VerifiedDesign, spending: AlphaSpending, worth: float) -> float:
         """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""
-        if np.isinf(worth):  # nothing is confirmed
-            return _MARGIN * (1 + attempt.missed) / 2
+        if np.isinf(worth):  # nothing is accepted
+            return _MARGIN * (1 + spending.missed) / 2
         # A miss costs nothing then, so at even odds the next one is aimed at the limit itself, but after a miss.
-        errors = _MARGIN * 2 * (0.5 - self.judge.error)
-        return errors if judged.confirmed else max(errors, _MARGIN / 2)
+        errors = _MARGIN * 2 * (0.5 - self.test.error)
+        return errors if tested.accepted else max(errors, _MARGIN / 2)
 
 
-def _still_kept(tried: tuple[VerifiedDesign, ...], judged: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
-    """Return the dearer designs of a search that were met, and still are with what a judged one says of them.
+def _still_kept(tried: tuple[VerifiedDesign, ...], tested: VerifiedDesign) -> tuple[VerifiedDesign, ...]:
+    """Return the dearer designs of a search that were met, and still are with what a tested one says of them.
 
-    What both say is weighed by their variances. The judged one itself is none of them.
+    What both say is weighed by their variances. The tested one itself is none of them.
     """
     return tuple(
         own
         for own in tried
         if own.met
-        and own.cost > judged.cost
+        and own.cost > tested.cost
         and all(
-            side.excess * other.standard_error**2 + other.predicted(own.design) * side.standard_error**2 <= 0
-            for side, other in zip(own.sides, judged.sides, strict=True)
+            constraint.excess * other.standard_error**2 + other.predicted(own.design) * constraint.standard_error**2
+            <= 0
+            for constraint, other in zip(own.constraints, tested.constraints, strict=True)
         )
     )

@@ -228,7 +228,7 @@ class ConvexProgram:
             cost=cost,
             bound=cost_bound(problem, prices, zones, enough=cost - _ENOUGH * abs(cost)),
             prices=prices,
-            bound_prices=np.maximum(np.stack([side.dual_value for side in self._keeping], axis=1), 0.0)
+            bound_prices=np.maximum(np.stack([constraint.dual_value for constraint in self._keeping], axis=1), 0.0)
             * (self._cost_scale / self._units)[:, None],
         )
 

@@ -16,7 +16,7 @@ from tolalloc.allocation.search.zone_allocation import aimed, kept_stacks
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.ladder import Ladder, group_ladder
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.settings import DrawnAmounts
@@ -417,7 +417,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
             judged = own.verify(choice, f"graded {len(tried)}")
             tried.append(judged)
         missed, kept = (missed, margin) if judged.met else (margin, kept)
-    chosen = answer(tuple(tried[1:]))
+    chosen = cheapest_met(tuple(tried[1:]))
     return GradedAllocation(
         space=space,
         chosen=chosen,
@@ -456,8 +456,8 @@ def choice_beside(
 def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> tuple[Stack, ...]:
     """Return the models of a design with a budget that is smaller by so many standard errors."""
     return tuple(
-        replace(stack, budget=stack.budget - margin * side.standard_error)
-        for stack, side in zip(aimed(last, tried), last.sides, strict=True)
+        replace(stack, budget=stack.budget - margin * constraint.standard_error)
+        for stack, constraint in zip(aimed(last, tried), last.constraints, strict=True)
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.space.constraint import Level, Side, root_sum_square_stack
+from tolalloc.allocation.space.constraint import OneSidedConstraint, QuantileBound, root_sum_square_stack
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import Solution, Stack
 from tolalloc.allocation.space.requirement import Check, RootSumSquare, Sampled
@@ -74,8 +74,8 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
     if found is None:
         return free
     moved = tuple(
-        replace(stack, budget=stack.budget + _derivative_error(side, stack, design, found[1]))
-        for side, stack in _weaker(design)
+        replace(stack, budget=stack.budget + _derivative_error(constraint, stack, design, found[1]))
+        for constraint, stack in _weaker(design)
     )
     again = cheapest(moved)
     return min(free, again[0] if again else free)
@@ -93,36 +93,39 @@ def _is_exact(check: Check, design: VerifiedDesign) -> bool:
     """Return whether the stacks of a requirement hold for every design: they lie nowhere above what they stand for."""
     if isinstance(check.requirement.guarantee, RootSumSquare):
         return True
-    laws = [side.law for side in check.sides]
+    laws = [constraint.law for constraint in check.constraints]
     if not all(law is not None and law.is_convex and (len(laws) == 1 or law.is_normal) for law in laws):
         return False
     groups = len(design.space.groups)
-    return all(side.batches is None or bool((side.batches[0, :groups] >= 0).all()) for side in check.sides)
+    return all(
+        constraint.batches is None or bool((constraint.batches[0, :groups] >= 0).all())
+        for constraint in check.constraints
+    )
 
 
-def _weaker(design: VerifiedDesign) -> list[tuple[Side, Stack]]:
+def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
     """Return every limited side with the stack that a design keeps that keeps the limit, the error counted."""
-    sides = len(design.sides)
+    constraints = len(design.constraints)
     found = []
     for check in design.checks:
-        levels: tuple[Level, ...] = ()
+        bounds: tuple[QuantileBound, ...] = ()
         if isinstance(check.requirement.guarantee, Sampled):
-            confidence = 1 - (1 - CONFIDENCE) / (2 * sides)  # the other half is that of the derivatives
-            levels = check.requirement.guarantee.least_levels(_sample(design, check), confidence)
-        for at, side in enumerate(check.sides):
-            excess = levels[at].excess if levels else side.excess
+            confidence = 1 - (1 - CONFIDENCE) / (2 * constraints)  # the other half is that of the derivatives
+            bounds = check.requirement.guarantee.least_bounds(_sample(design, check), confidence)
+        for at, constraint in enumerate(check.constraints):
+            excess = bounds[at].excess if bounds else constraint.excess
             if np.isfinite(excess):
-                load = float(side.stack.load(design.scales, design.settings))
+                load = float(constraint.stack.load(design.scales, design.settings))
                 budget = load - excess + _ROUNDING * (abs(load) + abs(excess))
-                found.append((side, replace(_touching(side, design), budget=budget)))
+                found.append((constraint, replace(_touching(constraint, design), budget=budget)))
     return found
 
 
 def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
     """Return the units that judged a design last."""
     law = design.laws.get(check.requirement.output)
-    if design.confirming:
-        return design.confirming.sample(check, law)
+    if design.independent:
+        return design.independent.limited(check.requirement, law)
     values = check.requirement.read(design.outputs)
     return LimitedSample(
         values=values,
@@ -132,10 +135,10 @@ def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
     )
 
 
-def _touching(side: Side, design: VerifiedDesign) -> Stack:
+def _touching(constraint: OneSidedConstraint, design: VerifiedDesign) -> Stack:
     """Return the plane that touches the model of a linear output at the design, the model itself of any other."""
-    stack = side.stack
-    if side.law is None:
+    stack = constraint.stack
+    if constraint.law is None:
         return stack
     spread = stack.root_sum_square * design.scales
     length = float(np.linalg.norm(spread)) or 1.0
@@ -146,16 +149,18 @@ def _touching(side: Side, design: VerifiedDesign) -> Stack:
     )
 
 
-def _derivative_error(side: Side, stack: Stack, design: VerifiedDesign, other: Float[np.ndarray, " variable"]) -> float:
+def _derivative_error(
+    constraint: OneSidedConstraint, stack: Stack, design: VerifiedDesign, other: Float[np.ndarray, " variable"]
+) -> float:
     """Return by how much the derivatives may err of what changes from one design to another [unit of the output]."""
     from scipy.stats import norm
 
-    if side.batches is None or side.law is not None:
+    if constraint.batches is None or constraint.law is not None:
         return 0.0
     groups, changes = len(design.space.groups), []
-    for gradient in side.batches:
+    for gradient in constraint.batches:
         own = root_sum_square_stack(stack.name, design.design, 0.0, gradient, groups)
         loads = [float(own.load(each[:groups], each[groups:])) for each in (other, design.design)]
         changes.append(loads[0] - loads[1])
     error = float(np.std(changes, ddof=1)) / np.sqrt(len(changes)) if len(changes) > 1 else 0.0
-    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * len(design.sides)))) * error
+    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * len(design.constraints)))) * error

@@ -14,7 +14,7 @@ from tolalloc.allocation.search.lower_bound import LowerBound, lower_bound
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.problem import Solution, Stack
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, answer
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.exceptions import InputError, SolveError
 
 SETTLED = 0.01
@@ -127,10 +127,10 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
 def _factor(tried: VerifiedDesign) -> float:
     """Return the common factor of all scales that takes a design to its limits [-]."""
     factors = []
-    for side in tried.sides:
-        rise = side.load_of_zones(tried.design)
-        budget = -float(side.predicted(tried.design)) - side.standard_error
-        factors.append(1 + budget / max(rise, _LEAST_RISE * side.scale))
+    for constraint in tried.constraints:
+        rise = constraint.load_of_zones(tried.design)
+        budget = -float(constraint.predicted(tried.design)) - constraint.standard_error
+        factors.append(1 + budget / max(rise, _LEAST_RISE * constraint.scale))
     return float(np.clip(min(factors), 0.4, 2.5))
 
 
@@ -162,10 +162,16 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     """
     similar = [item for item in tried if _is_similar(item, last)]
     stacks = []
-    for at, side in enumerate(last.sides):
-        found = [float(item.sides[at].predicted(item.design) - side.predicted(item.design)) for item in similar]
-        deviation = 0.0 if side.law else float(np.average(found, weights=[item.achieved.units for item in similar]))
-        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
+    for at, constraint in enumerate(last.constraints):
+        found = [
+            float(item.constraints[at].predicted(item.design) - constraint.predicted(item.design)) for item in similar
+        ]
+        deviation = (
+            0.0 if constraint.law else float(np.average(found, weights=[item.achieved.units for item in similar]))
+        )
+        stacks.append(
+            replace(constraint.stack, budget=constraint.stack.budget - margin * constraint.standard_error - deviation)
+        )
     return tuple(stacks)
 
 
@@ -188,7 +194,7 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     margin
         How far inside each limit the aim is; 0 for the limits themselves [standard errors].
     """
-    loads = [float(side.stack.load(chosen.scales, chosen.settings)) for side in chosen.sides]
+    loads = [float(constraint.stack.load(chosen.scales, chosen.settings)) for constraint in chosen.constraints]
     stacks = aimed(chosen, list(tried), margin)
     return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
 
@@ -210,7 +216,7 @@ def step_from(
         Factor by which a variable may change [-].
     """
     processes = last.space.process_positions(last.design)
-    return Programs(last.space, len(last.sides)).step(
+    return Programs(last.space, len(last.constraints)).step(
         aimed(last, [*tried, last], margin), processes, last.design, reach
     )
 
@@ -234,7 +240,7 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     Where fresh units are further from the prediction than chance explains, the next step reaches less.
     """
     space, tried = verifier.space, [start]
-    programs, processes = Programs(space, len(start.sides)), space.process_positions(start.design)
+    programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)
     for step in range(steps + _REPAIRS):
         last = tried[-1]
         if step >= steps and not _is_worth_mending(tried):
@@ -262,7 +268,7 @@ def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
     return all(
         abs(now.excess - before.predicted(new.design))
         <= _EXPLAINED * np.hypot(before.standard_error, now.standard_error)
-        for before, now in zip(last.sides, new.sides, strict=True)
+        for before, now in zip(last.constraints, new.constraints, strict=True)
     )
 
 
@@ -284,7 +290,7 @@ class ZoneAllocation:
     @property
     def proportional(self) -> VerifiedDesign:
         """The cheapest met design with all zones scaled alike, or the least violating one."""
-        return answer(self.proportional_tried)
+        return cheapest_met(self.proportional_tried)
 
     @property
     def baseline(self) -> VerifiedDesign:
@@ -331,7 +337,8 @@ class ZoneAllocation:
     def prices(self) -> dict[str, float]:
         """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output]."""
         return {
-            side.stack.name: float(price) for side, price in zip(self.chosen.sides, self.optimum.prices, strict=True)
+            constraint.stack.name: float(price)
+            for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True)
         }
 
     @property
@@ -411,12 +418,12 @@ def allocate(
         A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
         modification it tells tolerances alone from tolerances and modification together.
     """
-    first, space = start or answer(proportional_tried), verifier.space
+    first, space = start or cheapest_met(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
     tried = ((first,) if space.allows(first.design) else ()) + step_to_optimum(
         verifier, first, effort.steps, effort.reach
     )
-    chosen = answer(tried)
+    chosen = cheapest_met(tried)
     return ZoneAllocation(
         limit=verifier.limit,
         chosen=chosen,

@@ -8,14 +8,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.output_sample import LimitedSample, OutputTrial
+from tolalloc.allocation.space.output_sample import LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import Stack
 from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.near_limit import largest_first
 
 
 @dataclass(frozen=True, kw_only=True)
-class Side:
+class OneSidedConstraint:
     """One limited side of a requirement at a verified design."""
 
     sign: int  # 1 for an upper limit, −1 for a lower one [-]
@@ -119,8 +119,8 @@ _ACCURACY = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level:
-    """What units say of one limited side."""
+class QuantileBound:
+    """Confidence bound on the quantile that a guarantee limits, of one limited side."""
 
     sign: Literal[1, -1]  # 1 for an upper limit, −1 for a lower one [-]
     limit: float  # The limit [unit of the output]
@@ -132,13 +132,17 @@ class Level:
         """How far the value lies beyond the limit, negative inside [unit of the output]."""
         return self.sign * (self.value - self.limit)
 
+    def turned(self, values: Float[np.ndarray, " good"]) -> float:
+        """Return sign·value, the outermost unit's where the bound is infinite [unit of the output]."""
+        return self.sign * self.value if np.isfinite(self.value) else float((self.sign * values).max())
 
-def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> Level:
+
+def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> QuantileBound:
     """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown."""
     turned = np.where(np.isfinite(sample.values), sign * sample.values, np.inf)
     further = min(int(np.count_nonzero(turned - sign * limit > beyond)), turned.size - 1)
     outermost = largest_first(turned, _SURROUNDED * further + _SURROUNDING)
-    return Level(
+    return QuantileBound(
         sign=sign,
         limit=limit,
         value=sign * (float(turned[outermost[further]]) if np.isfinite(beyond) else np.inf),
@@ -148,12 +152,12 @@ def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, b
     )
 
 
-def levels_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple[Level, ...]:
+def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple[QuantileBound, ...]:
     """Return what a law says of every limited side if such a share of it may lie beyond the limits [-]."""
     excess = law.excess(sample.limits, beyond)
     error = _ACCURACY * law.half_width
     return tuple(
-        Level(sign=sign, limit=limit, value=limit + sign * excess, standard_error=error)
+        QuantileBound(sign=sign, limit=limit, value=limit + sign * excess, standard_error=error)
         for sign, limit in sample.limits.turned
     )
 
@@ -191,16 +195,11 @@ def _order_statistic_error(
     return float(np.sqrt(weights @ (outermost - weights @ outermost) ** 2))
 
 
-def reached(level: Level, values: Float[np.ndarray, " good"]) -> float:
-    """Return the turned value of a level, the outermost unit's where it is infinite [unit of the output]."""
-    return level.sign * level.value if np.isfinite(level.value) else float((level.sign * values).max())
-
-
-def side_scale(trial: OutputTrial, limit: float) -> float:
+def scale_of(sample: OutputSample, limit: float) -> float:
     """Return what an excess is compared with; a limit of zero says nothing of its size [unit of the output]."""
-    return max(abs(limit), float(trial.values.std())) or 1.0
+    return max(abs(limit), float(sample.values.std())) or 1.0
 
 
-def side_name(trial: OutputTrial, sign: int) -> str:
+def name_of(sample: OutputSample, sign: int) -> str:
     """Return what the limited side of an output is called."""
-    return f"{trial.output}, {'upper' if sign > 0 else 'lower'} limit"
+    return f"{sample.output}, {'upper' if sign > 0 else 'lower'} limit"

@@ -64,7 +64,7 @@ _SCALE_STEP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreshUnits:
+class DesignSample:
     """Random units of one design."""
 
     space: DesignSpace  # The design variables
@@ -268,10 +268,10 @@ class FreshUnits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutputTrial:
+class OutputSample:
     """What fresh units of a design say of one output, which guarantees judge."""
 
-    units: FreshUnits  # The units
+    units: DesignSample  # The units
     output: str  # Name of the output with its unit
     confidence: float = CONFIDENCE  # With which a guarantee must be shown, one-sided; one half is even odds [-]
 
@@ -296,7 +296,7 @@ class OutputTrial:
         """Number of units without a usable answer [-]."""
         return len(self.units.standard) - self.values.size
 
-    def sample(self, limits: Limits) -> LimitedSample:
+    def limited(self, limits: Limits) -> LimitedSample:
         """Return what the units say of limits; a search solves all of them."""
         values = np.append(self.values, np.full(self.failed, np.nan))
         return LimitedSample(

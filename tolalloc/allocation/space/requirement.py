@@ -11,17 +11,16 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.constraint import (
-    Level,
-    Side,
-    levels_of_law,
+    OneSidedConstraint,
+    QuantileBound,
+    bounds_of_law,
+    name_of,
     order_statistic,
-    reached,
     root_sum_square_stack,
-    side_name,
-    side_scale,
+    scale_of,
     worst_case_stack,
 )
-from tolalloc.allocation.space.output_sample import FreshUnits, LimitedSample, OutputTrial
+from tolalloc.allocation.space.output_sample import DesignSample, LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import Stack
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
@@ -43,7 +42,7 @@ class Guarantee(Protocol):
         """What must be shown, in words."""
         ...
 
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+    def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every limited side; the requirement is met if no value lies beyond its limit."""
         ...
 
@@ -56,11 +55,11 @@ class Guarantee(Protocol):
 class Sampled(Guarantee, Protocol):
     """A guarantee that random units show, with an error."""
 
-    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limited side with one-sided confidence, the upper one first."""
         ...
 
-    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what every limited side is at least, with one-sided confidence: the other end of `levels`."""
         ...
 
@@ -108,21 +107,21 @@ class AtYield(NamedFields):
             needed = int(np.ceil(np.log(1 - confidence) / np.log(self.target)))
             raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
 
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+    def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
+        return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
-    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limited side, or what its law does where they keep to it."""
         if sample.law:
-            return levels_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
+            return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
         beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
         return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
-    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what every limited side is at least."""
         if sample.law:
-            return levels_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
+            return bounds_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
         beyond = sample.units.least_excess(sample.excess, self.target, confidence)
         return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
@@ -173,26 +172,26 @@ class AtCpk(NamedFields):
         if units < 100:
             raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
 
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+    def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every limited side."""
-        return _spread_sides(trial, self.levels(trial.sample(limits), trial.confidence), limits)
+        return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
-    def levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limited side."""
-        return tuple(self._level(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
+        return tuple(self._bound(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
 
-    def least_levels(self, sample: LimitedSample, confidence: float) -> tuple[Level, ...]:
+    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what every limited side is at least."""
-        return self.levels(sample, 1 - confidence)
+        return self.bounds(sample, 1 - confidence)
 
-    def _level(
+    def _bound(
         self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
-    ) -> Level:
+    ) -> QuantileBound:
         turned = sign * values
         needed, error = self._needed(turned, confidence)
         deviation = float(turned.std(ddof=1))
         value = float(turned.mean()) + 3 * needed * deviation
-        return Level(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
+        return QuantileBound(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
 
     def _needed(self, turned: Float[np.ndarray, " unit"], confidence: float) -> tuple[float, float]:
         """Return the estimate whose lower bound is the target, and its standard error [-].
@@ -212,38 +211,40 @@ class AtCpk(NamedFields):
         return float(needed), float(np.sqrt(variance))
 
 
-def _spread_sides(trial: OutputTrial, levels: tuple[Level, ...], limits: Limits) -> tuple[Side, ...]:
+def _spread_constraints(
+    sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits
+) -> tuple[OneSidedConstraint, ...]:
     """Return the sides of what spreads, each with its local model."""
-    return tuple(_spread_side(trial, level, limits) for level in levels)
+    return tuple(_spread_constraint(sample, bound, limits) for bound in bounds)
 
 
-def _spread_side(trial: OutputTrial, level: Level, limits: Limits) -> Side:
-    value, groups = reached(level, trial.values), trial.groups
-    excess, weights, derivative = value - level.sign * level.limit, *_weights(trial, level.sign, value)
+def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits) -> OneSidedConstraint:
+    value, groups = bound.turned(sample.values), sample.groups
+    excess, weights, derivative = value - bound.sign * bound.limit, *_weights(sample, bound.sign, value)
     gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
-    if trial.law:
-        gradient[:groups] = trial.units.space.by_scale(trial.law.excess_by_zone(limits, excess))
+    if sample.law:
+        gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
         batches[:, :groups] = gradient[:groups]
-    return Side(
-        sign=level.sign,
-        limit=level.limit,
-        value=level.value,
-        standard_error=level.standard_error,
-        scale=side_scale(trial, level.limit),
-        stack=root_sum_square_stack(side_name(trial, level.sign), trial.design, excess, gradient, groups),
+    return OneSidedConstraint(
+        sign=bound.sign,
+        limit=bound.limit,
+        value=bound.value,
+        standard_error=bound.standard_error,
+        scale=scale_of(sample, bound.limit),
+        stack=root_sum_square_stack(name_of(sample, bound.sign), sample.design, excess, gradient, groups),
         batches=batches,
-        law=trial.law,
+        law=sample.law,
     )
 
 
 def _weights(
-    trial: OutputTrial, sign: int, value: float
+    sample: OutputSample, sign: int, value: float
 ) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
     """Return derivatives of units, and by what each counts in that of mean + spread·σ, the turned value.
 
     Theory page, equation (24).
     """
-    turned, (known, derivative) = sign * trial.values, trial.derived()
+    turned, (known, derivative) = sign * sample.values, sample.derived()
     spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
     standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
     return sign * (1.0 + spread * standard), derivative
@@ -274,21 +275,21 @@ class WorstCase:
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Accept every number of units; none is asked."""
 
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+    def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every limited side."""
-        return tuple(self._side(trial, sign, limit) for sign, limit in limits.turned)
+        return tuple(self._side(sample, sign, limit) for sign, limit in limits.turned)
 
-    def _side(self, trial: OutputTrial, sign: Literal[1, -1], limit: float) -> Side:
-        value, gradient = trial.worst(sign)
+    def _side(self, sample: OutputSample, sign: Literal[1, -1], limit: float) -> OneSidedConstraint:
+        value, gradient = sample.worst(sign)
         stack = worst_case_stack(
-            side_name(trial, sign), trial.design, sign * (value - limit), sign * gradient, trial.groups
+            name_of(sample, sign), sample.design, sign * (value - limit), sign * gradient, sample.groups
         )
-        return Side(
+        return OneSidedConstraint(
             sign=sign,
             limit=limit,
             value=value,
             standard_error=_MISSED * abs(value),
-            scale=side_scale(trial, limit),
+            scale=scale_of(sample, limit),
             stack=stack,
         )
 
@@ -312,7 +313,7 @@ class RootSumSquare:
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Accept every number of units; none is asked."""
 
-    def judge(self, trial: OutputTrial, limits: Limits) -> tuple[Side, ...]:
+    def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every limited side.
 
         Raises
@@ -320,19 +321,19 @@ class RootSumSquare:
         InputError
             A source that is neither a size nor a position.
         """
-        value, locked, added, by_setting = trial.linear()
+        value, locked, added, by_setting = sample.linear()
         spread = float(np.hypot(locked, np.linalg.norm(added)))
-        scales, settings = trial.design[: trial.groups], trial.design[trial.groups :]
+        scales, settings = sample.design[: sample.groups], sample.design[sample.groups :]
         return tuple(
-            Side(
+            OneSidedConstraint(
                 sign=sign,
                 limit=limit,
                 value=value + sign * spread,
                 standard_error=0.0,
-                scale=side_scale(trial, limit),
+                scale=scale_of(sample, limit),
                 stack=Stack(
-                    name=side_name(trial, sign),
-                    worst_case=np.zeros(trial.groups),
+                    name=name_of(sample, sign),
+                    worst_case=np.zeros(sample.groups),
                     root_sum_square=added / scales,
                     # Locked zones take their part of the quadrature: the free ones may fill what it leaves.
                     budget=_left(sign * (limit - value), locked) + float(sign * by_setting @ settings),
@@ -376,13 +377,13 @@ class Requirement:
         """Return what is limited, of the units whose outputs are given, NaN where a unit has none."""
         return values[self.output]
 
-    def trial(self, units: FreshUnits, confidence: float) -> OutputTrial:
+    def sample(self, units: DesignSample, confidence: float) -> OutputSample:
         """Return what units say of it."""
-        return OutputTrial(units=units, output=self.output, confidence=confidence)
+        return OutputSample(units=units, output=self.output, confidence=confidence)
 
-    def check(self, trial: OutputTrial) -> Check:
+    def check(self, sample: OutputSample) -> Check:
         """Return how a design stands against the requirement."""
-        return Check(requirement=self, sides=self.guarantee.judge(trial, self.limits))
+        return Check(requirement=self, constraints=self.guarantee.constraints(sample, self.limits))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -426,13 +427,13 @@ class JointRequirement(Requirement):
             ]
         )
 
-    def trial(self, units: FreshUnits, confidence: float) -> OutputTrial:
+    def sample(self, units: DesignSample, confidence: float) -> OutputSample:
         """Return what units say of it."""
-        return JointTrial(units=units, output=self.output, confidence=confidence, requirement=self)
+        return JointSample(units=units, output=self.output, confidence=confidence, requirement=self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointTrial(OutputTrial):
+class JointSample(OutputSample):
     """What fresh units of a design say of all limits at once."""
 
     requirement: JointRequirement  # The limits
@@ -466,19 +467,19 @@ class Check:
     """How a verified design stands against one requirement."""
 
     requirement: Requirement  # The requirement
-    sides: tuple[Side, ...]  # Its limited sides, the upper one first
+    constraints: tuple[OneSidedConstraint, ...]  # Its limited sides, the upper one first
 
     @property
     def met(self) -> bool:
         """Whether the guarantee is shown."""
-        return all(side.excess <= 0 for side in self.sides)
+        return all(constraint.excess <= 0 for constraint in self.constraints)
 
     @property
-    def tightest(self) -> Side:
+    def tightest(self) -> OneSidedConstraint:
         """The side with the largest relative excess."""
-        return max(self.sides, key=lambda side: side.relative_excess)
+        return max(self.constraints, key=lambda constraint: constraint.relative_excess)
 
     @property
     def slack(self) -> float:
         """What is left to the nearer limit, negative beyond it [unit of the output]."""
-        return -max(side.excess for side in self.sides)
+        return -max(constraint.excess for constraint in self.constraints)

@@ -8,14 +8,14 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.constraint import Side
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.output_sample import FreshUnits, LimitedSample
+from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.requirement import Check, Requirement
+from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
-from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Model
 
@@ -23,26 +23,6 @@ SLOPE_UNITS = 1024
 """Units that differences of an output without derivatives are averaged over [-]."""
 DERIVATIVE_UNITS = 6144
 """Units of a fast model whose derivatives are averaged: they cost as much as many values, and err less [-]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Confirming:
-    """Fresh units that no search has seen, most of them near a limit."""
-
-    units: SolvedUnits  # Which of the drawn units they are
-    outputs: dict[str, Float[np.ndarray, " solved"]]  # Outputs of all requirements, NaN where a unit has none
-    leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
-
-    def sample(self, check: Check, law: LinearLaw | None) -> LimitedSample:
-        """Return what the units say of a requirement whose output has a law, or has none."""
-        requirement = check.requirement
-        return LimitedSample(
-            values=requirement.read(self.outputs),
-            units=self.units,
-            limits=requirement.limits,
-            law=law,
-            leaving=self.leaving.get(requirement.output, 0),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +45,11 @@ class VerifiedDesign:
     # Change of the leading output's value with the zone of each active source; none where the model does not know its
     # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
-    # Change of the leading output with a deviation of each active source, `FreshUnits.sensitivity`; none as above
+    # Change of the leading output with a deviation of each active source, `DesignSample.sensitivity`; none as above
     by_deviation: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
-    confirming: Confirming | None = None  # What judged it last, none if that were the units of its search
-    confirmed: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
+    independent: IndependentSample | None = None  # What judged it last, none if that were the units of its search
+    accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
 
     @property
     def scales(self) -> Float[np.ndarray, " group"]:
@@ -87,15 +67,15 @@ class VerifiedDesign:
         return all(check.met for check in self.checks)
 
     @property
-    def sides(self) -> tuple[Side, ...]:
+    def constraints(self) -> tuple[OneSidedConstraint, ...]:
         """All limited sides of all requirements."""
-        return tuple(side for check in self.checks for side in check.sides)
+        return tuple(constraint for check in self.checks for constraint in check.constraints)
 
     @property
     def laws(self) -> dict[str, LinearLaw]:
         """Law of every limited output that is linear, at the zones of the design."""
         zones = self.space.zones(self.design)
-        found = {check.requirement.output: check.sides[0].law for check in self.checks}
+        found = {check.requirement.output: check.constraints[0].law for check in self.checks}
         return {output: replace(law, zones=zones) for output, law in found.items() if law}
 
     @property
@@ -106,18 +86,18 @@ class VerifiedDesign:
     @property
     def quantile_bound(self) -> float:
         """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
-        return self.checks[0].sides[0].value
+        return self.checks[0].constraints[0].value
 
     def shown_at(self, target: float) -> float:
         """Return the smallest upper limit of the leading output that the units show kept at another yield.
 
         With the same confidence; infinite where they are too few [unit of the output].
         """
-        if self.confirming is None:
+        if self.independent is None:
             return self.sample.quantile_bound(target, self.confidence)
-        values = self.checks[0].requirement.read(self.confirming.outputs)
+        values = self.checks[0].requirement.read(self.independent.outputs)
         finite = np.where(np.isfinite(values), values, np.inf)
-        return self.confirming.units.kept_excess(finite, target, self.confidence)
+        return self.independent.units.kept_excess(finite, target, self.confidence)
 
     @property
     def spread(self) -> float:
@@ -166,7 +146,7 @@ class Verifier:
         """
         seeds, errors = self.seeds.child(name), self.space.errors
         outputs = tuple(dict.fromkeys(name for requirement in self.requirements for name in requirement.outputs))
-        fresh = FreshUnits(
+        fresh = DesignSample(
             space=self.space,
             model=self.model,
             design=design,
@@ -179,7 +159,7 @@ class Verifier:
         for sample in fresh.samples:
             require_few_failures(sample, name, self.largest_failed_share)
         checks = tuple(
-            requirement.check(requirement.trial(fresh, self.confidence)) for requirement in self.requirements
+            requirement.check(requirement.sample(fresh, self.confidence)) for requirement in self.requirements
         )
         values = {output: fresh.values(output) for output in outputs}
         kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])
@@ -196,13 +176,13 @@ class Verifier:
             checks=checks,
             joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
             outputs=values,
-            by_zone=_by_zone(fresh, checks[0].sides[0].value),
+            by_zone=_by_zone(fresh, checks[0].constraints[0].value),
             by_deviation=fresh.sensitivity(fresh.outputs[0]) if fresh.outputs[0] in fresh.exact else None,
             confidence=self.confidence,
         )
 
 
-def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"] | None:
+def _by_zone(fresh: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:
     """Return the change of mean + spread·σ of the leading output with the zones; equation (24)."""
     leading = fresh.outputs[0]
     if leading not in fresh.exact:
@@ -214,7 +194,7 @@ def _by_zone(fresh: FreshUnits, quantile: float) -> Float[np.ndarray, " source"]
     return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / known.size)
 
 
-def answer(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
+def cheapest_met(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
     """Return the cheapest met design, or the least violating one where none is met."""
     met = [design for design in tried if design.met]
     if met:
