@@ -14,14 +14,13 @@ from published.recovery import Recovery, recovery
 from published.simulated_bench import Bench, random_units, simulated_bench
 
 import tolalloc as ta
-from tolalloc.bench.identification.answer import IdentificationAnswer
-from tolalloc.bench.identification.data import data_of
-from tolalloc.bench.identification.information import information
-from tolalloc.bench.identification.parameters import LIU2020, SYMBOLS, Parameter, parameter
-from tolalloc.bench.identification.prediction import KernelPredictor
-from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.request import IdentificationRequest, identify
-from tolalloc.bench.measurement.files import Measurements
+from tolalloc.bench.identification import IdentificationRequest, identify
+from tolalloc.bench.identification_answer import IdentificationAnswer
+from tolalloc.bench.information import information
+from tolalloc.bench.least_squares import IdentificationProblem
+from tolalloc.bench.measurements import Measurements
+from tolalloc.bench.parameters import LIU2020, SYMBOLS, Parameter, parameter
+from tolalloc.bench.prediction import KernelPredictor, data_of
 from tolalloc.cli.console import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree

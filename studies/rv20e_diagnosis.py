@@ -12,11 +12,10 @@ import numpy as np
 import pandas as pd
 
 import tolalloc as ta
-from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
-from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
-from tolalloc.bench.diagnosis.search import DiagnosisEffort
-from tolalloc.bench.diagnosis.sources import dominant, reductions
-from tolalloc.bench.measurement.files import MeasuredCurve
+from tolalloc.bench.diagnosis import Diagnosis, diagnose
+from tolalloc.bench.measurements import MeasuredCurve
+from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Noise, thinned
+from tolalloc.bench.sources import dominant, reductions
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.reducers.model import ReducerModel

@@ -19,8 +19,8 @@ from published.zhang2025_sections import (
 )
 
 import tolalloc as ta
+from tolalloc.assembly.adjustment import AssemblyRequest, assemble
 from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reports.document import Document

@@ -15,13 +15,12 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from tolalloc.bench.identification.answer import IdentificationAnswer
-from tolalloc.bench.identification.gauss_newton import NAME as GAUSS_NEWTON
-from tolalloc.bench.identification.gauss_newton import Batch, Identified, gauss_newton, starts
-from tolalloc.bench.identification.parameters import BIAS
-from tolalloc.bench.identification.prediction import KernelPredictor, StandIn
-from tolalloc.bench.identification.problem import IdentificationProblem
-from tolalloc.bench.identification.request import STARTS
+from tolalloc.bench.identification import STARTS
+from tolalloc.bench.identification_answer import IdentificationAnswer
+from tolalloc.bench.least_squares import NAME as GAUSS_NEWTON
+from tolalloc.bench.least_squares import Batch, IdentificationProblem, Identified, gauss_newton, starts
+from tolalloc.bench.parameters import BIAS
+from tolalloc.bench.prediction import KernelPredictor, StandIn
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reports.document import Section

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.measurement.files import Measurements
+from tolalloc.bench.measurements import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import as_toml, require_new, write_new
 from tolalloc.reading.units import ARCSECOND, DEGREE

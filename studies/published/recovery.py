@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.bench.identification.data import data_of
-from tolalloc.bench.identification.gauss_newton import gauss_newton
-from tolalloc.bench.identification.information import information
-from tolalloc.bench.identification.parameters import Parameter
-from tolalloc.bench.identification.prediction import KernelPredictor
-from tolalloc.bench.identification.problem import IdentificationProblem
+from tolalloc.bench.information import information
+from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton
+from tolalloc.bench.parameters import Parameter
+from tolalloc.bench.prediction import KernelPredictor, data_of
 from tolalloc.capability.monte_carlo import Yield, proportion
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.design import Reducer

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, data_of
-from tolalloc.bench.identification.prediction import KernelPredictor
-from tolalloc.bench.measurement.files import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.bench.measurements import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.bench.prediction import CURVE, LOOP, PEAK_TO_PEAK, KernelPredictor, data_of
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.design import Reducer

@@ -11,14 +11,13 @@ import pandas as pd
 
 import tolalloc as ta
 from published.zhang2025_genetic import genetic_allocation
-from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles
-from tolalloc.assembly.angular.tuning import best_precision
 from tolalloc.assembly.control import regulator
-from tolalloc.assembly.mounting.search import best_mounting, random_mounting
-from tolalloc.assembly.mounting.stock import PartStock, drawn_parts
+from tolalloc.assembly.gains import norms
+from tolalloc.assembly.mounting import best_mounting, random_mounting
 from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.precision_sweep import norms
+from tolalloc.assembly.stock import PartStock, drawn_parts
+from tolalloc.assembly.tolerances import AngularAllocation, allocate_angles, best_precision
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tolalloc.bench.identification.parameters import SYMBOLS
+from tolalloc.bench.parameters import SYMBOLS
 from tolalloc.cli.identify import NAMES
 from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.reducers.equivalent.columns import source_name

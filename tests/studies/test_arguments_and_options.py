@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.bench.diagnosis.request import DiagnosisRequest
+from tolalloc.bench.diagnosis import DiagnosisRequest
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError

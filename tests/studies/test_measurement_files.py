@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.bench.measurements import load_measurements
 from tolalloc.exceptions import TolallocError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MICRORADIAN
 from tolalloc.reducers.reducer.files import PRESETS

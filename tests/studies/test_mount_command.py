@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.assembly.mounting.stock import drawn_parts
+from tolalloc.assembly.stock import drawn_parts
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

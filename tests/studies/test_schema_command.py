@@ -11,7 +11,7 @@ from typer.main import get_command
 
 from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.files import DATA, load_plan
-from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import app
 from tolalloc.cli.start import KINDS, schema
 from tolalloc.exceptions import TolallocError

@@ -12,9 +12,8 @@ import pytest
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import kalman_filter, regulator
-from tolalloc.assembly.gains import final_errors
+from tolalloc.assembly.gains import final_errors, norms, precision_sweep
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.steps import Choice, Efforts, state_space, steps_in_order
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.reading.units import ARCSECOND

@@ -13,11 +13,10 @@ from scipy.optimize import minimize
 
 from studies.published.zhang2025_genetic import genetic_allocation
 from tests.validation_manual import shown
-from tolalloc.assembly.angular.allocation import allocate_angles, allocated
-from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.control import kalman_filter, regulator
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
+from tolalloc.assembly.tolerances import allocate_angles, allocated, best_precision, retuned_allocation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 

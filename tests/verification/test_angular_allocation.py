@@ -10,9 +10,8 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 from studies.published.zhang2025_genetic import genetic_allocation
-from tolalloc.assembly.angular.allocation import allocate_angles, verify_angles
-from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.files import load_plan
+from tolalloc.assembly.tolerances import allocate_angles, best_precision, retuned_allocation, verify_angles
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND

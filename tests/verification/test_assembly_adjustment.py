@@ -14,9 +14,8 @@ from tests.seeds import seeds
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
 from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.gains import FinalErrors, final_errors, tuned_gains
+from tolalloc.assembly.gains import FinalErrors, final_errors, norms, precision_sweep, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.precision_sweep import norms, precision_sweep
 from tolalloc.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_order
 from tolalloc.assembly.trajectory import Trajectory, foreseen, simulated
 from tolalloc.drawings.seeds import SeedTree

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tolalloc.assembly.adjustment import AssemblyRequest, assemble
 from tolalloc.assembly.answer import tables, tolerance_tables, transmission
 from tolalloc.assembly.answer.answer import AssemblyAnswer
 from tolalloc.assembly.answer.cautions import assumptions, warnings
@@ -17,7 +18,6 @@ from tolalloc.assembly.answer.tables import characteristic_table, larger
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
-from tolalloc.assembly.request import AssemblyRequest, assemble
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.reading.units import ARCSECOND

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from tests.prepared import prepared as baseline
-from tolalloc.bench.diagnosis.bridge import Neighbourhood, bridge
-from tolalloc.bench.diagnosis.diagnosis import Diagnosis, diagnose
-from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
-from tolalloc.bench.diagnosis.search import DiagnosisEffort, climb
-from tolalloc.bench.diagnosis.sources import (
+from tolalloc.bench.diagnosis import Diagnosis, diagnose
+from tolalloc.bench.measurements import MeasuredCurve
+from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Neighbourhood, Noise, bridge, climb, thinned
+from tolalloc.bench.sources import (
     dominant,
     exchanged,
     groups,
@@ -22,7 +21,6 @@ from tolalloc.bench.diagnosis.sources import (
     reductions,
     with_twins,
 )
-from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError

@@ -29,7 +29,7 @@ from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import DATA as CHAINS
 from tolalloc.assembly.files import load_plan
-from tolalloc.bench.measurement.files import load_measurements
+from tolalloc.bench.measurements import load_measurements
 from tolalloc.drawings.correlation import load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree

@@ -14,7 +14,7 @@ from openpyxl.chart import BarChart
 
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
-from tolalloc.bench.measurement.readings import load_readings
+from tolalloc.bench.readings import load_readings
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError

@@ -15,14 +15,19 @@ from studies.published.liu2020_swarm import best_neighbours, velocity, weights
 from studies.published.liu2020_tables import BiasOnly, improvement
 from studies.published.recovery import recovery
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
-from tolalloc.bench.identification.data import AllReadings, ReadingBlock, data_of
-from tolalloc.bench.identification.gauss_newton import gauss_newton, starts
-from tolalloc.bench.identification.information import information
-from tolalloc.bench.identification.parameters import LIU2020, Parameter, parameter
-from tolalloc.bench.identification.prediction import KernelPredictor, Prediction, StandIn, fit_stand_in
-from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
-from tolalloc.bench.identification.profile import as_stiffness, estimates, profile
-from tolalloc.bench.identification.resampling import bootstrap, judged, simplest
+from tolalloc.bench.information import information
+from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton, require_enough, starts
+from tolalloc.bench.parameters import LIU2020, Parameter, parameter
+from tolalloc.bench.prediction import (
+    AllReadings,
+    KernelPredictor,
+    Prediction,
+    ReadingBlock,
+    StandIn,
+    data_of,
+    fit_stand_in,
+)
+from tolalloc.bench.profile import as_stiffness, bootstrap, estimates, judged, profile, simplest
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

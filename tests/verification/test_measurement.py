@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 
 from studies.published.measurement_folder import write_measurements
-from tolalloc.bench.measurement.cleaning import clean_curve, clean_loop
-from tolalloc.bench.measurement.files import (
+from tolalloc.bench.measurements import (
     MeasuredCurve,
     MeasuredLoop,
     MeasuredPeakToPeak,
     Measurements,
     load_measurements,
 )
-from tolalloc.bench.measurement.readings import RawReadings
-from tolalloc.bench.measurement.resampling import FULL, READINGS, resampled
+from tolalloc.bench.readings import FULL, READINGS, RawReadings, clean_curve, clean_loop, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.reducer.unit_file import BuiltUnit

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.assembly.mounting.places import (
+from tolalloc.assembly.mounting import best_mounting, random_mounting, units_from
+from tolalloc.assembly.places import (
     PartTurn,
     Place,
     carrier_turn,
@@ -22,9 +23,8 @@ from tolalloc.assembly.mounting.places import (
     sun_turn,
     unmounted,
 )
-from tolalloc.assembly.mounting.search import best_mounting, random_mounting, units_from
-from tolalloc.assembly.mounting.stock import MeasuredPart, PartStock, drawn_parts, load_parts, own_errors
-from tolalloc.bench.diagnosis.sources import half_turn
+from tolalloc.assembly.stock import MeasuredPart, PartStock, drawn_parts, load_parts, own_errors
+from tolalloc.bench.sources import half_turn
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.bench.identification.catalogue import BEARINGS, identify_from_catalogue, with_bearings
+from tolalloc.bench.catalogue import BEARINGS, identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.perfect import exact_loop

@@ -24,8 +24,8 @@ def assemble(
 ) -> None:
     """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.assembly.request import assemble as assembled
-    from tolalloc.assembly.request import prepare_assembly
+    from tolalloc.assembly.adjustment import assemble as assembled
+    from tolalloc.assembly.adjustment import prepare_assembly
     from tolalloc.reports.folder import require_usable
 
     request = prepare_assembly(chain, measured, precision, seed)

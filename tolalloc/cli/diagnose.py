@@ -29,7 +29,7 @@ def diagnose(
 ) -> None:
     """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.bench.diagnosis.request import DiagnosisRequest, diagnose_unit
+    from tolalloc.bench.diagnosis import DiagnosisRequest, diagnose_unit
     from tolalloc.drawings.drawing import load_drawing
     from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
     from tolalloc.reports.folder import require_usable

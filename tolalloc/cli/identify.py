@@ -15,14 +15,14 @@ from tolalloc.exceptions import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolalloc.bench.identification.answer import IdentificationAnswer
-    from tolalloc.bench.identification.catalogue import CatalogueAnswer
-    from tolalloc.bench.identification.parameters import Parameter
+    from tolalloc.bench.catalogue import CatalogueAnswer
+    from tolalloc.bench.identification_answer import IdentificationAnswer
+    from tolalloc.bench.parameters import Parameter
     from tolalloc.reducers.reducer.design import Reducer
 
 PLACE = "tolalloc identify"
 NAMES = "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, pin_contact, torque, bias"
-"""Names of `tolalloc.bench.identification.parameters.SYMBOLS`, written out so that help need not import them."""
+"""Names of `tolalloc.bench.parameters.SYMBOLS`, written out so that help need not import them."""
 
 
 def identify(
@@ -90,7 +90,7 @@ def _require_stiffness_file(file: Path, out: Path | None) -> None:
 
 def _from_catalogue(design: Reducer) -> tuple[CatalogueAnswer, list[tuple[pd.DataFrame, str]]]:
     """Return the factor on all bearings that gives the rigidity of the catalogue."""
-    from tolalloc.bench.identification.catalogue import identify_from_catalogue
+    from tolalloc.bench.catalogue import identify_from_catalogue
 
     announce_compilation()
     answer = identify_from_catalogue(design)
@@ -107,11 +107,11 @@ def _from_units(
 ) -> tuple[IdentificationAnswer, list[tuple[pd.DataFrame, str]]]:
     """Return the stiffnesses that measured units tell."""
     # The report's libraries take half a second to import; a misspelt file need not wait for them.
-    from tolalloc.bench.identification.exhibits import estimates_table
-    from tolalloc.bench.identification.parameters import LIU2020
-    from tolalloc.bench.identification.request import IdentificationRequest
-    from tolalloc.bench.identification.request import identify as identified
-    from tolalloc.bench.measurement.files import load_measurements
+    from tolalloc.bench.identification import IdentificationRequest
+    from tolalloc.bench.identification import identify as identified
+    from tolalloc.bench.identification_exhibits import estimates_table
+    from tolalloc.bench.measurements import load_measurements
+    from tolalloc.bench.parameters import LIU2020
 
     request = IdentificationRequest(
         parameters=asked_parameters(design, asked or list(LIU2020), priors or []),
@@ -139,7 +139,7 @@ def asked_parameters(reducer: Reducer, asked: list[str], priors: list[str]) -> t
     InputError, UnknownNameError
         What is not allowed.
     """
-    from tolalloc.bench.identification.parameters import parameter
+    from tolalloc.bench.parameters import parameter
 
     known: dict[str, float] = {}
     for text in priors:

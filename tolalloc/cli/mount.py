@@ -22,8 +22,8 @@ def mount(
 ) -> None:
     """Build the units with the least peak-to-peak from measured parts: who goes where, turned how far."""
     # The report's libraries take half a second to import; a misspelt option need not wait for them.
-    from tolalloc.assembly.mounting.request import mount as mounted
-    from tolalloc.assembly.mounting.request import prepare_mounting
+    from tolalloc.assembly.mounting import mount as mounted
+    from tolalloc.assembly.mounting import prepare_mounting
     from tolalloc.reports.folder import require_usable
 
     request = prepare_mounting(parts, named_reducer(reducer, out), torque, starts, seed)

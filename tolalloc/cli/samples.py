@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.assembly.files import DATA as CHAINS
-from tolalloc.assembly.mounting.places import places_of
+from tolalloc.assembly.places import places_of
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source

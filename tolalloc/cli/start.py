@@ -17,7 +17,7 @@ from pydantic import BaseModel, create_model
 
 from tolalloc.assembly.files import ChainRecord, PartRecord
 from tolalloc.assembly.steps import AssemblyStep
-from tolalloc.bench.measurement.files import CurveRecord, LoopRecord, MeasurementRecord, PeakToPeakRecord
+from tolalloc.bench.measurements import CurveRecord, LoopRecord, MeasurementRecord, PeakToPeakRecord
 from tolalloc.cli.samples import Samples
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.fields import COLUMNS, HEADERS

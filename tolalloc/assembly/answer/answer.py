@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.angular.allocation import AngularAllocation, AngularVerification
-from tolalloc.assembly.angular.tuning import PrecisionCost, RetunedAllocation
 from tolalloc.assembly.answer.cautions import assumptions, warnings
 from tolalloc.assembly.answer.sections import sections
 from tolalloc.assembly.answer.sentences import sentences
 from tolalloc.assembly.answer.summary import summary
 from tolalloc.assembly.answer.tables import characteristic_table
-from tolalloc.assembly.gains import Gains
+from tolalloc.assembly.gains import Gains, PrecisionSweep
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.precision_sweep import PrecisionSweep
+from tolalloc.assembly.tolerances import AngularAllocation, AngularVerification, PrecisionCost, RetunedAllocation
 from tolalloc.assembly.trajectory import Trajectory
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from tolalloc.assembly.angular.allocation import AngularAllocation
-from tolalloc.assembly.angular.program import angular_problem
 from tolalloc.assembly.answer.tables import has_limits, rounded
 from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.tolerances import AngularAllocation, angular_problem
 from tolalloc.reading.units import ARCSECOND
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from scipy.stats import chi2
 from scipy.stats import f as fisher_f
 from scipy.stats import t as student
 
-from tolalloc.bench.identification.parameters import BIAS
-from tolalloc.bench.identification.prediction import Prediction
-from tolalloc.bench.identification.problem import IdentificationProblem
+from tolalloc.bench.least_squares import IdentificationProblem
+from tolalloc.bench.parameters import BIAS
+from tolalloc.bench.prediction import Prediction
 
 LEVEL = 0.95
 """Confidence of every interval [-]."""

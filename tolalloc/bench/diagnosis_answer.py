@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tolalloc.bench.diagnosis.diagnosis import Diagnosis
-from tolalloc.bench.diagnosis.problem import Noise
-from tolalloc.bench.measurement.files import MeasuredCurve
+from tolalloc.bench.measurements import MeasuredCurve
+from tolalloc.bench.posterior import Noise
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.reducer.design import Reducer
@@ -20,6 +19,8 @@ from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from tolalloc.bench.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.assembly.mounting.places import PartTurn, Place, mounted, own_name, owned_columns, places_of, unmounted
+from tolalloc.assembly.places import PartTurn, Place, mounted, own_name, owned_columns, places_of, unmounted
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import ANGULAR
@@ -148,7 +148,7 @@ class MeasuredPart:
     """
 
     name: str  # What is written on the part
-    kind: str  # Kind of place that it fits, `tolalloc.assembly.mounting.places.Place.kind`
+    kind: str  # Kind of place that it fits, `tolalloc.assembly.places.Place.kind`
     # Error in the part's own name, such as ``runout.cos1`` of a disc → deviation in its own frame [m, angles rad]
     errors: Mapping[str, float]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.mounting.stock import Mountings, PartStock
+from tolalloc.assembly.stock import Mountings, PartStock
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series

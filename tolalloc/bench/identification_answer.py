@@ -10,15 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.identification import exhibits
-from tolalloc.bench.identification.data import PEAK_TO_PEAK, AllReadings
-from tolalloc.bench.identification.gauss_newton import Identified
-from tolalloc.bench.identification.information import Information
-from tolalloc.bench.identification.parameters import BIAS, Parameter
-from tolalloc.bench.identification.prediction import LARGE_DRIFT, Prediction
-from tolalloc.bench.identification.profile import ParameterEstimate, ParameterProfile, as_stiffness
-from tolalloc.bench.identification.resampling import ParameterChoice
-from tolalloc.bench.measurement.files import Measurements
+from tolalloc.bench import identification_exhibits as exhibits
+from tolalloc.bench.information import Information
+from tolalloc.bench.least_squares import Identified
+from tolalloc.bench.measurements import Measurements
+from tolalloc.bench.parameters import BIAS, Parameter
+from tolalloc.bench.prediction import LARGE_DRIFT, PEAK_TO_PEAK, AllReadings, Prediction
+from tolalloc.bench.profile import ParameterChoice, ParameterEstimate, ParameterProfile, as_stiffness
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import write_identified_stiffness

@@ -7,16 +7,13 @@ from math import isfinite
 
 import numpy as np
 
-from tolalloc.bench.identification.answer import IdentificationAnswer
-from tolalloc.bench.identification.data import LOOP, AllReadings, data_of
-from tolalloc.bench.identification.gauss_newton import Identified, gauss_newton, starts
-from tolalloc.bench.identification.information import information
-from tolalloc.bench.identification.parameters import BIAS, TORQUE, Parameter, parameter
-from tolalloc.bench.identification.prediction import LARGE_DRIFT, KernelPredictor, StandIn, fit_stand_in
-from tolalloc.bench.identification.problem import IdentificationProblem, require_enough
-from tolalloc.bench.identification.profile import estimates, profile
-from tolalloc.bench.identification.resampling import FEWEST_UNITS, ParameterChoice, bootstrap, judged, simplest
-from tolalloc.bench.measurement.files import Measurements
+from tolalloc.bench.identification_answer import IdentificationAnswer
+from tolalloc.bench.information import information
+from tolalloc.bench.least_squares import IdentificationProblem, Identified, gauss_newton, require_enough, starts
+from tolalloc.bench.measurements import Measurements
+from tolalloc.bench.parameters import BIAS, TORQUE, Parameter, parameter
+from tolalloc.bench.prediction import LARGE_DRIFT, LOOP, AllReadings, KernelPredictor, StandIn, data_of, fit_stand_in
+from tolalloc.bench.profile import FEWEST_UNITS, ParameterChoice, bootstrap, estimates, judged, profile, simplest
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND

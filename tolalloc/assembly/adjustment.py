@@ -8,16 +8,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.angular.allocation import AngularAllocation, allocate_angles, verify_angles
-from tolalloc.assembly.angular.program import angular_limits
-from tolalloc.assembly.angular.tuning import best_precision, retuned_allocation
 from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_errors, load_plan
-from tolalloc.assembly.gains import expected_angles, tuned_gains
+from tolalloc.assembly.gains import expected_angles, norms, precision_sweep, tuned_gains
 from tolalloc.assembly.orientations import transmission_effect
 from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
-from tolalloc.assembly.precision_sweep import norms, precision_sweep
+from tolalloc.assembly.tolerances import (
+    AngularAllocation,
+    allocate_angles,
+    angular_limits,
+    best_precision,
+    retuned_allocation,
+    verify_angles,
+)
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
-from tolalloc.bench.diagnosis.problem import CurveProblem, Noise, thinned
-from tolalloc.bench.diagnosis.search import DiagnosisEffort, explain, posterior
-from tolalloc.bench.diagnosis.sources import (
+from tolalloc.bench.diagnosis_answer import DiagnosisAnswer
+from tolalloc.bench.measurements import MeasuredCurve
+from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Noise, explain, posterior, thinned
+from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings
+from tolalloc.bench.sources import (
     InseparableColumns,
     dominant,
     exchanged,
@@ -21,13 +24,19 @@ from tolalloc.bench.diagnosis.sources import (
     reductions,
     with_twins,
 )
-from tolalloc.bench.measurement.files import MeasuredCurve
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.choice import bind
+from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reports.header import Header
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import Progress, RunRecord
 
 IMPLAUSIBLE = 0.001
 """Probability of residuals as large, were the model true, below which a curve is not explained [-]."""
@@ -185,4 +194,90 @@ def _fit(
         chi_square=square,
         freedom=readings.freedom,
         explained=bool(chi2.sf(square, readings.freedom) >= IMPLAUSIBLE),
+    )
+
+
+LARGEST_NOISE = 60.0
+"""Largest error of a reading that is believed [arcsec]."""
+
+PLACE = "diagnosis"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisRequest:
+    """Which unit is to be diagnosed."""
+
+    curve: Path  # CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``
+    reducer: Reducer  # Nominal design, with the stiffness in use
+    errors: ErrorModel  # What the drawings say of its parts
+    # Torque on the carrier, negative where it resists the rotation; the test torque unless given [N·m]
+    torque_nm: float | None = None
+    noise_arcsec: float = 0.5  # Standard deviation of one reading [arcsec]
+    discrepancy_arcsec: float = 0.5  # Standard deviation of what the model leaves out [arcsec]
+    angle_offset_deg: float = 0.0  # Added to every angle of the bench [deg]
+    level: float = 0.97  # Probability that the named sources must have of containing the dominant one [-]
+    seed: int = 1  # Seed of every random number [-]
+    effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
+
+    def __post_init__(self) -> None:
+        for name, value, good, allowed in (
+            (
+                "noise_arcsec",
+                self.noise_arcsec,
+                0 < self.noise_arcsec <= LARGEST_NOISE,
+                f"above 0 up to {LARGEST_NOISE:g}",
+            ),
+            ("discrepancy_arcsec", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
+            ("angle_offset_deg", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
+            ("level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
+        ):
+            if not good:
+                raise InputError.of_argument(PLACE, name, value, allowed)
+        require_seed(PLACE, self.seed)
+
+
+def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAnswer:
+    """Return what the curve of a unit tells of its parts, and tell how far the work has come.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    SolveError
+        Too many curves failed.
+    """
+    record = RunRecord(progress, OUTCOMES)
+    kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE)
+    cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)
+    kernel, errors = replace(kernel, observe=record.observe), request.errors
+    curve = MeasuredCurve(
+        unit=0,
+        torque=kernel.torque,
+        carrier_angle=cleaned.along,
+        transmission_error=cleaned.values,
+        repairs=cleaned.repairs,
+    )
+    noise = Noise(
+        reading=request.noise_arcsec * cleaned.noise_factor * ARCSECOND,
+        discrepancy=request.discrepancy_arcsec * ARCSECOND,
+    )
+    with one_blas_thread(), record.stage("diagnosis"):
+        seeds = SeedTree(request.seed).child("diagnosis")
+        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, request.effort, request.level)
+    return DiagnosisAnswer(
+        header=Header(
+            name=request.curve.stem,
+            model=request.reducer.name,
+            seed=request.seed,
+            assumptions=assumed,
+            statuses=record.counts,
+            stages=record.stages,
+        ),
+        reducer=request.reducer,
+        torque=kernel.torque,
+        errors=errors,
+        curve=curve,
+        noise=noise,
+        level=request.level,
+        diagnosis=found,
     )

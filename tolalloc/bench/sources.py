@@ -14,8 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from tolalloc.bench.diagnosis.bridge import LogDensity
-from tolalloc.bench.diagnosis.problem import CurveProblem
+from tolalloc.bench.posterior import CurveProblem, LogDensity
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.exceptions import SolveError
 from tolalloc.reducers.reducer.design import Reducer

@@ -11,17 +11,19 @@ import numpy as np
 from jaxtyping import Float, Int
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from tolalloc.bench.measurement.cleaning import LARGEST_RANGE, clean_curve, clean_loop
-from tolalloc.bench.measurement.readings import (
+from tolalloc.bench.readings import (
     ANGLE,
+    LARGEST_RANGE,
     PEAK_TO_PEAK,
     TORQUE,
     TRANSMISSION_ERROR,
     TWIST,
+    Cleaned,
+    clean_curve,
+    clean_loop,
     load_readings,
     read_column,
 )
-from tolalloc.bench.measurement.resampling import Cleaned
 from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, validated

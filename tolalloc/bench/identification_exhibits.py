@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
-from tolalloc.bench.identification.data import CURVE, LOOP, PEAK_TO_PEAK, ReadingBlock
-from tolalloc.bench.identification.information import LEVEL
-from tolalloc.bench.identification.parameters import BIAS, Parameter
+from tolalloc.bench.information import LEVEL
+from tolalloc.bench.parameters import BIAS, Parameter
+from tolalloc.bench.prediction import CURVE, LOOP, PEAK_TO_PEAK, ReadingBlock
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reports.figure import Figure, Series
 
 if TYPE_CHECKING:
-    from tolalloc.bench.identification.answer import IdentificationAnswer
+    from tolalloc.bench.identification_answer import IdentificationAnswer
 
 _OPEN = 10.0  # width of an interval of a logarithm beyond which it says nothing [-]
 _TOP = 4.0  # a profile is drawn up to so many times its threshold

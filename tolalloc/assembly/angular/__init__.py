@@ -1,1 +1,0 @@
-"""Angular tolerances of parts that are adjusted while they are assembled."""

@@ -1,1 +1,0 @@
-"""Diagnosis: from the transmission error of one unit back to the errors of its parts."""

@@ -1,1 +1,0 @@
-"""From measured units to stiffnesses, and to what the measurements cannot tell."""

@@ -1,1 +1,0 @@
-"""Measured data of finished reducers: read from files, cleaned, every repair counted."""
