@@ -223,8 +223,8 @@ LONGER = (
         name="written_stiffness",
         commands=(
             "new @mine --with bench",
-            f"identify @mine/bench.toml {MINE} --parameter crank_disc_bearing --parameter bias=-5:5 --prior bias=1 "
-            "--write @stiffness.toml",
+            f"identify @mine/bench.toml {MINE} --parameter crank_disc_bearing=1e8:1e10 "
+            "--parameter pin_contact --prior pin_contact=0.2 --write @stiffness.toml",
             f"te {MINE} --stiffness @stiffness.toml",
         ),
     ),
