@@ -55,8 +55,8 @@ if TYPE_CHECKING:
     from tolalloc.reports.figure import Series as Series
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
-    from tolalloc.study.effort import Effort as Effort
-    from tolalloc.study.limit import Limit as Limit
+    from tolalloc.study.problem import Effort as Effort
+    from tolalloc.study.problem import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
     from tolalloc.study.questions import Calculation as Calculation
     from tolalloc.study.questions import Difference as Difference
@@ -76,7 +76,7 @@ _WHERE = {
     "Document": "reports.document",
     "Drawing": "drawings.drawing",
     "EFFICIENCY": "reducers",
-    "Effort": "study.effort",
+    "Effort": "study.problem",
     "Evaluation": "models.model",
     "FRICTION_TORQUE": "reducers",
     "Figure": "reports.figure",
@@ -85,7 +85,7 @@ _WHERE = {
     "InputError": "exceptions",
     "LOST_MOTION": "reducers",
     "LOST_MOTION_WITH_FRICTION": "reducers",
-    "Limit": "study.limit",
+    "Limit": "study.problem",
     "Model": "models.model",
     "PEAK_TO_PEAK": "reducers",
     "PRELOAD": "reducers",

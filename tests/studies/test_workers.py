@@ -16,7 +16,7 @@ from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
-from tolalloc.running.result_cache import KeptUnits
+from tolalloc.running.result_cache import ResultCache
 from tolalloc.running.workers import workers_at
 
 UNITS = 12 * 1024
@@ -69,7 +69,7 @@ def test_workers_that_are_killed_leave_the_same_bits(study, units, in_this_proce
 def test_what_workers_solved_is_kept_for_this_process(study, units, in_this_process, tmp_path):
     """However quickly it was there: it may have lain ready."""
     with workers_at("local") as workers:
-        kept = KeptUnits(folder=tmp_path, solved_by=workers)
+        kept = ResultCache(folder=tmp_path, solved_by=workers)
         study.model.mapped(kept).reading((ta.PEAK_TO_PEAK,))(units[:4096])
     known = len(list(tmp_path.iterdir()))
     assert known == 4
@@ -78,7 +78,7 @@ def test_what_workers_solved_is_kept_for_this_process(study, units, in_this_proc
         assert not list(chunks)
         return iter(())
 
-    mine = study.model.mapped(KeptUnits(folder=tmp_path, solved_by=solves_nothing)).reading((ta.PEAK_TO_PEAK,))
+    mine = study.model.mapped(ResultCache(folder=tmp_path, solved_by=solves_nothing)).reading((ta.PEAK_TO_PEAK,))
     np.testing.assert_array_equal(mine(units[:4096]).values, in_this_process[:4096])
 
 

@@ -21,7 +21,7 @@ from tolalloc.reports.header import Header
 from tolalloc.study.comparison import ComparisonAnswer
 from tolalloc.study.finished_run import read_run
 from tolalloc.study.prepared import Prepared
-from tolalloc.study.runner import run
+from tolalloc.study.study import run
 
 PROCESSES = "sources,process,model,fixed [{0}],factor [{0} µm^n],min [µm],max [µm],note\n{1}"
 TURNED = "*,turned,reciprocal,0.5,40,5,200,x\n*,ground,reciprocal,1.5,25,5,60,x\n"

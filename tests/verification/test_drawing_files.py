@@ -16,8 +16,8 @@ import tolalloc as ta
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.study.effort import Effort
 from tolalloc.study.prepared import Prepared
+from tolalloc.study.problem import Effort
 
 GAP, SPRING = "gap [mm]", "spring [mm]"
 ZONE = {"unit": "mm", "min": 0.005, "max": 0.3, "distribution": "normal", "Cp": 1.0}

@@ -22,7 +22,7 @@ from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.surrogate.validation import answers_of
 from tolalloc.sensitivity.target import target_sensitivity
-from tolalloc.study.effort import QUICK
+from tolalloc.study.problem import QUICK
 
 ERRORS = ErrorModel(
     (Source(name="a", part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0),)

@@ -21,7 +21,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running import result_cache as kept_units
-from tolalloc.running.result_cache import KeptUnits
+from tolalloc.running.result_cache import ResultCache
 
 ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
 UNITS = 24
@@ -72,7 +72,7 @@ def x() -> np.ndarray:
 
 def test_what_was_solved_is_not_solved_again(model, x, solved, tmp_path):
     alone = model.kernel(x)
-    kept = model.mapped(KeptUnits(folder=tmp_path)).kernel
+    kept = model.mapped(ResultCache(folder=tmp_path)).kernel
     assert solved.chunks == 1
     for _ in range(3):
         found = kept(x)
@@ -82,7 +82,7 @@ def test_what_was_solved_is_not_solved_again(model, x, solved, tmp_path):
 
 
 def test_derivatives_and_other_outputs_are_kept_too(model, x, solved, tmp_path):
-    kept = model.mapped(KeptUnits(folder=tmp_path))
+    kept = model.mapped(ResultCache(folder=tmp_path))
     first, before = kept.kernel.with_derivatives(x), solved.chunks
     again = kept.kernel.with_derivatives(x)
     assert solved.chunks == before
@@ -95,7 +95,7 @@ def test_derivatives_and_other_outputs_are_kept_too(model, x, solved, tmp_path):
 
 
 def test_another_question_has_another_answer(model, x, solved, tmp_path):
-    kept = model.mapped(KeptUnits(folder=tmp_path)).kernel
+    kept = model.mapped(ResultCache(folder=tmp_path)).kernel
     other = replace(model.reducer, stiffness=replace(model.reducer.stiffness, pin_contact=1e8))
     questions = (
         (kept, x),
@@ -112,7 +112,7 @@ def test_another_question_has_another_answer(model, x, solved, tmp_path):
 
 @pytest.mark.parametrize("damage", ["cut", "bits", "empty", "foreign", "nothing"])
 def test_a_damaged_or_foreign_file_is_solved_again(model, x, solved, tmp_path, damage):
-    kept = model.mapped(KeptUnits(folder=tmp_path)).kernel
+    kept = model.mapped(ResultCache(folder=tmp_path)).kernel
     right = kept(x)
     (path,) = tmp_path.glob("*.units")
     content = path.read_bytes()
@@ -133,14 +133,14 @@ def test_a_damaged_or_foreign_file_is_solved_again(model, x, solved, tmp_path, d
 
 
 def test_the_oldest_files_go_where_there_are_too_many(model, x, solved, tmp_path):
-    kept = model.mapped(KeptUnits(folder=tmp_path)).kernel
+    kept = model.mapped(ResultCache(folder=tmp_path)).kernel
     for age, factor in enumerate((1.0, 2.0, 3.0)):
         known = set(tmp_path.glob("*.units"))
         kept(factor * x)
         (new,) = set(tmp_path.glob("*.units")) - known
         os.utime(new, (1000.0 + age, 1000.0 + age))
     size = new.stat().st_size
-    KeptUnits(folder=tmp_path, largest=2 * size + size // 2).pruned()
+    ResultCache(folder=tmp_path, largest=2 * size + size // 2).pruned()
     assert len(list(tmp_path.glob("*.units"))) == 2
     kept(3.0 * x), kept(2.0 * x)
     assert solved.chunks == 3
@@ -154,7 +154,7 @@ def test_a_full_disk_leaves_no_half_file(model, x, solved, tmp_path, monkeypatch
 
     monkeypatch.setattr(os, "fdopen", full)
     with pytest.raises(OSError, match="No space left"):
-        model.mapped(KeptUnits(folder=tmp_path)).kernel(x)
+        model.mapped(ResultCache(folder=tmp_path)).kernel(x)
     assert not list(tmp_path.iterdir())
     assert solved.chunks == 1
 
@@ -193,7 +193,7 @@ def test_every_process_looks_for_the_same_files():
 def test_what_a_user_wrote_is_never_kept(tmp_path, monkeypatch):
     """Its text may change while its name stays."""
     monkeypatch.setattr(kept_units, "_WORTH", 0.0)
-    answers = KeptUnits(folder=tmp_path)(own_function, [np.ones((2, 1)), np.zeros((2, 1))])
+    answers = ResultCache(folder=tmp_path)(own_function, [np.ones((2, 1)), np.zeros((2, 1))])
     assert [float(answer.values[0, 0]) for answer in answers] == [2.0, 0.0]
     assert not list(tmp_path.iterdir())
 

@@ -34,7 +34,7 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
     study = load_study(script)
     if any(question.reads for question in study.questions):
         prepared = Prepared(study=study)
-        summary, lines, verdict = _checked(prepared, script)
+        summary, lines, verdict = _checked(prepared, script, [question.kind for question in study.questions])
         if timed:
             found, said = _timed(prepared)
             summary, lines = {**summary, **found}, [*lines, *said]
@@ -49,7 +49,7 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
         typer.echo("\n".join(lines))  # in one piece: a check that is stopped says nothing rather than half
 
 
-def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str], str]:
+def _checked(prepared: Prepared, script: Path, kinds: list[str]) -> tuple[dict[str, Any], list[str], str]:
     """Return what a check found, for a program and in lines for a person, and the sentence that sums it up."""
     from tolalloc.drawings.tolerance_table import doubts
     from tolalloc.reading.units import COST_UNITS
@@ -57,7 +57,7 @@ def _checked(prepared: Prepared, script: Path) -> tuple[dict[str, Any], list[str
 
     study, model = prepared.study, prepared.model
     errors, requirements, space = prepared.errors, prepared.requirements, prepared.space
-    kinds, portrait = [question.kind for question in study.questions], portrait_of(model)
+    portrait = portrait_of(model)
     summary = {
         "study": study.name,
         "model": model.name,

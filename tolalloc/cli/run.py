@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,8 +14,9 @@ from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
 
 if TYPE_CHECKING:
-    from tolalloc.reports.answer import Answer
+    from tolalloc.reports.answer import Answer as Told
     from tolalloc.running.chunks import Mapper
+    from tolalloc.study.answer import Answer
     from tolalloc.study.study import Study
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
@@ -106,11 +107,11 @@ def allocate(
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
-    from tolalloc.study.questions import Allocation, named
+    from tolalloc.study.questions import Allocation, questions_of
 
     study = _with_first_limit(_asked(script, quick, seed), limit, yield_target)
     if grades:
-        own = named(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
+        own = questions_of(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     folder = out or Path("runs") / f"{study.name}-allocate"
@@ -163,11 +164,11 @@ class _Way:
 def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.reports.pdf import require_printable, write_pdf
-    from tolalloc.study.questions import named
-    from tolalloc.study.runner import kept_beside
-    from tolalloc.study.runner import run as run_study
+    from tolalloc.study.questions import questions_of
+    from tolalloc.study.study import kept_beside
+    from tolalloc.study.study import run as run_study
 
-    questions = named(kinds, tuple(study.questions), f"study {study.name}")
+    questions = questions_of(kinds, tuple(study.questions), f"study {study.name}")
     if way.paper:
         require_printable(way.paper)
     announce_kernel(study.model)
@@ -200,7 +201,7 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     return workers_at(scheduler)
 
 
-def _show(answer: Answer) -> None:
+def _show(answer: Answer[Any] | Told) -> None:
     """Print the first table of an answer, its sentences and its warnings."""
     tables = []
     if answer.tables:

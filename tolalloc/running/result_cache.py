@@ -45,7 +45,7 @@ class _NotKeptError(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
-class KeptUnits:
+class ResultCache:
     """A mapper, as `tolalloc.running.chunks.map_chunks` takes it, that solves only chunks that no file answers.
 
     Parameters
@@ -87,7 +87,7 @@ class KeptUnits:
         """Return the answer that a file has to a chunk, if there is one."""
         return _read(self.folder / f"{digest}{_ENDING}", digest) if digest else None
 
-    def pruned(self) -> KeptUnits:
+    def pruned(self) -> ResultCache:
         """Take the oldest files away until the rest is small enough, and return the same."""
         files = list[tuple[float, int, Path]]()
         for path in self.folder.glob(f"*{_ENDING}"):

@@ -54,7 +54,7 @@ class Duration:
 def durations(prepared: Prepared) -> tuple[Duration, ...]:
     """Return what the ranking and the allocation of a study will take, those of them that it asks."""
     found = []
-    for question in prepared.study.questions:
+    for question in prepared.study.asked:
         if isinstance(question, Ranking):
             parts = _of_ranking(prepared)
         elif isinstance(question, Allocation):

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from tolalloc.allocation.cost.process_costs import currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.space.design_space import DesignSpace
@@ -18,10 +17,7 @@ from tolalloc.models.model import Model
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
-from tolalloc.study.limit import Limit
-
-if TYPE_CHECKING:
-    from tolalloc.study.study import Study
+from tolalloc.study.problem import Limit, Problem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +27,12 @@ class Prepared:
     Parameters
     ----------
     study
-        What was asked for.
+        What it is about.
     mapper
         What solves the model's chunks of samples.
     """
 
-    study: Study
+    study: Problem
     mapper: Mapper = map
 
     @property
@@ -148,7 +144,7 @@ class Prepared:
         """Digest of the study and of what its files hold, wherever they stand."""
         study = self.study
         content = (
-            (study.name, study.seed, study.largest_failed_share, study.effort, study.questions),
+            (study.name, study.seed, study.largest_failed_share, study.effort, study.asked),
             (dict(study.limits), study.joint),
             self.model.content,
             self.errors.sources,

@@ -6,18 +6,22 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, is_number
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.reading.named_fields import NamedFields, Rule, a, flag, is_number, mapped, or_none, whole
+from tolalloc.reports.header import Header
+from tolalloc.study.answer import Answer
+from tolalloc.study.prepared import Prepared
 
 if TYPE_CHECKING:
-    from tolalloc.reports.answer import Answer
+    from tolalloc.reports.answer import Answer as Told
     from tolalloc.reports.document import Document
     from tolalloc.running.progress import RunRecord
-    from tolalloc.study.prepared import Prepared
+
+_ZONES = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +41,7 @@ class Question(NamedFields, ABC):
         cls.called = f"question {getattr(cls, 'kind', cls.__name__)}"
 
     @abstractmethod
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:
         """Return the answer.
 
         Parameters
@@ -61,7 +65,7 @@ class Ranking(Question):
 
     kind: ClassVar[str] = "ranking"
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
         from tolalloc.sensitivity.answer import rank
         from tolalloc.sensitivity.measures import Measures
@@ -98,19 +102,10 @@ class Difference(Question):
 
     kind: ClassVar[str] = "difference"
 
-    zones: Mapping[str, float]
-    units: int = 1024
+    zones: Annotated[Mapping[str, float], mapped(_ZONES, Rule("a number", is_number))]
+    units: Annotated[int, whole("a whole number from 100 to 10,000,000", 100, 10_000_000)] = 1024
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.zones, Mapping) or not all(
-            isinstance(name, str) and is_number(zone) for name, zone in self.zones.items()
-        ):
-            allowed = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
-            raise InputError.at("question difference", "zones", self.zones, allowed)
-        if not (type(self.units) is int and 100 <= self.units <= 10_000_000):
-            raise InputError.at("question difference", "units", self.units, "a whole number from 100 to 10,000,000")
-
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
         """Return both drawings on the same units."""
         from tolalloc.allocation.difference import difference
 
@@ -155,23 +150,14 @@ class Allocation(Question):
     kind: ClassVar[str] = "allocation"
     reads: ClassVar[frozenset[str]] = Question.reads | {"joint"}
 
-    grades: bool = False
-    fixed_first: bool = True
-    front: bool = True
-    what_if: bool = True
-    unit_price: UnitPrice | None = None
-    quality_loss: QualityLoss | None = None
+    grades: Annotated[bool, flag()] = False
+    fixed_first: Annotated[bool, flag()] = True
+    front: Annotated[bool, flag()] = True
+    what_if: Annotated[bool, flag()] = True
+    unit_price: Annotated[UnitPrice | None, or_none(a(UnitPrice, "UnitPrice(...) or None"))] = None
+    quality_loss: Annotated[QualityLoss | None, or_none(a(QualityLoss, "QualityLoss(...) or None"))] = None
 
-    def __post_init__(self) -> None:
-        for name in ("grades", "fixed_first", "front", "what_if"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError.at("question allocation", name, getattr(self, name), "True or False")
-        if not isinstance(self.unit_price, UnitPrice | None):
-            raise InputError.at("question allocation", "unit_price", self.unit_price, "UnitPrice(...) or None")
-        if not isinstance(self.quality_loss, QualityLoss | None):
-            raise InputError.at("question allocation", "quality_loss", self.quality_loss, "QualityLoss(...) or None")
-
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:
         """Return the cheapest drawing."""
         from tolalloc.allocation.drawing_question import DrawingQuestion, allocate_drawing
 
@@ -210,15 +196,17 @@ class Calculation(Question):
 
     build: Callable[[bool], Document]
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
         """Return what the function made."""
-        from tolalloc.study.calculated import CalculatedAnswer
+        study = prepared.study
+        with record.stage(study.name):
+            made = self.build(study.quick)
+        return Answer(
+            kind=self.kind, header=Header(name=study.name, model="", seed=made.seed, quick=study.quick), result=made
+        )
 
-        with record.stage(prepared.study.name):
-            return CalculatedAnswer.of(self.build(prepared.study.quick), prepared)
 
-
-def named(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:
+def questions_of(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:
     """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults.
 
     Raises

@@ -18,8 +18,7 @@ from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import Progress
 from tolalloc.study.finished_run import FinishedRun, read_run
 from tolalloc.study.prepared import Prepared
-from tolalloc.study.runner import run
-from tolalloc.study.study import Study
+from tolalloc.study.study import Study, run
 
 _NUMBERS = {
     "cost [cost units]": "cost [cost units]",

@@ -1,66 +1,69 @@
-"""What a user asks for: a model, a drawing, limits and questions, checked as a whole before anything long runs."""
+"""A study: a problem with its questions, asked one by one or run into one folder with one report."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
-from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, is_number
-from tolalloc.study.effort import QUICK, Effort
-from tolalloc.study.limit import Limit
-from tolalloc.study.questions import Allocation, Question, Ranking, named
+from tolalloc.exceptions import InputError
+from tolalloc.reading.named_fields import Rule
+from tolalloc.reports.document import Document, joined
+from tolalloc.reports.folder import claimed
+from tolalloc.reports.portrait import portrait_of
+from tolalloc.running.chunks import Mapper
+from tolalloc.running.progress import Progress, RunRecord, Silent
+from tolalloc.running.result_cache import ResultCache
+from tolalloc.study.answer import Answer
+from tolalloc.study.prepared import Prepared
+from tolalloc.study.problem import Effort, Problem
+from tolalloc.study.questions import Allocation, Calculation, Question, Ranking, questions_of
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer
-    from tolalloc.drawings.drawing import Drawing
-    from tolalloc.models.model import ModelSource
-    from tolalloc.reports.answer import Answer
-    from tolalloc.running.progress import Progress
+    from tolalloc.reports.answer import Answer as Told
     from tolalloc.sensitivity.answer import RankingAnswer
-    from tolalloc.study.runner import Run
 
-
-_TITLE_BLOCK = ("drawing number", "revision", "author")
-_LONGEST_TEXT = 60
-_NAME = r"[\w-][\w. -]{0,99}"
-
-
-def _effort(name: str, place: str) -> Effort:
-    """Return the effort of a name, ``quick`` or ``full``."""
-    if name not in ("quick", "full"):
-        raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
-    return QUICK if name == "quick" else Effort()
-
-
-def _is_source(model: object) -> bool:
-    return hasattr(model, "bound") and not isinstance(model, type)
-
-
-def _is_share(value: object) -> bool:
-    return is_number(value) and 0 <= cast("float", value) < 0.5
-
-
-def _are_named(limits: object) -> bool:
-    return isinstance(limits, Mapping) and all(isinstance(output, str) for output in limits)
-
-
-def _is_title_block(given: object) -> bool:
-    return isinstance(given, Mapping) and all(
-        label in _TITLE_BLOCK and isinstance(text, str) and len(text) <= _LONGEST_TEXT for label, text in given.items()
-    )
+_READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
 
 
 def _are_questions(given: object) -> bool:
     return isinstance(given, Sequence) and bool(given) and all(isinstance(one, Question) for one in given)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A finished study.
+
+    Parameters
+    ----------
+    answers
+        Kind of question → answer, in the order of the study.
+    folder
+        Where the report stands; none if nothing was written.
+    document
+        The one report.
+    """
+
+    answers: dict[str, Answer[Any] | Told]
+    folder: Path | None
+    document: Document
+
+    def __repr__(self) -> str:
+        """Return what was answered and where it stands."""
+        return f"<run of {', '.join(self.answers)}: {self.folder or 'nothing written'}>"
+
+    def __getitem__(self, kind: str) -> Answer[Any] | Told:
+        return self.answers[kind]
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: every answer."""
+        return "\n".join(answer._repr_html_() for answer in self.answers.values())
+
+
 @dataclass(frozen=True, repr=False)
-class Study(NamedFields):
+class Study(Problem):
     """A study: what is asked of a model at the zones of a drawing.
 
     Parameters
@@ -102,72 +105,39 @@ class Study(NamedFields):
     """
 
     called: ClassVar[str] = "study"
-    by_position: ClassVar[int] = 2
 
-    model: ModelSource | None = None
-    drawing: Drawing | None = None
-    limits: Mapping[str, Limit | None] = field(default_factory=dict)
-    joint: AtYield | None = None
-    questions: Sequence[Question] = (Ranking(), Allocation())
-    name: str = "study"
-    seed: int = 1
-    largest_failed_share: float = 0.01
-    effort: Effort = field(default_factory=Effort)
-    title_block: Mapping[str, str] = field(default_factory=dict)
+    questions: Annotated[
+        Sequence[Question], Rule("ta.Ranking(...), ta.Allocation(...) and other questions", _are_questions)
+    ] = (Ranking(), Allocation())
 
     def __post_init__(self) -> None:
-        is_name = isinstance(self.name, str) and re.fullmatch(_NAME, self.name)
-        place = f"study {self.name}" if is_name else "study"
         if isinstance(self.questions, Question):
             object.__setattr__(self, "questions", (self.questions,))
-        if isinstance(self.effort, str):
-            object.__setattr__(self, "effort", _effort(self.effort, place))
-        for name, good, allowed in (
-            ("name", is_name, "100 letters, digits, '_', '-', '.' and blanks, or less"),
-            ("model", self.model is None or _is_source(self.model), "ta.reducer(...), ta.model(...) or another model"),
-            ("drawing", self.drawing is None or hasattr(self.drawing, "errors"), "ta.drawing(...)"),
-            ("limits", _are_named(self.limits), "a dictionary of outputs and their ta.Limit(...)"),
-            ("joint", self.joint is None or isinstance(self.joint, AtYield), "ta.AtYield(...) or None"),
-            ("seed", type(self.seed) is int and self.seed >= 0, "0 or a positive integer"),
-            ("largest_failed_share", _is_share(self.largest_failed_share), "0 to 0.5"),
-            ("questions", _are_questions(self.questions), "ta.Ranking(...), ta.Allocation(...) and other questions"),
-            (
-                "title_block",
-                _is_title_block(self.title_block),
-                f"a dictionary of texts up to {_LONGEST_TEXT} characters under {', '.join(_TITLE_BLOCK)}",
-            ),
-            ("effort", hasattr(self.effort, "is_quick"), "'quick', 'full' or ta.Effort(...)"),
-        ):
-            if not good:
-                raise InputError.at(place, name, getattr(self, name), allowed)
+        super().__post_init__()
         object.__setattr__(self, "questions", tuple(self.questions))
         kinds = [question.kind for question in self.questions]
         for kind in kinds:
             if kinds.count(kind) > 1:
-                raise InputError(f"{place}: it asks {kind} {kinds.count(kind)} times; a study asks each question once.")
-        for output, limit in self.limits.items():
-            if not isinstance(limit, Limit | None):
-                raise InputError.at(
-                    place, f"limits[{output!r}]", limit, "ta.Limit(...), or None to lift the model's own"
-                )
-        self._require_read(place)
+                times = f"it asks {kind} {kinds.count(kind)} times"
+                raise InputError(f"{self.place}: {times}; a study asks each question once.")
+        self._require_read()
 
-    def _require_read(self, place: str) -> None:
+    def _require_read(self) -> None:
         """Raise if a field is given that no question reads."""
-        read = frozenset().union(*(question.reads for question in self.questions)) | {
-            "name",
-            "questions",
-            "effort",
-            "title_block",
-        }
-        kinds = ", ".join(question.kind for question in self.questions)
+        read = _READ_BY_ALL.union(*(question.reads for question in self.questions))
         for own in fields(self):
             default = own.default_factory() if callable(own.default_factory) else own.default
             if own.name not in read and getattr(self, own.name) != default:
+                kinds = ", ".join(question.kind for question in self.questions)
                 raise InputError(
-                    f"{place}: no question of it reads {own.name} (it asks: {kinds}); leave it out or "
+                    f"{self.place}: no question of it reads {own.name} (it asks: {kinds}); leave it out or "
                     "ask what reads it."
                 )
+
+    @property
+    def asked(self) -> tuple[object, ...]:
+        """What is asked."""
+        return tuple(self.questions)
 
     def __repr__(self) -> str:
         asked = ", ".join(question.kind for question in self.questions)
@@ -177,53 +147,13 @@ class Study(NamedFields):
         )
         return f"Study({self.name!r}: {model} at {drawing}; limits: {limits}; asks: {asked}; seed {self.seed})"
 
-    @property
-    def quick(self) -> bool:
-        """Whether the effort is the small one."""
-        return self.effort.is_quick
-
-    def with_effort(self, effort: Literal["quick", "full"] | Effort | None) -> Study:
-        """Return the study at another effort, as it is where none is given."""
-        if effort is None:
-            return self
-        return replace(self, effort=_effort(effort, f"study {self.name}") if isinstance(effort, str) else effort)
-
-    def changed(
-        self, drawing: Drawing | str | Path, settings: Mapping[str, float] | None = None, name: str = ""
-    ) -> Study:
-        """Return the study at another drawing, and at other values of the model's settings and operating conditions.
-
-        Parameters
-        ----------
-        drawing
-            Another drawing, or the path of a tolerance table whose zones the present one takes; its correlations and
-            process costs stay.
-        settings
-            Setting or operating condition → its value [unit of its name], such as ``{"flank clearance [µm]": 2.0}``.
-        name
-            Name of the new study; that of this one unless given.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A table that cannot be read, a setting that the model does not have, a value outside its bounds.
-        """
-        if self.drawing is None or self.model is None:
-            raise InputError(f"study {self.name}: it has no {'drawing' if self.model else 'model'} that could change.")
-        model = self.model.set_to(settings) if settings else self.model
-        other = self.drawing.with_table(drawing) if isinstance(drawing, str | Path) else drawing
-        # What is asked for counts before what the drawing states.
-        asked = {name: value for name, value in (settings or {}).items() if name in other.settings}
-        other = replace(other, settings={**other.settings, **asked})
-        return replace(self, model=model, drawing=other, name=name or self.name)
-
     def ask(
         self,
         question: Question | str,
         effort: Literal["quick", "full"] | Effort | None = None,
         progress: Progress | None = None,
         checkpoint: Path | None = None,
-    ) -> Answer:
+    ) -> Answer[Any] | Told:
         """Return the answer to one question, of this study or any other.
 
         Parameters
@@ -237,11 +167,10 @@ class Study(NamedFields):
         checkpoint
             File that keeps an interrupted search, if one is wanted.
         """
-        from tolalloc.study.runner import answered
-
         if isinstance(question, str):
-            question = named((question,), tuple(self.questions), f"study {self.name}")[0]
-        return answered(self.with_effort(effort), question, progress, checkpoint)
+            question = questions_of((question,), tuple(self.questions), self.place)[0]
+        prepared = Prepared(study=self.with_effort(effort))
+        return question.answer(prepared, _record(prepared, question, progress), checkpoint)
 
     def rank(
         self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
@@ -279,6 +208,76 @@ class Study(NamedFields):
         TolallocError
             One sentence on what is wrong; nothing is written then.
         """
-        from tolalloc.study.runner import run
-
         return run(self.with_effort(effort), Path(folder or Path("runs") / self.name), progress=progress, fresh=fresh)
+
+
+def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:
+    outcomes = portrait_of(prepared.model).outcomes if "model" in question.reads else {}
+    return RunRecord(progress or Silent(), outcomes)
+
+
+def run(
+    study: Study,
+    folder: Path,
+    questions: tuple[Question, ...] = (),
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+    *,
+    fresh: bool = False,
+    solved_by: Mapper = map,
+) -> Run:
+    """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
+
+    Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `kept_beside`, and a
+    run that was stopped takes them from there, unless it is to begin afresh. All others are solved by a mapper: this
+    process unless given.
+
+    Raises
+    ------
+    TolallocError
+        One sentence on what is wrong.
+    """
+    asked = questions or tuple(study.questions)
+    kept = replace(kept_beside(folder), solved_by=solved_by).pruned()
+    prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
+    with claimed(folder) as beside:
+        answers = {
+            question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
+            for question in asked
+        }
+        from tolalloc.reports.writer import write_document
+
+        document = _document(prepared, answers)
+        if study.model is not None:
+            prepared.model.put_away()  # drawing the figures takes as much memory
+        for answer in answers.values():
+            answer.add_files(beside)
+        write_document(document, beside)
+    return Run(answers=answers, folder=folder, document=document)
+
+
+def kept_beside(folder: Path) -> ResultCache:
+    """Return where the units of runs into neighbouring folders are kept."""
+    return ResultCache(folder=folder.absolute().parent / ".tolalloc-units")
+
+
+def _document(prepared: Prepared, answers: dict[str, Answer[Any] | Told]) -> Document:
+    """Return the one report: the answer itself where there is one, all of them under their study otherwise."""
+    study, first = prepared.study, next(iter(answers.values()))
+    known: dict[str, Any] = {
+        "study": study.name,
+        "study hash": first.header.digest,
+        "quick": study.quick,
+        "questions": list(answers),
+        "currency": first.header.currency,
+        "statuses": {kind: dict(answer.header.statuses) for kind, answer in answers.items()},
+        "stages": {kind: dict(answer.header.stages) for kind, answer in answers.items()},
+    }
+    if not set(answers) - {Calculation.kind}:
+        return replace(
+            first.document, manifest=known, title_block=study.title_block
+        )  # a calculation has a summary of its own, not one beside others
+    title = first.title if len(answers) == 1 else f"{first.header.model}: {study.name}"
+    parts = [(kind, answer.document) for kind, answer in answers.items()]
+    whole = joined(title, first.subtitle, parts, **known, seed=study.seed)
+    return replace(whole, title_block=study.title_block)

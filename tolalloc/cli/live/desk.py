@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from threading import Event, Lock, Thread
-from typing import Any
+from typing import Any, cast
 
 from tolalloc.cli.live.session import LiveDesign, LiveUnits, Session, names_in
 from tolalloc.drawings.sources import Source
@@ -141,7 +141,7 @@ class Saving:
             raise InputError(f"study {before.name}: it has no drawing that could change.")
         sources = (replace(own, locked=own.locked or own.name in locked) for own in self.session.sources(design))
         drawing = before.drawing.with_sources(sources)
-        return before.changed(drawing, self._settings(design), name)
+        return cast("Study", before.changed(drawing, self._settings(design), name))
 
     def save(self, design: LiveDesign, name: str) -> dict[str, Any]:
         """Write the tolerance table and the study of a design, and return their names.

@@ -1,0 +1,247 @@
+"""What a study is about: a model at a drawing, the limits of its outputs, and how much may be computed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee
+from tolalloc.capability.indices import Limits
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.named_fields import NamedFields, Rule, a, mapped, number, or_none, whole
+from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
+
+if TYPE_CHECKING:
+    from tolalloc.drawings.drawing import Drawing
+    from tolalloc.models.model import ModelSource
+
+_TITLE_BLOCK = ("drawing number", "revision", "author")
+_TITLES = ", ".join(_TITLE_BLOCK)
+_LONGEST_TEXT = 60
+_NAME = re.compile(r"[\w-][\w. -]{0,99}")
+_SIDE = or_none(number("a finite number; an open side is None"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit(NamedFields):
+    """Limits of an output and what must be shown of them.
+
+    Parameters
+    ----------
+    upper, lower
+        Largest and smallest value allowed; an open side is None [unit of the output].
+    show
+        What must be shown: ``AtYield(target=…)``, ``AtCpk(target=…)``, ``WorstCase()``, ``RootSumSquare()``;
+        99.73 % of units unless given.
+
+    Raises
+    ------
+    InputError
+        No side, sides in the wrong order, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> Limit(upper=60.0).upper
+    60.0
+    """
+
+    called: ClassVar[str] = "limit"
+
+    upper: Annotated[float | None, _SIDE] = None
+    lower: Annotated[float | None, _SIDE] = None
+    show: Guarantee | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.show, type) or not (self.show is None or isinstance(self.show, Guarantee)):
+            raise InputError.at("limit", "show", self.show, "AtYield(...), AtCpk(...), WorstCase() or RootSumSquare()")
+        super().__post_init__()
+        for name in ("upper", "lower"):
+            if (side := getattr(self, name)) is not None:
+                object.__setattr__(self, name, float(side))  # a study asks the same with 60 and with 60.0
+        _ = self.limits
+
+    @property
+    def guarantee(self) -> Guarantee:
+        """What must be shown."""
+        return self.show or AtYield(target=USUAL_YIELD)
+
+    @property
+    def limits(self) -> Limits:
+        """The limits alone."""
+        return Limits(upper=self.upper, lower=self.lower)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort(NamedFields):
+    """How much a study may compute: full unless numbers are given.
+
+    Parameters
+    ----------
+    ranking
+        Effort of a ranking.
+    allocation
+        Effort of an allocation.
+    is_quick
+        Whether reports shall say that the run is a quick one.
+
+    Raises
+    ------
+    InputError
+        A field of another kind.
+    """
+
+    called: ClassVar[str] = "effort"
+
+    ranking: Annotated[RankingEffort, a(RankingEffort)] = field(default_factory=RankingEffort)
+    allocation: Annotated[AllocationEffort, a(AllocationEffort)] = field(default_factory=AllocationEffort)
+    is_quick: Annotated[bool, a(bool)] = False
+
+
+QUICK = Effort(ranking=QUICK_RANKING, allocation=QUICK_ALLOCATION, is_quick=True)
+"""Effort of a quick run: every stage is real, every interval wide."""
+
+
+def effort_of(name: str, place: str) -> Effort:
+    """Return the effort of a name, ``quick`` or ``full``."""
+    if name not in ("quick", "full"):
+        raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
+    return QUICK if name == "quick" else Effort()
+
+
+def _is_source(model: object) -> bool:
+    return model is None or (hasattr(model, "bound") and not isinstance(model, type))
+
+
+def _is_drawing(given: object) -> bool:
+    return given is None or hasattr(given, "errors")
+
+
+def _is_title_block(given: object) -> bool:
+    return isinstance(given, Mapping) and all(
+        label in _TITLE_BLOCK and isinstance(text, str) and len(text) <= _LONGEST_TEXT for label, text in given.items()
+    )
+
+
+@dataclass(frozen=True, repr=False)
+class Problem(NamedFields):
+    """A model at the zones of a drawing, what is limited, and how much may be computed.
+
+    Parameters
+    ----------
+    model
+        What answers: ``ta.reducer(...)``, ``ta.model(...)``.
+    drawing
+        The tolerance table, ``ta.drawing(...)``.
+    limits
+        Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
+        None lifts a limit that the model has of its own: no unit of a reducer may be preloaded, `PRELOAD`.
+    joint
+        Share of units that must keep all limits at once, ``AtYield(target=…)``; a limit that says nothing else of its
+        own need only be kept by them.
+    name
+        Name of the study and of its run folder.
+    seed
+        Seed of every random number [-].
+    largest_failed_share
+        Share of units without an answer above which a question stops [-].
+    effort
+        How much may be computed.
+    title_block
+        What the first page of a report says beside study and date: ``drawing number``, ``revision``, ``author``. What
+        is not said stays empty there, to be filled in by hand.
+    """
+
+    called: ClassVar[str] = "study"
+    by_position: ClassVar[int] = 2
+
+    model: Annotated["ModelSource | None", Rule("ta.reducer(...), ta.model(...) or another model", _is_source)] = None
+    drawing: Annotated["Drawing | None", Rule("ta.drawing(...)", _is_drawing)] = None
+    limits: Annotated[
+        Mapping[str, Limit | None],
+        mapped("a dictionary of outputs and their ta.Limit(...)", Rule("", lambda _: True)),
+    ] = field(default_factory=dict)
+    joint: Annotated[AtYield | None, or_none(a(AtYield, "ta.AtYield(...) or None"))] = None
+    name: Annotated[
+        str, Rule("100 letters, digits, '_', '-', '.' and blanks, or less", lambda name: _is_name(name))
+    ] = "study"
+    seed: Annotated[int, whole("0 or a positive integer", 0)] = 1
+    largest_failed_share: Annotated[float, number("0 to 0.5", least=0, below=0.5)] = 0.01
+    effort: Annotated[Effort, a(Effort, "'quick', 'full' or ta.Effort(...)")] = field(default_factory=Effort)
+    title_block: Annotated[
+        Mapping[str, str],
+        Rule(
+            f"a dictionary of texts up to {_LONGEST_TEXT} characters under {', '.join(_TITLE_BLOCK)}", _is_title_block
+        ),
+    ] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.effort, str):
+            object.__setattr__(self, "effort", effort_of(self.effort, self.place))
+        super().__post_init__()
+        for output, limit in self.limits.items():
+            if not isinstance(limit, Limit | None):
+                allowed = "ta.Limit(...), or None to lift the model's own"
+                raise InputError.at(self.place, f"limits[{output!r}]", limit, allowed)
+
+    @property
+    def place(self) -> str:
+        """Who is meant, for messages."""
+        return self._place(vars(self))
+
+    @classmethod
+    def _place(cls, named: Mapping[str, Any]) -> str:
+        """Return who is meant; a name that is none is not said."""
+        return f"{cls.called} {named['name']}" if _is_name(named.get("name")) else cls.called
+
+    @property
+    def asked(self) -> tuple[object, ...]:
+        """What is asked; nothing yet."""
+        return ()
+
+    @property
+    def quick(self) -> bool:
+        """Whether the effort is the small one."""
+        return self.effort.is_quick
+
+    def with_effort(self, effort: Literal["quick", "full"] | Effort | None) -> Self:
+        """Return the same at another effort, as it is where none is given."""
+        if effort is None:
+            return self
+        return replace(self, effort=effort_of(effort, self.place) if isinstance(effort, str) else effort)
+
+    def changed(
+        self, drawing: Drawing | str | Path, settings: Mapping[str, float] | None = None, name: str = ""
+    ) -> Self:
+        """Return the same at another drawing, and at other values of the model's settings and operating conditions.
+
+        Parameters
+        ----------
+        drawing
+            Another drawing, or the path of a tolerance table whose zones the present one takes; its correlations and
+            process costs stay.
+        settings
+            Setting or operating condition → its value [unit of its name], such as ``{"flank clearance [µm]": 2.0}``.
+        name
+            Name of the new study; that of this one unless given.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A table that cannot be read, a setting that the model does not have, a value outside its bounds.
+        """
+        if self.drawing is None or self.model is None:
+            raise InputError(f"study {self.name}: it has no {'drawing' if self.model else 'model'} that could change.")
+        model = self.model.set_to(settings) if settings else self.model
+        other = self.drawing.with_table(drawing) if isinstance(drawing, str | Path) else drawing
+        # What is asked for counts before what the drawing states.
+        asked = {name: value for name, value in (settings or {}).items() if name in other.settings}
+        other = replace(other, settings={**other.settings, **asked})
+        return replace(self, model=model, drawing=other, name=name or self.name)
+
+
+def _is_name(given: object) -> bool:
+    return isinstance(given, str) and bool(_NAME.fullmatch(given))
