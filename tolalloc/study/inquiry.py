@@ -142,7 +142,8 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         if not any(own.name == "reducer" for own in fields(self)):
             return self
         files = (*written, *(getattr(self, name) for name in self.written))
-        return replace(self, reducer=named_reducer(getattr(self, "reducer"), *files, argument=argument))  # noqa: B009
+        named: dict[str, Any] = {"reducer": named_reducer(vars(self)["reducer"], *files, argument=argument)}
+        return replace(self, **named)
 
     def ask(self, progress: Progress | None = None) -> Answer[Any]:
         """Return the answer, the files that it names written."""
