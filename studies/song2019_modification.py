@@ -20,8 +20,8 @@ from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.modification import METRICS, ModificationRequest, reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.teeth.figures import clearance_figure
 from tolalloc.reports.document import Document, Section
+from tolalloc.reports.tellers.contact import clearance_figure
 
 STAGE = CycloidStage(
     pin_count=40,
@@ -127,7 +127,7 @@ def build(quick: bool) -> Document:
         )
     allowed = reference(rotated_profile_fit(STAGE, require_gap=True))
     without = assess(replace(own, modification=allowed.modification), -own.load.rated_torque)
-    clearance = positive.answer.contact.assessment.clearance
+    clearance = positive.answer.result.contact.assessment.clearance
     sections = (
         Section(
             heading="Negative shift",

@@ -19,7 +19,6 @@ from tolalloc.reducers.cycloid.mesh import normals
 from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.teeth.answer import contact_answer
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 
@@ -99,7 +98,7 @@ def build(quick: bool) -> Document:
         rows.append(row(f"steel line contact, {width:g} mm, linear method", pressed_linear(own, phase)))
         rows.append(row(f"steel line contact, {width:g} mm, law at every pin", steel[width]))
     share = float(np.mean(implied.pins_in_contact == 16))
-    found = contact_answer(reducer, -TORQUE)
+    found = ta.contact(reducer="rv40e_xi2015", torque=-TORQUE)
     return Document(
         title="RV-40E of xi2015: how many teeth carry 572 N·m",
         subtitle=f"{torque:g} N·m on the more loaded disc, {phase.size} phases of the pin pitch.",

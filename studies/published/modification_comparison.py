@@ -11,12 +11,14 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.modification import ModificationAnswer, ModificationProblem, ModificationRequest, choose
+from tolalloc.reducers.modification import ModificationProblem, ModificationRequest, ModificationResult, choose
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.teeth.answer import span
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.tellers.contact import span
 from tolalloc.running.progress import Progress
+from tolalloc.study.answer import Answer
+from tolalloc.study.inquiries.modify import answer_of
 
 from .li2018_genetic import binary_search
 from .modification_searches import ALGORITHMS, REACHED, SearchResult, Spread, polish, search
@@ -48,7 +50,7 @@ class ModificationComparison:
         First seed of each algorithm [-].
     """
 
-    answer: ModificationAnswer
+    answer: Answer[ModificationResult]
     spreads: tuple[Spread, ...]
     polished: tuple[float, ...]
     seed: int
@@ -69,18 +71,19 @@ def compared(
 ) -> ModificationComparison:
     """Return the best amounts and how every algorithm found them; each algorithm and finished search is told."""
     progress.begin("reference")
-    answer = choose(study, reducer, torque)
+    answer = answer_of(choose(study, reducer, torque))
+    chosen = answer.result
     progress.advance(1)
     spreads, polished = [], []
     for name, searcher in searchers(study.method).items():
         progress.begin(name)
         results = []
         for seed in seeds:
-            results.append(searcher(answer.problem, seed))
+            results.append(searcher(chosen.problem, seed))
             progress.advance(1)
-        spreads.append(Spread(results=tuple(results), reference=answer.best))
-        done = tuple(polish(answer.problem, result) for result in results)
-        polished.append(Spread(results=done, reference=answer.best).share)
+        spreads.append(Spread(results=tuple(results), reference=chosen.best))
+        done = tuple(polish(chosen.problem, result) for result in results)
+        polished.append(Spread(results=done, reference=chosen.best).share)
     return ModificationComparison(
         answer=answer, spreads=tuple(spreads), polished=tuple(polished), seed=next(iter(seeds))
     )
@@ -93,7 +96,7 @@ def _ends(lengths: Float[np.ndarray, " seed"]) -> str:
 
 def algorithms_table(found: ModificationComparison) -> pd.DataFrame:
     """Return what each algorithm found, over all its seeds."""
-    best = found.answer.best
+    best = found.answer.result.best
     rows: list[dict[str, object]] = [
         {
             "algorithm": "reference",
@@ -129,7 +132,7 @@ def convergence_figure(found: ModificationComparison) -> Figure:
     floor = 1e-7  # below that, the objective in micrometres is the optimum for any purpose
     series = []
     for spread in found.spreads:
-        band = np.maximum((spread.band(at) - found.answer.best.objective) / MICROMETRE, floor)
+        band = np.maximum((spread.band(at) - found.answer.result.best.objective) / MICROMETRE, floor)
         known = np.isfinite(band).all(axis=0) & (at <= max(result.evaluations for result in spread.results))
         series.append(
             Series(
@@ -171,12 +174,13 @@ def _summaries(found: ModificationComparison) -> list[dict[str, Any]]:
 def comparison_document(found: ModificationComparison, *more: Section) -> Document:
     """Return the report of one comparison; further sections follow it."""
     document, method = found.answer.document, found.answer.header.name
+    objective = found.answer.result.problem.description
     section = Section(
         heading="How the algorithms found the amounts",
         paragraphs=(
-            f"Objective: {found.answer.problem.description}. A seed has reached the reference if both amounts are "
-            f"within {REACHED / MICROMETRE:g} µm of its amounts; polished is the share that does after a local search "
-            "from where it ended.",
+            f"Objective: {objective}. A seed has reached the reference if both amounts are within "
+            f"{REACHED / MICROMETRE:g} µm of its amounts; polished is the share that does after a local search from "
+            "where it ended.",
         ),
         figures=(convergence_figure(found),),
         tables=(("algorithms", algorithms_table(found)),),

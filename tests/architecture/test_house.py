@@ -28,7 +28,7 @@ DOORS = {
     "distributed": ("running/workers.py",),
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/lanes.py"),
-    "ezdxf": ("reducers/teeth/", "reports/feature_frame.py"),
+    "ezdxf": ("reports/drawing_files.py",),
     "exudyn": ("reducers/dynamics/prototype.py",),
     "typer": ("cli/",),
     "rich": ("cli/",),

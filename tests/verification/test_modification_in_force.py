@@ -15,6 +15,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.study.inquiries.modify import answer_of
 from tolalloc.study.prepared import Prepared
 
 
@@ -58,13 +59,15 @@ def test_a_check_of_a_design_speaks_of_its_clearances(model):
 @pytest.mark.parametrize(("radial", "warned"), [(15.0, True), (10.0, True), (5.0, True), (3.0, True), (1.5, False)])
 def test_a_proposed_modification_beyond_the_catalogue_is_said(radial, warned):
     """Amounts that li2018 chooses for an RV-20E leave 0.34′ of backlash a micrometre of radial clearance."""
-    answer = choose(
+    found = choose(
         ModificationRequest(method="li2018", radial_clearance=radial * MICROMETRE), load_reducer("rv20e"), -167.0
     )
-    said = [own for own in answer.warnings if "the catalogue of RV-20E allows 1′ of lost motion" in own]
-    assert bool(said) == warned
+    assert found.allowed_lost_motion == pytest.approx(ARCMINUTE)
+    assert found.exceeds_catalogue == warned
+    assert any("the catalogue of" in own for own in answer_of(found).warnings) == warned
 
 
 def test_a_reducer_without_a_catalogue_has_nothing_to_exceed():
-    answer = choose(ModificationRequest(method="li2018"), load_reducer("rv20e_liu2020"), -167.0)
-    assert not any("the catalogue of" in own for own in answer.warnings)
+    found = choose(ModificationRequest(method="li2018"), load_reducer("rv20e_liu2020"), -167.0)
+    assert found.lost_motion is None
+    assert not found.exceeds_catalogue

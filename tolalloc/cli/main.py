@@ -13,13 +13,11 @@ from tolalloc.cli.assemble import assemble
 from tolalloc.cli.check import check
 from tolalloc.cli.compare import compare
 from tolalloc.cli.console import note
-from tolalloc.cli.contact import contact
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.doctor import doctor
 from tolalloc.cli.examples import EXAMPLES
 from tolalloc.cli.identify import identify
 from tolalloc.cli.inquiries import inquiry_command
-from tolalloc.cli.modify import modify
 from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new, schema
 from tolalloc.cli.open import open_page
@@ -61,8 +59,8 @@ _COMMANDS = (
     compare,
     inquiry_command("costs"),
     inquiry_command("te"),
-    contact,
-    modify,
+    inquiry_command("contact"),
+    inquiry_command("modify"),
     identify,
     diagnose,
     assemble,

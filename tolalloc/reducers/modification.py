@@ -5,24 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.contact import ContactResult, contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, formula_gap
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
-from tolalloc.reducers.teeth.answer import ContactAnswer, contact_answer
-from tolalloc.reports.answer import Answer
-from tolalloc.reports.document import Section
-from tolalloc.reports.header import Header
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Amounts = Float[np.ndarray, "n 2"]
 """Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
@@ -362,115 +356,8 @@ def _path(
     return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
 
 
-_NONE = 1e-11  # clearance that counts as none [m]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModificationAnswer(Answer):
-    """A finished choice."""
-
-    kind: ClassVar[str] = "modification"
-    problem: ModificationProblem  # What was minimised, and what had to be kept
-    best: Optimum  # The sure optimum
-    contact: ContactAnswer  # What it does on the reducer
-    cautions: tuple[str, ...] = ()  # What the method itself must warn of
-
-    @property
-    def title(self) -> str:
-        """What the answer is about."""
-        return f"{self.header.model}: tooth modification by {self.header.name}"
-
-    @property
-    def subtitle(self) -> str:
-        """Under which conditions it holds."""
-        return f"{self.problem.name}; contact at {self.contact.torque:g} N·m on the carrier."
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The answer in a few sentences."""
-        equidistant, shift = self.best.amounts / MICROMETRE
-        return (
-            f"Equidistant amount {equidistant:.4f} µm, shift amount {shift:.4f} µm (pin radius and pin circle radius "
-            f"plus these at grinding): the least {self.problem.description}, {self.best.objective / MICROMETRE:.6g} "
-            "µm.",
-            f"In a reducer file: [modification] equidistant_um = {equidistant:.4f}, shift_um = {shift:.4f}, "
-            'convention = "plus".',
-            *self.contact.sentences,
-        )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a reader must know before acting on it."""
-        return (*self.cautions, *self.contact.warnings)
-
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What no source prints."""
-        return (*self.header.assumptions, *self.contact.assumptions)
-
-    @cached_property
-    def delivered(self) -> pd.DataFrame:
-        """What was asked for beside what the exact distances show."""
-        import pandas as pd
-
-        found = self.contact.assessment.exact_clearance
-        lowest, asked = float(found.after.min()), self.problem.radial_clearance / MICROMETRE
-        return pd.DataFrame(
-            [
-                ("radial clearance at tip and root [µm]", f"{asked:g} or more", found.radial / MICROMETRE),
-                (
-                    "smallest clearance after the first contact [µm]",
-                    "0",
-                    (lowest if abs(lowest) > _NONE else 0.0) / MICROMETRE,
-                ),
-            ],
-            columns=["quantity", "asked", "delivered, exact distances"],
-        )
-
-    @cached_property
-    def sections(self) -> tuple[Section, ...]:
-        """Headings with their paragraphs, figures and tables."""
-        return (
-            Section(
-                heading="What the amounts deliver",
-                paragraphs=(
-                    f"Objective: {self.problem.description}. A grid that is narrowed down around its best point, "
-                    f"{self.best.evaluations} points in all, finds the optimum without chance.",
-                ),
-                tables=(("delivered", self.delivered),),
-            ),
-            *self.contact.sections,
-        )
-
-    @cached_property
-    def summary(self) -> dict[str, Any]:
-        """The answer for a program, units of measurement in the names."""
-        return {
-            "method": self.header.name,
-            "objective": self.problem.description,
-            "equidistant amount [µm]": self.best.amounts[0] / MICROMETRE,
-            "shift amount [µm]": self.best.amounts[1] / MICROMETRE,
-            "objective [µm]": self.best.objective / MICROMETRE,
-            "status": self.best.status,
-            "violation [µm]": self.best.violation / MICROMETRE,
-            "backlash [arcmin]": self.contact.assessment.clearance.backlash / ARCMINUTE,
-            "contact": self.contact.summary,
-            "warnings": list(self.warnings),
-            "assumptions": list(self.header.assumptions),
-        }
-
-
-ASSUMPTIONS = {
-    "song2019": (
-        "song2019 prints no box: equidistant amount 0…1 mm, shift amount 0…±1 mm",
-        "song2019's condition Δr_rp − |Δr_p| > 0 is none for a negative shift; Δr_rp − Δr_p keeps the radial clearance",
-    ),
-    "li2018": (
-        "li2018's formulas are lost: least mean gap, radial clearance kept, no interference, is a well-posed reading",
-        "work interval 25…100° in 100 steps, amounts 0…100 µm: li2018 prints none",
-    ),
-}
-"""Method → what its source does not print."""
+METHODS = ("song2019", "li2018")
+"""Published methods: closest to a rotated profile, and least gap on the working flank."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -493,8 +380,8 @@ class ModificationRequest:
 
     def __post_init__(self) -> None:
         place = "modification"
-        if self.method not in ASSUMPTIONS:
-            raise UnknownNameError.among(place, "method", self.method, ASSUMPTIONS)
+        if self.method not in METHODS:
+            raise UnknownNameError.among(place, "method", self.method, METHODS)
         if self.metric not in METRICS:
             raise UnknownNameError.among(place, "metric", self.metric, METRICS)
         if not 0 <= self.radial_clearance <= 1e-3:
@@ -515,7 +402,37 @@ class ModificationRequest:
         )
 
 
-def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> ModificationAnswer:
+@dataclass(frozen=True, kw_only=True)
+class ModificationResult:
+    """The two amounts that a method chose, and what they do on the reducer."""
+
+    request: ModificationRequest  # What was asked
+    reducer: Reducer  # The design with these amounts
+    problem: ModificationProblem  # What was minimised, and what had to be kept
+    best: Optimum  # The sure optimum
+    contact: ContactResult  # What it does on the reducer
+    lost_motion: float | None  # Of exact parts with these amounts; none without a catalogue to compare with [rad]
+
+    @property
+    def allowed_lost_motion(self) -> float:
+        """Lost motion of the catalogue; not a number without one [rad]."""
+        return self.reducer.catalogue.lost_motion if self.reducer.catalogue else np.nan
+
+    @property
+    def exceeds_catalogue(self) -> bool:
+        """Whether exact parts with these amounts have more play than the catalogue allows."""
+        if self.lost_motion is None:
+            return False
+        return max(self.lost_motion, self.contact.assessment.clearance.backlash) > self.allowed_lost_motion
+
+    @property
+    def turns_far(self) -> bool:
+        """Whether the rotated profile to come close to has more play than a precision reducer."""
+        far = self.request.rotation * self.reducer.cycloid_stage.disc_pitch_radius > LARGE
+        return self.request.method == "song2019" and far
+
+
+def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> ModificationResult:
     """Return the best amounts, and what they do on the reducer.
 
     The reducer's own modification is replaced; the torque on the carrier is that of the contact, negative resists
@@ -525,6 +442,17 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     ------
     InputError
         No amounts meet the constraints, or the best ones cannot be ground or mounted.
+
+    References
+    ----------
+    song2019, equation (10); li2018, whose formulas are lost, as `residual_gap` reads it.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = choose(ModificationRequest(method="li2018"), load_reducer("rv40e_xi2015"), -572.0)
+    >>> [round(float(amount) / 1e-6, 3) for amount in found.best.amounts]  # Δr_rp, Δr_p [µm]
+    [35.968, 20.968]
     """
     problem = request.problem(reducer)
     best = reference(problem)
@@ -539,43 +467,11 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
             "allowed is less radial clearance."
         )
     modified = replace(reducer, modification=best.modification)
-    contact = contact_answer(modified, torque)
-    return ModificationAnswer(
-        header=Header(
-            name=request.method,
-            model=reducer.name,
-            conditions=contact.header.conditions,
-            assumptions=ASSUMPTIONS[request.method],
-        ),
+    return ModificationResult(
+        request=request,
+        reducer=modified,
         problem=problem,
         best=best,
-        contact=contact,
-        cautions=(
-            *_cautions(request, reducer),
-            *_beyond_catalogue(modified, contact.assessment.clearance.backlash),
-        ),
-    )
-
-
-def _beyond_catalogue(modified: Reducer, backlash: float) -> tuple[str, ...]:
-    """Return whether exact parts with the amounts have more play than the catalogue allows, backlash in [rad]."""
-    if modified.catalogue is None:
-        return ()
-    lost, allowed = float(exact_loop(modified).lost_motion[-1]), modified.catalogue.lost_motion
-    if max(lost, backlash) <= allowed:
-        return ()
-    return (
-        f"Exact parts with these amounts have {backlash / ARCMINUTE:.2g}′ of backlash and {lost / ARCMINUTE:.2g}′ of "
-        f"lost motion; the catalogue of {modified.name} allows {allowed / ARCMINUTE:.2g}′ of lost motion. Ask for less "
-        "radial clearance or rotation before setting a drawing.",
-    )
-
-
-def _cautions(request: ModificationRequest, reducer: Reducer) -> tuple[str, ...]:
-    """Return what the method itself must warn of."""
-    if request.method != "song2019" or request.rotation * reducer.cycloid_stage.disc_pitch_radius <= LARGE:
-        return ()
-    return (
-        f"A rotation of {request.rotation:g} rad is {request.rotation / ARCMINUTE:.0f} arcmin of play to each side; a "
-        "precision reducer has one or two: ask for less before setting a drawing.",
+        contact=contact_of(modified, torque),
+        lost_motion=float(exact_loop(modified).lost_motion[-1]) if modified.catalogue else None,
     )

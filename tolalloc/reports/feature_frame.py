@@ -217,11 +217,9 @@ def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path, notes: 
     notes
         What must be said beside the frames, a line each below them, such as the tooth modification.
     """
-    from ezdxf import units
-    from ezdxf.enums import TextEntityAlignment
-    from ezdxf.filemanagement import new
+    from tolalloc.reports.drawing_files import centre, new_drawing
 
-    drawing = new("R2010", units=units.MM)
+    drawing = new_drawing()
     drawing.styles.add("FRAME", font="DejaVuSans.ttf")
     space, tall = drawing.modelspace(), _HEIGHT * _SCALE
     for number, (name, frame) in enumerate(frames):
@@ -231,9 +229,8 @@ def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path, notes: 
             if frame.characteristic != "size":
                 block.add_lwpolyline([(x, 0), (x + wide, 0), (x + wide, tall), (x, tall)], close=True)
             if text:
-                block.add_text(text, height=tall / 2, dxfattribs={"style": "FRAME"}).set_placement(
-                    (x + wide / 2, tall / 2), align=TextEntityAlignment.MIDDLE_CENTER
-                )
+                middle = (x + wide / 2, tall / 2)
+                centre(block.add_text(text, height=tall / 2, dxfattribs={"style": "FRAME"}), middle)
         lines, circles = drawn_symbol(frame.characteristic)
         for line in lines:
             block.add_lwpolyline([(x * tall, y * tall) for x, y in line])

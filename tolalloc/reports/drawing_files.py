@@ -1,13 +1,11 @@
-"""A tooth profile as a file: CSV for a measuring machine, DXF for a drawing."""
+"""Files for a drawing: DXF in millimetres, whose library enters here, and the tooth profile of a disc."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-from ezdxf import units
-from ezdxf.filemanagement import new
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import require_new
@@ -15,9 +13,30 @@ from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import linear_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ProfilePoints, ToothProfile, profile_points, require_points
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from ezdxf.document import Drawing
+
+
+def new_drawing() -> Drawing:
+    """Return an empty DXF drawing in millimetres."""
+    from ezdxf import units
+    from ezdxf.filemanagement import new
+
+    return new("R2010", units=units.MM)
+
+
+def centre(text: Any, place: tuple[float, float]) -> None:
+    """Put the middle of a text of a drawing at a place [mm]."""
+    from ezdxf.enums import TextEntityAlignment
+
+    text.set_placement(place, align=TextEntityAlignment.MIDDLE_CENTER)
+
 
 def points_frame(profile: ToothProfile, points: ProfilePoints) -> pd.DataFrame:
     """Return the points with angle, curvature and material removed."""
+    import pandas as pd
+
     angle = points.angle
     return pd.DataFrame(
         {
@@ -35,7 +54,7 @@ def _write_csv(profile: ToothProfile, points: ProfilePoints, path: Path) -> None
 
 
 def _write_dxf(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:
-    drawing = new("R2010", units=units.MM)
+    drawing = new_drawing()
     space = drawing.modelspace()
     for name, colour in (("TOOTH_PROFILE", 7), ("TIP_AND_ROOT", 8)):
         drawing.layers.add(name, color=colour)
@@ -46,6 +65,7 @@ def _write_dxf(profile: ToothProfile, points: ProfilePoints, path: Path) -> None
 
 
 WRITERS = {".csv": _write_csv, ".dxf": _write_dxf}
+"""Ending of a profile's file → what writes it: CSV for a measuring machine, DXF for a drawing."""
 
 
 def require_profile_file(path: Path, per_tooth: int) -> None:

@@ -1,0 +1,87 @@
+"""What the modified teeth do without errors: clearance, and how they carry a torque by every method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolalloc.reducers.cycloid.assessment import Assessment, assess, pin_moment
+from tolalloc.reducers.equivalent.line_load import peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import Solved, load_share
+from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class YieldingContact:
+    """The reducer without errors, its bearings yielding, over one pin pitch."""
+
+    pins_in_contact: tuple[int, int]  # Fewest and most on a disc [-]
+    largest_force: float  # Of a pin [N]
+    pressure: float  # Peak pressure between a pin and a tooth [Pa]
+    moment: float  # Of all pin forces about the centres of their discs [N·m]
+    share: float  # Largest share of the torque on a disc [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactResult:
+    """One modification under one torque."""
+
+    assessment: Assessment  # Clearance and contact; without errors they do not depend on the torque's direction
+    torque: float  # Torque on the carrier; negative resists the rotation [N·m]
+    # The same reducer, its bearings yielding, as `te` and `run` solve it; none where distances must be exact
+    yielding: YieldingContact | None
+
+
+def contact_of(
+    reducer: Reducer, torque: float, *, law: str = "logarithmic", exact: bool | None = None, phases: int = 72
+) -> ContactResult:
+    """Return what the reducer's modification does under a torque on the carrier.
+
+    Parameters
+    ----------
+    reducer
+        The nominal design with its tooth modification.
+    torque
+        Torque on the carrier, of either sign; the pins carry T·(1 − 1/i) of it [N·m].
+    law
+        Contact law of pins and teeth, one of `tolalloc.reducers.cycloid.solvers.LAWS`.
+    exact
+        Whether distances are exact; by default where the modification is too large for the linear formula.
+    phases
+        Phases of the crank within one pin pitch [-].
+
+    Raises
+    ------
+    InputError
+        The profile cannot be ground, interferes with the pins, or the torque is beyond any contact.
+
+    References
+    ----------
+    Li Lixing's linear method as xi2015 has it; Hertz's line contact of steel on steel.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = contact_of(load_reducer("rv40e_xi2015"), -572.0, phases=1)
+    >>> round(float(found.assessment.single.force.max()))  # largest pin force on the more loaded disc [N]
+    1144
+    """
+    found = assess(reducer, torque, law=law, exact=exact, phases=phases)
+    linear = reducer.modification.rotation == 0.0 and not found.clearance.exact  # the gaps are the linear formula's
+    yielding = _yielding(perfect_reducer(found.reducer, torque)) if linear else None
+    return ContactResult(assessment=found, torque=torque, yielding=yielding)
+
+
+def _yielding(solved: Solved) -> YieldingContact:
+    pins, found = solved.forces.pins[0], solved.equilibria
+    carry = (pins > 0).sum(axis=2)
+    pressure = unit_pressure(found) * np.sqrt(peak_line_load(found, solved.forces))
+    return YieldingContact(
+        pins_in_contact=(int(carry.min()), int(carry.max())),
+        largest_force=float(pins.max()),
+        pressure=float(pressure.max()),
+        moment=pin_moment(found.reducer, abs(found.torque)),
+        share=float(load_share(solved.forces.pins).max()),
+    )

@@ -1,0 +1,364 @@
+"""What a tooth modification does to clearance and contact, without errors."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.contact import ContactResult, YieldingContact
+from tolalloc.reducers.cycloid.assessment import Assessment
+from tolalloc.reducers.cycloid.clearance import FLANK, linear_clearance
+from tolalloc.reducers.cycloid.loaded_contact import LoadedContact
+from tolalloc.reducers.cycloid.mesh import normals
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.templates import Sentences
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_say = Sentences("contact")
+_METHODS = ("linear method", "law at every pin")
+"""Both ways in which one disc is loaded, as legends call them."""
+_ON_TERMINAL = ("quantity", "one disc, law at every pin", "all discs, bearings yielding")
+"""Columns of the loaded contact that a terminal has room for; the report has all."""
+_FROM_CRANK = "angle of the pin from the crank direction [°]"
+
+
+class ContactTeller(Teller[ContactResult]):
+    """What is said of one modification under one torque."""
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return _say("title", model=self.header.model)
+
+    @property
+    def subtitle(self) -> str:
+        """Torques, face width and phases."""
+        found = self.result.assessment
+        return _say(
+            "subtitle",
+            torque=self.result.torque,
+            on_disc=found.share * found.torque,
+            width=found.reducer.cycloid_stage.face_width / MILLIMETRE,
+            phases=found.single.phase.size,
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Clearance, and how the pins carry with bearings that yield and with rigid ones."""
+        found, single, yielding = self.result.assessment, self.result.assessment.single, self.result.yielding
+        clearance, pins = found.clearance, found.single.pins_in_contact
+        law = _say(f"law_{found.reducer.stiffness.pin_contact_law}")
+        said = [
+            _say(
+                "clearance",
+                backlash=clearance.backlash / ARCMINUTE,
+                radial=clearance.radial / MICROMETRE,
+                first_contact=clearance.first_contact / DEGREE,
+            ),
+            _say(
+                "rigid",
+                share=found.share,
+                law=law,
+                pins=span(pins.min(), pins.max()),
+                force=single.force.max(),
+                most_loaded=single.most_loaded / DEGREE,
+                pressure=single.pressure.max() / MEGAPASCAL,
+                most_pressed=single.most_pressed / DEGREE,
+            ),
+        ]
+        if yielding:
+            pressure, carry = yielding.pressure / MEGAPASCAL, span(*yielding.pins_in_contact)
+            torque, force = self.result.torque, yielding.largest_force
+            said.insert(1, _say("yielding", torque=torque, law=law, pins=carry, force=force, pressure=pressure))
+        return tuple(said)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        return self.result.assessment.warnings
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        return self.result.assessment.assumptions
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Profile and clearance, and the teeth under load."""
+        found = self.result.assessment
+        return (
+            Section(
+                heading=_say("profile_heading"),
+                figures=(_profile_figure(found.profile), clearance_figure(found)),
+                tables=(("profile", self._profile_table),),
+            ),
+            Section(
+                heading=_say("load_heading"),
+                paragraphs=(_say("methods"),),
+                figures=(_force_figure(found), _phase_figure(found)),
+                tables=(("loaded contact", self._contact_table), ("pins", self._pin_table)),
+            ),
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Profile, and the loaded contact by every method, units of measurement in the names."""
+        found, yielding = self.result.assessment, self.result.yielding
+        return {
+            "reducer": self.header.model,
+            "torque on the carrier [N·m]": self.result.torque,
+            "torque on the more loaded disc [N·m]": found.share * found.torque,
+            "face width [mm]": found.reducer.cycloid_stage.face_width / MILLIMETRE,
+            "phases [-]": int(found.single.phase.size),
+            "profile": _profile_summary(found),
+            "linear": _contact_summary(found.linear),
+            "per tooth": _contact_summary(found.single),
+            "all discs together": _contact_summary(found.together),
+            "bearings yielding": _yielding_summary(yielding) if yielding else None,
+            "warnings": list(self.warnings),
+            "assumptions": list(self.assumptions),
+        }
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """Profile and clearance, and the loaded contact by two methods."""
+        model, table = self.header.model, self._contact_table
+        return (
+            (self._profile_table, _say("profile_on_terminal", model=model)),
+            (
+                table[[name for name in _ON_TERMINAL if name in table]],
+                _say("contact_on_terminal", model=model, torque=self.result.torque),
+            ),
+        )
+
+    @property
+    def _profile_table(self) -> pd.DataFrame:
+        """Profile and clearance."""
+        import pandas as pd
+
+        profile = self.summary["profile"]
+        return pd.DataFrame({"quantity": profile.keys(), "value": profile.values()})
+
+    @cached_property
+    def _contact_table(self) -> pd.DataFrame:
+        """The loaded contact by every method side by side."""
+        import pandas as pd
+
+        columns, found = {}, self.result.assessment
+        for title, name, contact in (
+            ("one disc, linear method", "linear", found.linear),
+            ("one disc, law at every pin", "per tooth", found.single),
+            ("all discs, rigid bearings", "all discs together", found.together),
+        ):
+            own = self.summary[name]
+            pins = own["share of phases with so many pins in contact [-]"]
+            columns[title] = {
+                "torque [N·m]": f"{float(contact.torque[0].sum()):.4g}",
+                "deflection over the phases [µm]": span(*own["deflection over the phases [µm]"]),
+                "loaded zone [deg]": span(*own["loaded zone [deg]"]),
+                "pins in contact on a disc, share of phases": ", ".join(f"{pin}: {at:.1%}" for pin, at in pins.items()),
+                **_largest(own, f", {own['largest pin force at [deg]']:.1f}", f", {own['peak pressure at [deg]']:.1f}"),
+            }
+        if own := self.summary["bearings yielding"]:
+            columns["all discs, bearings yielding"] = {
+                "torque [N·m]": f"{own['moment about the discs [N·m]']:.4g}",
+                "pins in contact on a disc, share of phases": span(*own["pins in contact on a disc [-]"]),
+                **_largest(own),
+            }
+        frame = pd.DataFrame(columns).fillna("–")
+        frame.insert(0, "quantity", frame.index)
+        return frame.reset_index(drop=True)
+
+    @property
+    def _pin_table(self) -> pd.DataFrame:
+        """Gap, force and pressure of every pin that could carry, with a pin in the crank direction."""
+        import pandas as pd
+
+        linear, single = self.result.assessment.linear, self.result.assessment.single
+        order = _carrying(single)
+        return pd.DataFrame(
+            {
+                "pin at [deg]": single.pin_angle[0, 0, order] / DEGREE,
+                "gap before load [µm]": single.gap[0, 0, order] / MICROMETRE,
+                "force, linear method [N]": linear.force[0, 0, order],
+                "force, law at every pin [N]": single.force[0, 0, order],
+                "peak pressure, law at every pin [MPa]": single.pressure[0, 0, order] / MEGAPASCAL,
+            }
+        )
+
+
+def span(low: float, high: float) -> str:
+    """Return a range of numbers as text, one number where both ends are alike."""
+    first, last = f"{low:.5g}", f"{high:.5g}"
+    return first if first == last else f"{first}…{last}"
+
+
+def _largest(own: dict[str, Any], force_at: str = "", pressure_at: str = "") -> dict[str, str]:
+    """Return cells of the largest force, pressure and share, with where they are if that is known."""
+    return {
+        "largest pin force [N], at [deg]": f"{own['largest pin force [N]']:.1f}{force_at}",
+        "peak pressure [MPa], at [deg]": f"{own['peak pressure [MPa]']:.0f}{pressure_at}",
+        "largest share of the torque on a disc [-]": f"{own['largest share of the torque on a disc [-]']:.3f}",
+    }
+
+
+def _profile_summary(found: Assessment) -> dict[str, float | str | None]:
+    """Return profile and clearance, units in the names."""
+    profile, clearance = found.profile, found.clearance
+    return {
+        "equidistant amount [µm]": profile.modification.equidistant / MICROMETRE,
+        "shift amount [µm]": profile.modification.shift / MICROMETRE,
+        "tip radius [mm]": profile.tip_radius / MILLIMETRE,
+        "root radius [mm]": profile.root_radius / MILLIMETRE,
+        "K1 at grinding [-]": profile.ground.shortening,
+        "flank turns convex at [deg]": profile.inflection_angle / DEGREE,
+        "smallest convex radius of the tooth [mm]": (profile.ground.smallest_convex_radius - profile.ground.pin_radius)
+        / MILLIMETRE,
+        "radial clearance at tip and root [µm]": clearance.radial / MICROMETRE,
+        "clearance on the flank [µm]": profile.modification.flank_clearance(profile.stage) / MICROMETRE,
+        "first contact at [deg]": clearance.first_contact / DEGREE,
+        "free rotation to one side [arcmin]": clearance.rotation / ARCMINUTE,
+        "backlash [arcmin]": clearance.backlash / ARCMINUTE,
+        "backlash by exact distances [arcmin]": found.exact_clearance.backlash / ARCMINUTE,
+        "largest clearance after the first contact [µm]": float(clearance.after.max()) / MICROMETRE,
+        "formula off by at most [µm]": found.exact_clearance.formula_error / MICROMETRE,
+        "distances": "exact" if clearance.exact else "linear formula",
+    }
+
+
+def _contact_summary(contact: LoadedContact) -> dict[str, Any]:
+    """Return one loaded contact over all phases, units in the names."""
+    pins = contact.pins_in_contact
+    counts, times = np.unique(pins, return_counts=True)
+    share = contact.torque / contact.torque.sum(axis=1, keepdims=True)
+    return {
+        "method": contact.method,
+        "deflection [µm]": float(contact.deflection.mean()) / MICROMETRE,
+        "deflection over the phases [µm]": [float(f(contact.deflection)) / MICROMETRE for f in (np.min, np.max)],
+        "loaded zone [deg]": [float(value) / DEGREE for value in contact.zone.mean(axis=0)],
+        "share of phases with so many pins in contact [-]": {
+            str(count): float(time / pins.size) for count, time in zip(counts, times, strict=True)
+        },
+        "largest pin force [N]": float(contact.force.max()),
+        "largest pin force at [deg]": contact.most_loaded / DEGREE,
+        "peak pressure [MPa]": float(contact.pressure.max()) / MEGAPASCAL,
+        "peak pressure at [deg]": contact.most_pressed / DEGREE,
+        "largest share of the torque on a disc [-]": float(share.max()),
+    }
+
+
+def _yielding_summary(found: YieldingContact) -> dict[str, Any]:
+    """Return the reducer without errors, its bearings yielding, units in the names."""
+    return {
+        "pins in contact on a disc [-]": list(found.pins_in_contact),
+        "largest pin force [N]": found.largest_force,
+        "peak pressure [MPa]": found.pressure / MEGAPASCAL,
+        "moment about the discs [N·m]": found.moment,
+        "largest share of the torque on a disc [-]": found.share,
+    }
+
+
+def _carrying(contact: LoadedContact) -> list[int]:
+    """Return the pins on the side that can carry, with a pin in the crank direction, by their angle."""
+    angle = contact.pin_angle[0, 0]
+    return [int(at) for at in np.argsort(angle) if angle[at] > 0]
+
+
+def _profile_figure(profile: ToothProfile) -> Figure:
+    """Draw one tooth, exact and with the modification magnified."""
+    exact, angle = ToothProfile(stage=profile.stage), np.linspace(0.0, np.pi, 361)
+    removed = linear_clearance(profile.stage, profile.modification, angle)
+    places, apart = exact.points(angle), removed[:, np.newaxis] * exact.normals(angle)
+    largest = max(float(np.abs(removed).max()), 1e-12)
+    height = exact.tip_radius - exact.root_radius
+    factor = max(float(f"{0.12 * height / largest:.0e}"), 1.0)
+    middle = np.exp(1j * (np.pi / profile.stage.disc_teeth + np.pi / 2))  # the tooth's middle upright
+
+    def upright(points: np.ndarray) -> tuple[list[float], list[float]]:
+        own = (points[:, 0] + 1j * points[:, 1]) * middle / MILLIMETRE
+        x, y = own.real.tolist(), own.imag.tolist()
+        return x + [-value for value in x[::-1]], y + y[::-1]
+
+    drawn = (("exact tooth", places), (f"modified, {factor:g} times magnified", places + factor * apart))
+    # What is removed along the normal is drawn, not the slip of points along the flank, which changes nothing.
+    return Figure(
+        name="profile",
+        title=_say("profile_figure", factor=factor),
+        x_label="across the tooth [mm]",
+        y_label="from the disc's centre [mm]",
+        series=tuple(
+            Series(label=label, kind="line", x=upright(points)[0], y=upright(points)[1]) for label, points in drawn
+        ),
+        equal=True,
+    )
+
+
+def clearance_figure(found: Assessment) -> Figure:
+    """Draw clearance and deflection against the angle, and the zone where pins carry."""
+    lever = normals(found.reducer.cycloid_stage.shortening, FLANK).lever
+    angle = list(FLANK / DEGREE)
+    low, high = found.single.zone.mean(axis=0) / DEGREE
+    formula = [Series(label="Li Lixing's formula", kind="line", x=angle, y=list(found.clearance.formula / MICROMETRE))]
+    if found.clearance.formula_error < 0.01 * MICROMETRE:  # the same line as the clearance
+        formula = []
+    return Figure(
+        name="clearance",
+        title=_say("clearance_figure"),
+        x_label=_FROM_CRANK,
+        y_label="clearance, deflection [µm]",
+        series=(
+            Series(label="clearance", kind="line", x=angle, y=list(found.clearance.after / MICROMETRE)),
+            *formula,
+            *(
+                Series(
+                    label=f"deflection, {name}",
+                    kind="line",
+                    x=angle,
+                    y=list(lever * contact.deflection.mean() / MICROMETRE),
+                )
+                for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
+            ),
+        ),
+        vertical=((low, f"carrying from {low:.1f}°"), (high, f"to {high:.1f}°")),
+    )
+
+
+def _force_figure(found: Assessment) -> Figure:
+    """Draw the force of each pin."""
+    angle, order = found.single.pin_angle[0, 0], _carrying(found.single)
+    return Figure(
+        name="forces",
+        title=_say("force_figure"),
+        x_label=_FROM_CRANK,
+        y_label="force [N]",
+        series=tuple(
+            Series(label=name, kind="points", x=list(angle[order] / DEGREE), y=list(contact.force[0, 0, order]))
+            for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
+        ),
+    )
+
+
+def _phase_figure(found: Assessment) -> Figure:
+    """Draw how the number of pins in contact changes while one pin takes over from the next."""
+    phase = list(found.single.phase / DEGREE)
+    return Figure(
+        name="pins_in_contact",
+        title=_say("phase_figure"),
+        x_label="angle from the crank direction to the next pin [°]",
+        y_label="pins in contact [-]",
+        series=tuple(
+            Series(label=name, kind="points", x=phase, y=[int(count) for count in contact.pins_in_contact[:, 0]])
+            for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
+        ),
+    )
+
+
+TELLER = ContactTeller

@@ -1,0 +1,136 @@
+"""The two modification amounts that a method chose, and what they do on the reducer."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from tolalloc.reading.units import ARCMINUTE, MICROMETRE
+from tolalloc.reducers.modification import ModificationResult
+from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.document import Section
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.tellers.contact import ContactTeller
+from tolalloc.reports.templates import Sentences
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_say = Sentences("modification")
+_NONE = 1e-11  # clearance that counts as none [m]
+_UNPRINTED = {
+    "song2019": ("song2019_box", "song2019_clearance"),
+    "li2018": ("li2018_reading", "li2018_interval"),
+}
+"""Method → sentences on what its source does not print."""
+_DELIVERED: tuple[Column[tuple[str, str, float]], ...] = (
+    Column(header="quantity", value=lambda row: row[0]),
+    Column(header="asked", value=lambda row: row[1]),
+    Column(header="delivered, exact distances", value=lambda row: row[2]),
+)
+
+
+class ModificationTeller(Teller[ModificationResult]):
+    """What is said of a finished choice."""
+
+    @cached_property
+    def _contact(self) -> ContactTeller:
+        return ContactTeller(self.result.contact, self.header)
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return _say("title", model=self.header.model, method=self.header.name)
+
+    @property
+    def subtitle(self) -> str:
+        """The problem, and the torque of the contact."""
+        return _say("subtitle", problem=self.result.problem.name, torque=self.result.contact.torque)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The amounts, how a reducer file states them, and how the teeth carry."""
+        best, (equidistant, shift) = self.result.best, self.result.best.amounts / MICROMETRE
+        description, objective = self.result.problem.description, best.objective / MICROMETRE
+        return (
+            _say("amounts", equidistant=equidistant, shift=shift, description=description, objective=objective),
+            _say("file", equidistant=equidistant, shift=shift),
+            *self._contact.sentences,
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Play beyond a precision reducer's or the catalogue's, and those of the contact."""
+        found, request, said = self.result, self.result.request, []
+        if found.turns_far:
+            said.append(_say("turns_far", rotation=request.rotation, play=request.rotation / ARCMINUTE))
+        if found.exceeds_catalogue and found.lost_motion is not None:
+            said.append(
+                _say(
+                    "exceeds_catalogue",
+                    backlash=found.contact.assessment.clearance.backlash / ARCMINUTE,
+                    lost_motion=found.lost_motion / ARCMINUTE,
+                    model=self.header.model,
+                    allowed=found.allowed_lost_motion / ARCMINUTE,
+                )
+            )
+        return (*said, *self._contact.warnings)
+
+    @property
+    def _unprinted(self) -> tuple[str, ...]:
+        """What the source of the method does not print."""
+        return tuple(_say(key) for key in _UNPRINTED[self.result.request.method])
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What neither the source of the method nor that of the reducer prints."""
+        return (*self._unprinted, *self._contact.assumptions)
+
+    @property
+    def delivered(self) -> pd.DataFrame:
+        """What was asked for beside what the exact distances show."""
+        found = self.result.contact.assessment.exact_clearance
+        lowest, asked = float(found.after.min()), self.result.problem.radial_clearance / MICROMETRE
+        lowest = lowest if abs(lowest) > _NONE else 0.0
+        rows = [
+            ("radial clearance at tip and root [µm]", f"{asked:g} or more", found.radial / MICROMETRE),
+            ("smallest clearance after the first contact [µm]", "0", lowest / MICROMETRE),
+        ]
+        return Table(name="delivered", columns=_DELIVERED, rows=rows).frame()
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """What the amounts deliver, and the contact."""
+        found = self.result
+        objective = _say("objective", description=found.problem.description, evaluations=found.best.evaluations)
+        delivered = Section(
+            heading=_say("delivered_heading"), paragraphs=(objective,), tables=(("delivered", self.delivered),)
+        )
+        return (delivered, *self._contact.sections)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The amounts and the contact, units of measurement in the names."""
+        best = self.result.best
+        return {
+            "method": self.header.name,
+            "objective": self.result.problem.description,
+            "equidistant amount [µm]": best.amounts[0] / MICROMETRE,
+            "shift amount [µm]": best.amounts[1] / MICROMETRE,
+            "objective [µm]": best.objective / MICROMETRE,
+            "status": best.status,
+            "violation [µm]": best.violation / MICROMETRE,
+            "backlash [arcmin]": self.result.contact.assessment.clearance.backlash / ARCMINUTE,
+            "contact": self._contact.summary,
+            "warnings": list(self.warnings),
+            "assumptions": list(self._unprinted),
+        }
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """What the amounts deliver."""
+        title = _say("delivered_on_terminal", model=self.header.model, method=self.header.name)
+        return ((self.delivered, title),)
+
+
+TELLER = ModificationTeller
