@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from allocation_rivals import SEARCH_UNITS, Compared, Rival
 
-from tests.random_studies import random_study
+from tests.random_cases import random_study
 from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.drawings.seeds import SeedTree

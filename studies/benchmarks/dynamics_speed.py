@@ -27,7 +27,7 @@ from kernel_speed import SEED, figures, progress, run_benchmark
 from numpy_cores import timed
 from scipy.optimize import brentq
 
-from tests.random_units import random_units
+from tests.random_cases import random_units
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.dynamics.motion import (
     Damping,

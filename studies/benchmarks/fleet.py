@@ -30,7 +30,7 @@ from distributed import Client
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.running.chunks import SAMPLES_AT_ONCE
 from tolalloc.running.compiled import use_threads

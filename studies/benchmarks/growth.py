@@ -24,9 +24,8 @@ from numpy_cores import CORES, timed
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tolalloc as ta
-from tests.prepared import prepared
-from tests.random_reducers import DISC_TILT
-from tests.random_units import random_units
+from tests.builders import prepared
+from tests.random_cases import DISC_TILT, random_units
 from tests.verification.test_allocation_program import compiled, random_problem
 from tolalloc.allocation.cost.model import Process, ReciprocalPower
 from tolalloc.allocation.search import process_choice

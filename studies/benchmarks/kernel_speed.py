@@ -47,7 +47,7 @@ from jaxtyping import Float
 from numpy_cores import ANGLES, CORES, TORQUE, TRIAL_ANGLES, numpy_curves, numpy_kernel, numpy_workers, timed, trial
 from threadpoolctl import threadpool_info
 
-from tests.random_units import random_units
+from tests.random_cases import random_units
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer

@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tests.rare_cases import CASES, RareCase, random_units
+from tests.reliability import CASES, RareCase, random_units
 from tolalloc.capability.yield_at_limit import agreement
 from tolalloc.drawings.seeds import SeedTree
 

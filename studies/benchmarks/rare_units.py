@@ -21,7 +21,7 @@ from jaxtyping import Float
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.prepared import prepared
+from tests.builders import prepared
 from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import tolalloc as ta
-from tests.live_page import BROWSER, CONTRASTS, CUT, DRIVER, MOVE, STUDY, OpenStudy, browser, until, width
 from tests.studies.command import ROOT
+from tests.studies.live_page import BROWSER, CONTRASTS, CUT, DRIVER, MOVE, STUDY, OpenStudy, browser, until, width
 from tolalloc.cli.study_script import load_study
 
 pytestmark = [

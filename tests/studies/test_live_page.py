@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 import tolalloc as ta
-from tests.live_page import STUDY
 from tests.studies.command import ROOT, command, tolalloc
+from tests.studies.live_page import STUDY
 from tolalloc.cli.live.desk import Desk
 from tolalloc.cli.live.server import LARGEST, MOST_CONNECTIONS, Address, LiveServer
 from tolalloc.cli.live.session import LiveDesign, Session

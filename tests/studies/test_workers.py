@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.seeds import SeedTree

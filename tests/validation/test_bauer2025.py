@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.three_cranks import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
+from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
-from tests.reliability_problems import FOUR_BRANCHES, MARGINS, PROBLEMS, exact, problem
+from tests.reliability import FOUR_BRANCHES, MARGINS, PROBLEMS, exact, problem
 from tolalloc.capability.limit_state import RareFailure
 from tolalloc.capability.rare_failure import subset_simulation
 from tolalloc.drawings.seeds import SeedTree

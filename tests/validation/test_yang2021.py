@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.three_cranks import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
+from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
 from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND

@@ -15,7 +15,7 @@ from openpyxl import load_workbook
 from typer.testing import CliRunner
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.answer.cost_formulas import cost_formula
 from tolalloc.allocation.answer.dimensions import dimensions

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kurtosis, norm, skew
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc.allocation.front.robustness as module
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.model import Reciprocal, SumOfCosts, Weighted
 from tolalloc.allocation.front.robustness import COST_CHANGE, Robustness, Variant, robustness

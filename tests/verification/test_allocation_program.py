@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from tests.seeds import seeds
+from tests.random_cases import seeds
 from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal
 from tolalloc.allocation.search.convex_program import ConvexProgram, front
 from tolalloc.allocation.search.lagrange_dual import LagrangeDual, cost_bound

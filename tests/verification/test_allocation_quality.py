@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.random_studies import random_reducer, random_sources
+from tests.random_cases import random_rv20e, random_sources
 from tests.studies.command import ROOT
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -62,7 +62,7 @@ def test_random_tables_fit_their_reducers():
     generator = np.random.default_rng(1)
     kinds = set()
     for number in range(20):
-        reducer = random_reducer(generator)
+        reducer = random_rv20e(generator)
         kinds.add((reducer.crank_count, reducer.disc_count))
         errors = ErrorModel(random_sources(generator, reducer))
         model = ReducerChoice(reducer=reducer).bound(errors, f"random reducer {number}")

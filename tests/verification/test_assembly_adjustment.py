@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from tests.random_assemblies import random_plan
-from tests.seeds import seeds
+from tests.random_cases import random_plan, seeds
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
 from tolalloc.assembly.files import load_plan

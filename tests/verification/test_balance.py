@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from tests.random_reducers import Case, random_case, random_reducer, random_unit
-from tests.seeds import seeds
+from tests.random_cases import Case, random_case, random_reducer, random_unit, seeds
 from tests.validation_manual import shown
 from tests.verification.dense_twin import DenseModel, dense_model
 from tolalloc.reading.units import ARCSECOND

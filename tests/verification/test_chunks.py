@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.random_units import random_units
+from tests.random_cases import random_units
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.response.kernel import KernelResponse

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.random_reducers import random_cycloid_stage
-from tests.seeds import seeds
+from tests.random_cases import random_cycloid_stage, seeds
 from tests.verification.distance_search import grindable, places, random_amounts, searched, searched_between
 from tests.verification.test_cycloid_profile import path_bend
 from tolalloc.exceptions import InputError

@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from tests.random_reducers import LAWS, random_reducer
+from tests.random_cases import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE

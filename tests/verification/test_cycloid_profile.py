@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from tests.random_reducers import random_cycloid_stage
-from tests.seeds import seeds
+from tests.random_cases import random_cycloid_stage, seeds
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, require_sound
 from tolalloc.reducers.reducer.design import CycloidStage, Modification

@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.random_reducers import is_angle, random_case
-from tests.random_units import random_units
-from tests.seeds import seeds
+from tests.random_cases import is_angle, random_case, random_units, seeds
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.model import EquivalentModel

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc.bench.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.measurements import MeasuredCurve
 from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Neighbourhood, Noise, bridge, climb, thinned

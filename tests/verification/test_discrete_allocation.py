@@ -3,7 +3,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tests.seeds import seeds
+from tests.random_cases import seeds
 from tolalloc.allocation.cost.model import Process, Reciprocal
 from tolalloc.allocation.search import multiple_choice
 from tolalloc.allocation.search.discrete import DiscreteProblem, Option, feature_options

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, with_zones
 from tolalloc.exceptions import InputError, TolallocError
 

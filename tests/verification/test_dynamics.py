@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from tests.random_reducers import random_case
-from tests.random_units import random_units
-from tests.seeds import seeds
+from tests.random_cases import random_case, random_units, seeds
 from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
 from tolalloc.exceptions import InputError

@@ -9,9 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.random_reducers import Case, random_case, variations
-from tests.random_units import random_units
-from tests.seeds import seeds
+from tests.random_cases import Case, random_case, random_units, seeds, variations
 from tests.validation_manual import shown
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
 from tolalloc.reading.units import ARCSECOND

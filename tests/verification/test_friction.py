@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCMINUTE

@@ -23,8 +23,8 @@ from openpyxl import Workbook
 import tolalloc as ta
 from studies.published.measurement_folder import write_measurements
 from studies.published.simulated_bench import random_units, simulated_bench
-from tests.plain_reading import DECIMALS, differences, made, rows, said
 from tests.studies.bench_files import CURVES_AND_LOOPS
+from tests.verification.plain_reading import DECIMALS, differences, made, rows, said
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import DATA as CHAINS

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc.allocation.search.discrete import allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import kept_stacks
 from tolalloc.allocation.space.ladder import SERIES, ZONES, grade_zones

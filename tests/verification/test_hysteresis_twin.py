@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.prepared import prepared
-from tests.random_reducers import is_angle
+from tests.builders import prepared
+from tests.random_cases import is_angle
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
 from tests.verification.dense_twin_bearings import standing, turning, with_bearings, with_secants
 from tolalloc.drawings.seeds import SeedTree

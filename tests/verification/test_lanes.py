@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.prepared import prepared
-from tests.random_units import random_units
+from tests.builders import prepared
+from tests.random_cases import random_units
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LINEAR

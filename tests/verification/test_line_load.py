@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.random_reducers import random_reducer
+from tests.random_cases import random_reducer
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 from tolalloc.reducers.cycloid.contact_stiffness import peak_pressure

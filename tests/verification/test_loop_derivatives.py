@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.three_cranks import table_of_three_cranks
+from tests.builders import table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reducers.equivalent.model import EquivalentModel

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.kinematics import Positions

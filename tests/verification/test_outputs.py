@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.random_reducers import random_case
-from tests.seeds import seeds
+from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.attribution import attribute

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.answers import Status, count_statuses

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import pareto_front

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.prepared import prepared as baseline
+from tests.builders import prepared as baseline
 from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile

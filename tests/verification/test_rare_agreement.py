@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import poisson
 
-from tests.rare_cases import CASES, breitung, flat, metaballs_probability, outside_sphere, random_units, uniform_sum
+from tests.reliability import CASES, breitung, flat, metaballs_probability, outside_sphere, random_units, uniform_sum
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.capability.yield_at_limit import Agreement, agreement, judged, yield_at_limit

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.stats import gumbel_r, kstest, lognorm, norm, uniform
 
 from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
-from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
+from tests.reliability import LargestValue, LimitOfInputs, LogNormal, Normal, Uniform
 from tolalloc.capability.limit_state import CountedLimitState, RareFailure
 from tolalloc.capability.rare_failure import subset_simulation
 from tolalloc.drawings.seeds import SeedTree

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion

@@ -8,7 +8,7 @@ from math import gcd
 import numpy as np
 import pytest
 
-from tests.random_reducers import random_case
+from tests.random_cases import random_case
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import SolveError, UnknownNameError
 from tolalloc.reading.units import MILLIMETRE

@@ -8,7 +8,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from tests.prepared import prepared
+from tests.builders import prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel

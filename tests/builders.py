@@ -1,15 +1,52 @@
-"""The shipped tolerance tables, which are those of an RV-20E with two cranks, for a reducer of three."""
+"""What tests build alike: studies of the baseline, sources, sums of sources, tables of three cranks."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+import tolalloc as ta
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.study.prepared import Prepared
+
+
+def prepared(
+    *,
+    reducer: dict[str, Any] | None = None,
+    drawing: dict[str, Any] | None = None,
+    limits: dict[str, ta.Limit] | None = None,
+    **changes: Any,
+) -> Prepared:
+    """Return the study of the baseline, with fields changed; nothing is solved.
+
+    Parameters
+    ----------
+    reducer, drawing
+        Fields of ``ta.reducer`` and ``ta.drawing`` that differ from the baseline.
+    limits
+        Limits of the study; 60″ for the peak-to-peak unless given.
+    changes
+        Other fields of ``ta.Study``.
+    """
+    chosen = {
+        "name": "rv20e_liu2020",
+        "flank_clearance": (1.0, 5.0),
+        "radial_clearance": (5.0, 20.0),
+        **(reducer or {}),
+    }
+    study = ta.Study(
+        model=ta.reducer(**chosen),
+        drawing=ta.drawing(**{"table": "rv20e_baseline", **(drawing or {})}),
+        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)} if limits is None else limits,
+        **{"name": "test", **changes},
+    )
+    return Prepared(study=study)
+
 
 FIRST_STAGE = ("sun.", "planet", "mesh")
 STANDING = ("housing.", "each_pin.", "carrier.assembly", "carrier.tilt", "sun.assembly")

@@ -1,32 +1,215 @@
-"""Rare failures with exact answers: published limit states and own ones, each in independent standard normal variables.
-
-A case fails where its margin is below zero. Exact probabilities are closed forms or integrals over one variable; that
-of the metaballs is the sum over a fine grid. Published: ``reliability.json`` (`tests.reliability_problems`);
-Breitung 2019, counterexamples to subset simulation (piecewise linear, metaballs); Der Kiureghian & Dakessian 1998, two
-design points; Engelund & Rackwitz 1993, sums of exponential inputs; all others are own.
-"""
+"""Reliability problems with known probabilities, and the distributions that they are written in."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import factorial
+from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 import numpy as np
+from jaxtyping import Float
 from scipy.integrate import quad
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import chi2, gamma, gumbel_r, norm
 
-from tests.marginals import LargestValue, LimitOfInputs, LogNormal, Uniform
-from tests.reliability_problems import PROBLEMS, exact, problem
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
+from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation
+
+
+@runtime_checkable
+class Marginal(Protocol):
+    """Distribution of one input."""
+
+    def value(self, u: Float[np.ndarray, " sample"]) -> Float[np.ndarray, " sample"]:
+        """Return the values that are as probable as standard normal ones."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Normal:
+    """Normal distribution.
+
+    Parameters
+    ----------
+    mean, deviation
+        Mean and standard deviation [unit of the input].
+    """
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "deviation", self.deviation)
+
+    def value(self, u: Float[np.ndarray, " sample"]) -> Float[np.ndarray, " sample"]:
+        """Return the values that are as probable as standard normal ones [unit of the input]."""
+        return self.mean + self.deviation * u
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uniform:
+    """Uniform distribution.
+
+    Parameters
+    ----------
+    low, high
+        Ends [unit of the input].
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "high − low", self.high - self.low)
+
+    def value(self, u: Float[np.ndarray, " sample"]) -> Float[np.ndarray, " sample"]:
+        """Return the values that are as probable as standard normal ones [unit of the input]."""
+        width = self.high - self.low
+        # Each end is reached from its own side, where the small probability still has all its digits.
+        return np.asarray(np.where(u < 0, self.low + width * ndtr(u), self.high - width * ndtr(-u)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogNormal:
+    """Lognormal distribution, given by the moments of the input itself.
+
+    Parameters
+    ----------
+    mean, deviation
+        Mean and standard deviation of the input, not of its logarithm [unit of the input].
+    """
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "mean", self.mean)
+        _require_positive(self, "deviation", self.deviation)
+
+    def value(self, u: Float[np.ndarray, " sample"]) -> Float[np.ndarray, " sample"]:
+        """Return the values that are as probable as standard normal ones [unit of the input]."""
+        variance = np.log1p((self.deviation / self.mean) ** 2)
+        # A search may overshoot to where the value is infinite, which then reads as a failed sample.
+        with np.errstate(over="ignore"):
+            return np.asarray(self.mean * np.exp(np.sqrt(variance) * u - variance / 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargestValue:
+    """Gumbel distribution of largest values, given by its moments.
+
+    Parameters
+    ----------
+    mean, deviation
+        Mean and standard deviation [unit of the input].
+    """
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "deviation", self.deviation)
+
+    def value(self, u: Float[np.ndarray, " sample"]) -> Float[np.ndarray, " sample"]:
+        """Return the values that are as probable as standard normal ones [unit of the input]."""
+        scale = self.deviation * np.sqrt(6) / np.pi
+        # The logarithm of Φ, not Φ itself, keeps the far upper tail finite.
+        exponent = np.maximum(-log_ndtr(u), np.finfo(float).tiny)
+        return np.asarray(self.mean - scale * (np.euler_gamma + np.log(exponent)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitOfInputs:
+    """A limit state that is written in independent inputs instead of standard normal variables.
+
+    Parameters
+    ----------
+    marginals
+        Distributions of the inputs, in the order of the columns.
+    margin
+        Returns the distance of every sample from the limit, negative where the product fails.
+
+    References
+    ----------
+    Transformation x = F⁻¹(Φ(u)) of independent inputs: Ditlevsen & Madsen, Structural Reliability Methods, ch. 7.
+    """
+
+    marginals: tuple[Marginal, ...]
+    margin: Callable[[Float[np.ndarray, "sample variable"]], Float[np.ndarray, " sample"]]
+
+    @property
+    def variables(self) -> int:
+        """Number of inputs."""
+        return len(self.marginals)
+
+    def inputs(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
+        """Return the inputs of points of standard normal space [units of the inputs]."""
+        return np.column_stack([item.value(column) for item, column in zip(self.marginals, u.T, strict=True)])
+
+    def __call__(self, u: Float[np.ndarray, "sample variable"]) -> np.ndarray:
+        """Return the distance of every sample from the limit."""
+        return self.margin(self.inputs(u))
+
+
+def _require_positive(owner: object, field: str, value: float) -> None:
+    """Raise unless a parameter of a distribution is positive."""
+    if not value > 0:
+        raise InputError.at(type(owner).__name__, field, value, "a number above 0")
+
+
+PROBLEMS = {
+    item["id"]: item
+    for item in json.loads(
+        Path(__file__).with_name("validation").joinpath("reliability.json").read_text(encoding="utf-8")
+    )["problems"]
+}
+FOUR_BRANCHES = "FourBranch_p=7/sqrt2"
+MARGINALS = {
+    "normal": lambda first, second: Normal(mean=first, deviation=second),
+    "uniform": lambda first, second: Uniform(low=first, high=second),
+    "lognormal(mean,std)": lambda first, second: LogNormal(mean=first, deviation=second),
+    "gumbel_max(mean,std)": lambda first, second: LargestValue(mean=first, deviation=second),
+}
+
+
+def four_branches(x: np.ndarray) -> np.ndarray:
+    along, across = (x[:, 0] + x[:, 1]) / np.sqrt(2), x[:, 0] - x[:, 1]
+    bent, straight = 3 + 0.1 * across**2, 7 / np.sqrt(2)
+    return np.min([bent - along, bent + along, straight + across, straight - across], axis=0)
+
+
+MARGINS = {
+    "RP8": lambda x: x @ np.array([1.0, 2.0, 2.0, 1.0, -5.0, -5.0]),
+    "RP14": lambda x: x[:, 0] - 32 / (np.pi * x[:, 1] ** 3) * np.sqrt(x[:, 2] ** 2 * x[:, 3] ** 2 / 16 + x[:, 4] ** 2),
+    "RP22": lambda x: 2.5 - (x[:, 0] + x[:, 1]) / np.sqrt(2) + 0.1 * (x[:, 0] - x[:, 1]) ** 2,
+    "RP31": lambda x: 2 - x[:, 1] + 256 * x[:, 0] ** 4,
+    "RP75": lambda x: 3 - x[:, 0] * x[:, 1],
+    "R-S": lambda x: x[:, 0] - x[:, 1],
+    FOUR_BRANCHES: four_branches,
+}
+
+
+def problem(name: str) -> LimitOfInputs:
+    inputs = PROBLEMS[name]["inputs"]
+    return LimitOfInputs(
+        marginals=tuple(MARGINALS[kind](float(first), float(second)) for _, kind, first, second in inputs),
+        margin=MARGINS[name],
+    )
+
+
+def exact(name: str) -> float:
+    return float(PROBLEMS[name]["computed"]["pf"])
+
 
 Margin = Callable[[np.ndarray], np.ndarray]
 
