@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
 DOORS = {
     "SALib": ("sensitivity/",),
-    "pymoo": ("allocation/",),
-    "cvxpy": ("allocation/",),
+    "pymoo": ("allocation/front/genetic.py",),
+    "cvxpy": ("allocation/search/convex_program.py",),
     "sklearn": ("sensitivity/surrogate/", "reducers/stand_ins.py"),
     "matplotlib": ("reports/",),
     "jinja2": ("reports/",),

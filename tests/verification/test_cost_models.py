@@ -76,13 +76,13 @@ def test_another_unit_of_the_zone_changes_no_cost(model, unit):
 @pytest.mark.parametrize("model", MODELS, ids=named)
 def test_the_convex_form_is_the_value_and_a_lower_bound(model):
     zones = np.linspace(2.0, 34.0, 997)
-    expression = model.expression(cp.Variable(3, pos=True))
+    expression = model.expression(cp.Variable(3, pos=True), cp)
     assert expression.is_convex() and expression.is_dcp() and expression.shape == (3,)
-    value = model.expression(cp.Constant(zones)).value
+    value = model.expression(cp.Constant(zones), cp).value
     exact = isinstance(model, Tabulated) or model in CLOSED
     np.testing.assert_allclose(value, model.value(zones), rtol=1e-12 if exact else OUTER_ERROR)
     assert (value <= model.value(zones) * (1 + 1e-12)).all()
-    alone = model.expression(cp.Constant(4.4))
+    alone = model.expression(cp.Constant(4.4), cp)
     assert alone.shape == () and alone.value == pytest.approx(float(model.value(np.asarray(4.4))), rel=OUTER_ERROR)
 
 
@@ -90,19 +90,18 @@ def test_the_convex_form_is_the_value_and_a_lower_bound(model):
 def test_a_solver_takes_the_convex_form(model):
     """The stationary point of the cost plus a price per unit of zone, against a fine grid."""
     zone = cp.Variable(pos=True)
-    program = cp.Problem(cp.Minimize(model.expression(zone) + 0.11 * zone), [zone >= 2.0, zone <= 30.0])
+    program = cp.Problem(cp.Minimize(model.expression(zone, cp) + 0.11 * zone), [zone >= 2.0, zone <= 30.0])
     grid = np.linspace(2.0, 30.0, 200001)
     assert program.solve(solver="CLARABEL") == pytest.approx((model.value(grid) + 0.11 * grid).min(), rel=3e-6)
 
 
 def test_shapes_that_are_not_convex_have_no_convex_form():
-    zone = cp.Variable(pos=True)
-    assert Tabulated(NOT_CONVEX).expression(zone) is None
-    assert Spline(NOT_CONVEX).expression(zone) is None
-    assert SumOfCosts(models=(CLOSED[0], Spline(NOT_CONVEX)), ratios=(1.0, 1.0)).expression(zone) is None
+    assert not Tabulated(NOT_CONVEX).is_convex
+    assert not Spline(NOT_CONVEX).is_convex
+    assert not SumOfCosts(models=(CLOSED[0], Spline(NOT_CONVEX)), ratios=(1.0, 1.0)).is_convex
     straight = Points(zones=(1.0, 2.1, 3.7, 4.0), costs=(9.0, 9.0 - 1.1, 9.0 - 2.7, 6.0))
     for kind in (Tabulated, Spline):
-        assert kind(straight).expression(cp.Constant(3.0)).value == pytest.approx(7.0, rel=OUTER_ERROR)
+        assert kind(straight).expression(cp.Constant(3.0), cp).value == pytest.approx(7.0, rel=OUTER_ERROR)
 
 
 def test_points_of_a_convex_curve_nearly_always_give_a_convex_spline(generator):
@@ -111,10 +110,10 @@ def test_points_of_a_convex_curve_nearly_always_give_a_convex_spline(generator):
     for _ in range(200):
         zones = np.sort(generator.uniform(2.0, 30.0, 6))
         costs = generator.uniform(0, 3) + 20 * zones ** -generator.uniform(0.5, 2.5)
-        missing += Spline(points(zones.tolist(), costs.tolist())).expression(cp.Variable(pos=True)) is None
+        missing += not Spline(points(zones.tolist(), costs.tolist())).is_convex
     assert missing <= 5
     partly_straight = Points(zones=(1.0, 2.1, 3.7, 5.0, 9.0), costs=(9.0, 7.9, 6.3, 5.0, 3.0))
-    assert Spline(partly_straight).expression(cp.Variable(pos=True)) is not None
+    assert Spline(partly_straight).is_convex
 
 
 def test_where_the_points_are_not_convex_the_spline_is_that_of_fritsch_and_butland():

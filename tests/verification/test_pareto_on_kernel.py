@@ -11,8 +11,9 @@ import pytest
 from tests.builders import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
+from tolalloc.allocation.front.genetic import nondominated
 from tolalloc.allocation.front.pareto_front import pareto_front
-from tolalloc.allocation.front.pareto_problem import DesignProblem, nondominated
+from tolalloc.allocation.front.pareto_problem import DesignProblem
 from tolalloc.allocation.front.trade import QuantileResponse
 from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.effort import FrontEffort

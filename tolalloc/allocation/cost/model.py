@@ -15,7 +15,7 @@ from jaxtyping import Float
 from tolalloc.exceptions import InputError
 
 Expression = Any
-"""Expression of cvxpy, which is imported when a program is made."""
+"""Expression of cvxpy; the program that wants a cost as one hands cvxpy over, which is loaded for that alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +38,11 @@ class _FallingCost:
             if name != "fixed" and not (isfinite(value) and value > 0):
                 raise InputError.at("cost model", name, value, "a finite number above 0, so that the cost falls")
 
+    @property
+    def is_convex(self) -> bool:
+        """Whether the cost is a convex function of the zone: all closed forms are."""
+        return True
+
 
 @dataclass(frozen=True, kw_only=True)
 class Reciprocal(_FallingCost):
@@ -51,11 +56,9 @@ class Reciprocal(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.factor / zone**2)
 
-    def expression(self, zone: Expression) -> Expression:
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        import cvxpy as cp
-
-        return self.fixed + self.factor * cp.inv_pos(zone)
+        return self.fixed + self.factor * cvx.inv_pos(zone)
 
     def rescaled(self, unit: float) -> Reciprocal:
         """Return the same cost as a function of zone / unit."""
@@ -76,16 +79,14 @@ class ReciprocalPower(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.exponent * self.factor * zone ** (-self.exponent - 1.0))
 
-    def expression(self, zone: Expression) -> Expression:
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression.
 
         Notes
         -----
         Through the logarithm, as solvers take powers by a rational exponent that is only close to n.
         """
-        import cvxpy as cp
-
-        return self.fixed + cp.exp(log(self.factor) - self.exponent * cp.log(zone))
+        return self.fixed + cvx.exp(log(self.factor) - self.exponent * cvx.log(zone))
 
     def rescaled(self, unit: float) -> ReciprocalPower:
         """Return the same cost as a function of zone / unit."""
@@ -111,11 +112,9 @@ class Exponential(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-self.factor / self.scale * np.exp(-zone / self.scale))
 
-    def expression(self, zone: Expression) -> Expression:
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        import cvxpy as cp
-
-        return self.fixed + self.factor * cp.exp(-zone / self.scale)
+        return self.fixed + self.factor * cvx.exp(-zone / self.scale)
 
     def rescaled(self, unit: float) -> Exponential:
         """Return the same cost as a function of zone / unit."""
@@ -143,11 +142,9 @@ class Combined(_FallingCost):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(-(self.value(zone) - self.fixed) * (self.exponent / zone + 1.0 / self.scale))
 
-    def expression(self, zone: Expression) -> Expression:
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        import cvxpy as cp
-
-        return self.fixed + cp.exp(log(self.factor) - self.exponent * cp.log(zone) - zone / self.scale)
+        return self.fixed + cvx.exp(log(self.factor) - self.exponent * cvx.log(zone) - zone / self.scale)
 
     def rescaled(self, unit: float) -> Combined:
         """Return the same cost as a function of zone / unit."""
@@ -182,8 +179,13 @@ class CostModel(Protocol):
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         ...
 
-    def expression(self, zone: Expression) -> Expression | None:
-        """Return the cost as a convex expression of scalar or vector zones, or None where it is not convex."""
+    @property
+    def is_convex(self) -> bool:
+        """Whether the cost is a convex function of the zone."""
+        ...
+
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
+        """Return a convex cost as an expression of scalar or vector zones, made with cvxpy."""
         ...
 
     def rescaled(self, unit: float) -> CostModel:
@@ -245,10 +247,14 @@ class Weighted:
         """Return the derivative of the cost by the zone [cost units per unit of the zone]."""
         return np.asarray(self.weight * self.model.slope(zone))
 
-    def expression(self, zone: Expression) -> Expression | None:
-        """Return the cost as a convex expression, or None where the model is not convex."""
-        found = self.model.expression(zone)
-        return None if found is None else self.weight * found
+    @property
+    def is_convex(self) -> bool:
+        """Whether the cost is a convex function of the zone."""
+        return self.model.is_convex
+
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
+        """Return the cost as a convex expression."""
+        return self.weight * self.model.expression(zone, cvx)
 
     def rescaled(self, unit: float) -> Weighted:
         """Return the same cost as a function of zone / unit."""
@@ -287,11 +293,14 @@ class SumOfCosts:
         """Return the derivative of the cost by the common variable [cost units per unit of the variable]."""
         return np.asarray(np.sum([part.slope(zone) for part in self._parts], axis=0))
 
-    def expression(self, zone: Expression) -> Expression | None:
-        """Return the cost as a convex expression, or None where a part is not convex."""
-        parts = [part.expression(zone) for part in self._parts]
-        convex = [part for part in parts if part is not None]
-        return sum(convex) if len(convex) == len(parts) else None
+    @property
+    def is_convex(self) -> bool:
+        """Whether every part is a convex function of its zone."""
+        return all(part.is_convex for part in self._parts)
+
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
+        """Return the cost as a convex expression."""
+        return sum(part.expression(zone, cvx) for part in self._parts)
 
     def rescaled(self, unit: float) -> SumOfCosts:
         """Return the same cost as a function of variable / unit."""

@@ -174,11 +174,14 @@ class Tabulated:
         """Return the derivative of the cost by the zone, at a point to its right [cost units per unit of the zone]."""
         return np.asarray(self._slopes[self._line(zone)])
 
-    def expression(self, zone: Expression) -> Expression | None:
-        """Return the cost as the highest of the lines, or None where their slopes do not increase."""
-        if np.diff(self._slopes, append=0.0).min() < ROUNDING * self._slopes.min():
-            return None
-        return _highest(np.array(self.points.zones[:-1]), np.array(self.points.costs[:-1]), self._slopes, zone)
+    @property
+    def is_convex(self) -> bool:
+        """Whether the slopes of the lines increase."""
+        return bool(np.diff(self._slopes, append=0.0).min() >= ROUNDING * self._slopes.min())
+
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
+        """Return the cost as the highest of the lines."""
+        return _highest(np.array(self.points.zones[:-1]), np.array(self.points.costs[:-1]), self._slopes, zone, cvx)
 
     def rescaled(self, unit: float) -> Tabulated:
         """Return the same cost as a function of zone / unit."""
@@ -228,8 +231,20 @@ class Spline:
         inside = np.clip(zone, self.points.zones[0], self.points.zones[-1])
         return np.asarray(np.minimum(self._curve(inside, 1), 0.0))  # above 0 it is rounding
 
-    def expression(self, zone: Expression) -> Expression | None:
-        """Return the cost as the highest of many tangents, or None where the spline is not convex.
+    @cached_property
+    def _bends(self) -> Float[np.ndarray, "2 piece"]:
+        """Second derivative at both ends of every piece, between them a straight line [cost units per unit²]."""
+        lengths, cubic, square = np.diff(self.points.zones), self._curve.c[0], self._curve.c[1]
+        return np.stack([2 * square, 2 * square + 6 * cubic * lengths])
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether no piece of the spline bends downwards."""
+        zones = np.array(self.points.zones)
+        return bool((self._bends * np.diff(zones)).min() >= ROUNDING * self.slope(zones).min())
+
+    def expression(self, zone: Expression, cvx: Any) -> Expression:
+        """Return the cost as the highest of many tangents.
 
         Notes
         -----
@@ -237,17 +252,12 @@ class Spline:
         so many that this stays within `OUTER_ERROR` of its lowest cost. So the expression is a lower bound on the cost.
         """
         zones = np.array(self.points.zones)
-        lengths, cubic, square = np.diff(zones), self._curve.c[0], self._curve.c[1]
-        bends = np.stack(
-            [2 * square, 2 * square + 6 * cubic * lengths]
-        )  # f″ at both ends, between them a straight line
-        if (bends * lengths).min() < ROUNDING * self.slope(zones).min():
-            return None
-        largest = np.maximum(bends.max(axis=0), 0.0)
+        lengths = np.diff(zones)
+        largest = np.maximum(self._bends.max(axis=0), 0.0)
         steps = np.ceil(lengths * np.sqrt(largest / (8 * OUTER_ERROR * np.array(self.points.costs[1:])))).astype(int)
         pieces = zip(zones[:-1], zones[1:], np.maximum(steps, 1), strict=True)
         touched = np.unique(np.concatenate([np.linspace(start, end, count + 1) for start, end, count in pieces]))
-        return _highest(touched, self.value(touched), self.slope(touched), zone)
+        return _highest(touched, self.value(touched), self.slope(touched), zone, cvx)
 
     def rescaled(self, unit: float) -> Spline:
         """Return the same cost as a function of zone / unit."""
@@ -292,10 +302,9 @@ def _highest(
     costs: Float[np.ndarray, " line"],
     slopes: Float[np.ndarray, " line"],
     zone: Expression,
+    cvx: Any,
 ) -> Expression:
     """Return the highest of the lines with these slopes through these points, for every zone."""
-    import cvxpy as cp
-
-    flat = cp.reshape(zone, (1, zone.size), order="C")
+    flat = cvx.reshape(zone, (1, zone.size), order="C")
     heights = np.outer(costs - slopes * touched, np.ones(zone.size))
-    return cp.reshape(cp.max(slopes[:, np.newaxis] @ flat + heights, axis=0), zone.shape, order="C")
+    return cvx.reshape(cvx.max(slopes[:, np.newaxis] @ flat + heights, axis=0), zone.shape, order="C")

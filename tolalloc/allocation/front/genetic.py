@@ -6,7 +6,7 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.moo.nsga3 import NSGA3
 from pymoo.core.algorithm import Algorithm
@@ -14,7 +14,9 @@ from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.operators.survival.rank_and_crowding import RankAndCrowding
+from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
 from pymoo.optimize import minimize
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
@@ -36,7 +38,7 @@ class _Searched(Problem):  # type: ignore[misc]
         self.signs = np.array([objective.sign for objective in problem.objectives])
         bounds = np.array([genes.lower, genes.upper, genes.integer]).tolist()
         identity = repr((genes.names, bounds, problem.objectives, problem.constraints))
-        self.remembered = CachedAnswers(self._ask, identity, checkpoint)
+        self.cached = CachedAnswers(self._ask, identity, checkpoint)
         margin = _MARGIN * genes.integer
         super().__init__(
             n_var=genes.lower.size,
@@ -48,7 +50,7 @@ class _Searched(Problem):  # type: ignore[misc]
 
     def answers(self, designs: Float[np.ndarray, "design gene"]) -> Objectives:
         """Return the objectives of every design, each asked for once."""
-        numbers, count = self.remembered(designs), self.signs.size
+        numbers, count = self.cached(designs), self.signs.size
         return Objectives(
             values=numbers[:, :count], violation=numbers[:, count:-1], status=numbers[:, -1].astype(np.uint8)
         )
@@ -167,6 +169,44 @@ def search(
         seed=seeds.child("genetic").integer(),
         copy_algorithm=False,
     )
-    searched.remembered.write()
+    searched.cached.write()
     designs = np.concatenate(searched.asked)
     return SearchedDesigns(problem=problem, designs=designs, answers=searched.answers(designs))
+
+
+def best_front(found: SearchedDesigns, number: int) -> SearchedDesigns:
+    """Return allowed designs that no other one beats, in the order of the first objective, possibly none.
+
+    Where there are more than the number [-], those in the densest places are left out.
+    """
+    allowed = found.at(np.flatnonzero(found.answers.kept))
+    front = allowed.at(np.flatnonzero(nondominated(allowed.losses)))
+    few = front.at(thinned(front.losses, number))
+    return few.at(np.argsort(few.losses[:, 0], kind="stable"))
+
+
+def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
+    """Return which designs no other one beats in one objective without losing in another; equal ones stay both.
+
+    Examples
+    --------
+    >>> nondominated(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 4.0]]))
+    array([ True,  True, False])
+    """
+    front = np.zeros(len(losses), bool)
+    front[NonDominatedSorting().do(losses, only_non_dominated_front=True)] = True
+    return front
+
+
+def thinned(losses: Float[np.ndarray, "design objective"], number: int) -> Int[np.ndarray, " kept"]:
+    """Return the positions of at most so many designs of a front, those in the densest places left out one by one.
+
+    References
+    ----------
+    Kukkonen & Deb 2006, CEC, 1179–1186, for two objectives; Kukkonen & Deb 2006, PPSN IX, 553–562, for more.
+    """
+    if len(losses) <= number:
+        return np.arange(len(losses))
+    crowding = get_crowding_function("pcd" if losses.shape[1] == 2 else "mnn")
+    distance = crowding.do(losses, n_remove=len(losses) - number)
+    return np.asarray(np.sort(np.argsort(-distance, kind="stable")[:number]))

@@ -51,8 +51,10 @@ class Front:
 
 
 def _front(found: SearchedDesigns, problem: DesignProblem, number: int) -> Front:
-    """Return the front of a search, not yet judged by the kernel."""
-    front = found.front(number)
+    """Return the front of a search, not yet run on the kernel."""
+    from tolalloc.allocation.front.genetic import best_front
+
+    front = best_front(found, number)
     if not len(front.designs):
         violation = found.answers.violation[found.least_violating]
         raise SolveError(
@@ -110,7 +112,7 @@ def pareto_front(
         Group → the scales that it may have, rising [-].
     large
         Settings that shall be large, further objectives.
-    sides
+    others
         Limited sides of other requirements, kept by their local models.
     largest_failed_share
         Share of the kernel's designs that may fail; a design fails with the first of its units [-].

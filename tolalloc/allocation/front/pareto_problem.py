@@ -205,31 +205,6 @@ class DesignProblem:
         return Objectives(values=values, violation=violation.reshape(len(designs), -1), status=evaluation.status)
 
 
-def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
-    """Return which designs no other one beats in one objective without losing in another; equal ones stay both."""
-    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
-
-    front = np.zeros(len(losses), bool)
-    front[NonDominatedSorting().do(losses, only_non_dominated_front=True)] = True
-    return front
-
-
-def thinned(losses: Float[np.ndarray, "design objective"], number: int) -> Int[np.ndarray, " kept"]:
-    """Return the positions of at most so many designs of a front, those in the densest places left out one by one.
-
-    References
-    ----------
-    Kukkonen & Deb 2006, CEC, 1179–1186, for two objectives; Kukkonen & Deb 2006, PPSN IX, 553–562, for more.
-    """
-    from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
-
-    if len(losses) <= number:
-        return np.arange(len(losses))
-    crowding = get_crowding_function("pcd" if losses.shape[1] == 2 else "mnn")
-    distance = crowding.do(losses, n_remove=len(losses) - number)
-    return np.asarray(np.sort(np.argsort(-distance, kind="stable")[:number]))
-
-
 def normalised(
     losses: Float[np.ndarray, "design objective"], front: Float[np.ndarray, "point objective"]
 ) -> Float[np.ndarray, "design objective"]:
@@ -283,16 +258,6 @@ class SearchedDesigns:
         """Designs that failed [-]."""
         return int(np.count_nonzero(~self.answers.good))
 
-    def front(self, number: int) -> SearchedDesigns:
-        """Return allowed designs that no other one beats, in the order of the first objective, possibly none.
-
-        Where there are more than the number [-], those in the densest places are left out.
-        """
-        allowed = self._at(np.flatnonzero(self.answers.kept))
-        front = allowed._at(np.flatnonzero(nondominated(allowed.losses)))
-        few = front._at(thinned(front.losses, number))
-        return few._at(np.argsort(few.losses[:, 0], kind="stable"))
-
     @property
     def least_violating(self) -> int:
         """Position of the design whose violations sum up to the least; where every design failed, a `SolveError`."""
@@ -301,7 +266,8 @@ class SearchedDesigns:
             raise SolveError(f"Pareto search: all of {len(self.designs)} designs failed.")
         return at
 
-    def _at(self, which: Int[np.ndarray, " kept"]) -> SearchedDesigns:
+    def at(self, which: Int[np.ndarray, " kept"]) -> SearchedDesigns:
+        """Return the designs at some positions."""
         answers = self.answers
         return SearchedDesigns(
             problem=self.problem,

@@ -1,17 +1,17 @@
-"""The convex program: least cost for one choice of processes, compiled once and solved for many stacks."""
+"""Programs that cvxpy solves: the convex one of a choice of processes, compiled once, and choices of whole numbers."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.allocation.cost.model import Expression
-from tolalloc.allocation.search.lagrange_dual import convex_cost, cost_bound
+from tolalloc.allocation.search.lagrange_dual import cost_bound, require_convex
 from tolalloc.allocation.space.problem import (
     AllocationProblem,
     LeastInfeasible,
@@ -89,9 +89,11 @@ class ConvexProgram:
             (cp.Parameter(count, nonneg=True), cp.Parameter(count, nonneg=True), cp.Parameter(shares), cp.Parameter())
             for _ in range(stacks)
         ]
+        for feature, process in zip(features, self._made, strict=True):
+            require_convex(f"feature {feature.name}", process)
         made = [
-            convex_cost(f"feature {feature.name}", process.rescaled(unit), self._zones[at])
-            for at, (feature, process, unit) in enumerate(zip(features, self._made, self._units, strict=True))
+            process.rescaled(unit).cost.expression(self._zones[at], cp)
+            for at, (process, unit) in enumerate(zip(self._made, self._units, strict=True))
         ]
         cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
         self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
@@ -240,4 +242,66 @@ def front(
     return tuple(
         program.solve([*stacks[:at], replace(stacks[at], budget=float(budget)), *stacks[at + 1 :]])
         for budget in budgets
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class WholeNumbers:
+    """What a mixed-integer program says of choices of zeros and ones."""
+
+    values: Float[np.ndarray, " column"] | None  # Zero or one of every column, none where nothing was found [-]
+    bound: float  # Lower bound on the cost, as far as the solver is right [unit of the cost]
+    nodes: int  # Nodes that it took [-]
+    is_optimal: bool  # Whether the values were proven to be the best
+    is_infeasible: bool  # Whether it was proven that no values keep the rows
+
+
+def choose_whole_numbers(
+    cost: Float[np.ndarray, " column"],
+    rows: Any,
+    limits: Float[np.ndarray, " row"],
+    one_each: Any,
+    most_nodes: int,
+) -> WholeNumbers:
+    """Return the zeros and ones z of least cost·z with rows·z ≤ limits and one_each·z = 1.
+
+    Parameters
+    ----------
+    cost
+        Cost of every column [any unit].
+    rows, one_each
+        Sparse matrices with as many columns.
+    limits
+        Largest value of every row.
+    most_nodes
+        Nodes of branch and bound, after which it ends with what it has [-].
+
+    Raises
+    ------
+    SolveError
+        The solver gave up.
+    """
+    import cvxpy as cp
+
+    z = cp.Variable(cost.size, boolean=True)
+    program = cp.Problem(cp.Minimize(cost @ z), [rows @ z <= limits, one_each @ z == 1])
+    options = {
+        "mip_rel_gap": 0.0,
+        "mip_abs_gap": 0.0,
+        "presolve": "off",  # the rows are few and tight already
+        "mip_max_nodes": most_nodes,
+    }
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Solution may be inaccurate")  # out of nodes, which the status says
+        try:
+            program.solve(solver=cp.HIGHS, highs_options=options)
+        except cp.SolverError as error:
+            raise SolveError(f"The mixed-integer program of the allocation was given up: {error}") from error
+    stats = program.solver_stats.extra_stats
+    return WholeNumbers(
+        values=z.value,
+        bound=-np.inf if z.value is None else float(stats.mip_dual_bound),
+        nodes=int(stats.mip_node_count),
+        is_optimal=program.status == cp.OPTIMAL,
+        is_infeasible=program.status == cp.INFEASIBLE,
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.allocation.cost.model import ClosedForm, CostModel, Expression, Process, Reciprocal, stacked
+from tolalloc.allocation.cost.model import ClosedForm, CostModel, Process, Reciprocal, stacked
 from tolalloc.allocation.space.problem import AllocationProblem
 from tolalloc.exceptions import InputError
 
@@ -162,15 +162,13 @@ class LagrangeDual:
     """
 
     def __init__(self, problem: AllocationProblem) -> None:
-        import cvxpy as cp
-
         self.problem = problem
         counts = [len(feature.processes) for feature in problem.features]
         self.feature = np.repeat(np.arange(len(counts)), counts)
         self.starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
         self._processes = tuple(process for feature in problem.features for process in feature.processes)
         for at, process in zip(self.feature, self._processes, strict=True):
-            convex_cost(f"feature {problem.features[at].name}", process, cp.Variable(pos=True))
+            require_convex(f"feature {problem.features[at].name}", process)
         self._alone = by_form(self._processes)
         self._worst_case = np.array([stack.worst_case for stack in problem.stacks]).reshape(-1, len(counts))
         self._root_sum_square = np.array([stack.root_sum_square for stack in problem.stacks]).reshape(-1, len(counts))
@@ -249,12 +247,10 @@ def unit_rows(rows: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "row c
     return rows / np.where(length > 0, length, 1.0)
 
 
-def convex_cost(place: str, process: Process, zone: Expression) -> Expression:
-    """Return the cost of a process as a convex expression [cost units]; one that is not convex is an InputError."""
-    expression = process.cost.expression(zone)
-    if expression is None:
+def require_convex(place: str, process: Process) -> None:
+    """Raise an InputError unless the cost of a process is convex in its zone."""
+    if not process.cost.is_convex:
         raise InputError.at(place, f"process {process.name}", "a cost that is not convex", "a convex cost")
-    return expression
 
 
 _SMALLEST_SHARE = 1e-9

@@ -24,7 +24,6 @@ The relaxation of the zeros and ones to 0 ≤ z ≤ 1 is made of linear rows, al
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,6 +33,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import csr_matrix
 
+from tolalloc.allocation.search.convex_program import WholeNumbers, choose_whole_numbers
 from tolalloc.exceptions import SolveError
 
 ROUNDING = 5e-13
@@ -333,26 +333,25 @@ class _ChoiceSearch:
 
     def run(self) -> ProvenChoice | None:
         """Return the best choice, None where no choice is allowed."""
-        import cvxpy as cp
-
         values, multipliers = self._relaxation()
         lift = self._lift(multipliers)
         self._offer(exchanged(self.program, values))
         kept = self._divide(self.bound + lift <= self.cost + RELAXED * COSTS)
-        status = cp.USER_LIMIT
-        while self.nodes_left > 0:
-            taken, proven, status = self._decide(kept)
-            self.bound = max(self.bound, min(proven, self.cost))
-            if status == cp.INFEASIBLE:
+        is_infeasible = False
+        while self.nodes_left > 0 and not is_infeasible:
+            found, taken = self._decided(kept)
+            self.bound = max(self.bound, min(found.bound, self.cost))
+            is_infeasible = found.is_infeasible
+            if is_infeasible:
                 self.bound = self.cost
+            elif taken is None or self._offer(taken) or not found.is_optimal:
                 break
-            if taken is None or self._offer(taken) or status != cp.OPTIMAL:
-                break
-            self.rows.exclude(taken)
-        if self.best is None and status != cp.INFEASIBLE:
-            raise SolveError("No choice that keeps every stack was found within the nodes allowed; allow more of them.")
+            else:
+                self.rows.exclude(taken)
         if self.best is None:
-            return None
+            if is_infeasible:
+                return None
+            raise SolveError("No choice that keeps every stack was found within the nodes allowed; allow more of them.")
         cost = float(self.program.cost[self.best].sum())
         return self.best, cost, min(self.bound / self.rows.scale, cost)
 
@@ -427,31 +426,19 @@ class _ChoiceSearch:
             ends.append(float(np.sqrt(max(sign * (found.fun - _SLACK), 0.0))))
         return ends[0], ends[1]
 
-    def _decide(self, kept: Bool[np.ndarray, " more"]) -> tuple[Int[np.ndarray, " any_group"] | None, float, str]:
-        """Return the answer of the mixed-integer program, its bound and its status."""
-        import cvxpy as cp
-
+    def _decided(self, kept: Bool[np.ndarray, " more"]) -> tuple[WholeNumbers, Int[np.ndarray, " any_group"] | None]:
+        """Return what the mixed-integer program of the choices that are left says, and which choices it takes."""
         rows, columns = self.rows, np.flatnonzero(kept)
-        z = cp.Variable(columns.size, boolean=True)
-        keep = csr_matrix(rows.matrix[:, columns]) @ z <= rows.relaxed_limits
-        program = cp.Problem(cp.Minimize(rows.cost[columns] @ z), [keep, rows.one_each[:, columns] @ z == 1])
-        options = {
-            "mip_rel_gap": 0.0,
-            "mip_abs_gap": 0.0,
-            "presolve": "off",  # the rows are few and tight already
-            "mip_max_nodes": self.nodes_left,
-        }
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Solution may be inaccurate")  # out of nodes, which the status says
-            try:
-                program.solve(solver=cp.HIGHS, highs_options=options)
-            except cp.SolverError as error:
-                raise SolveError(f"The mixed-integer program of the allocation was given up: {error}") from error
-        stats = program.solver_stats.extra_stats
-        self.nodes_left -= max(int(stats.mip_node_count), 1)
-        if z.value is None:
-            return None, -np.inf, program.status
+        found = choose_whole_numbers(
+            rows.cost[columns],
+            csr_matrix(rows.matrix[:, columns]),
+            rows.relaxed_limits,
+            rows.one_each[:, columns],
+            self.nodes_left,
+        )
+        self.nodes_left -= max(found.nodes, 1)
+        if found.values is None:
+            return found, None
         starts = np.searchsorted(columns, rows.program.starts)
-        parts = np.split(z.value, starts[1:])
-        taken = columns[starts + np.array([part.argmax() for part in parts])]
-        return taken, float(stats.mip_dual_bound), program.status
+        parts = np.split(found.values, starts[1:])
+        return found, columns[starts + np.array([part.argmax() for part in parts])]
