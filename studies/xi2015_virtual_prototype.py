@@ -17,12 +17,11 @@ from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.dynamics.prototype import engine, with_rigid_bearings
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.simulation.answer import SimulationAnswer
-from tolalloc.reducers.simulation.figures import error_figure, run_figures
-from tolalloc.reducers.simulation.request import SimulationRequest, prepare_simulation, with_ideal_gears
-from tolalloc.reducers.simulation.run import simulate
-from tolalloc.reducers.simulation.sentences import range_text
+from tolalloc.reducers.simulation import SimulationRequest, SimulationResult, prepare_simulation, with_ideal_gears
 from tolalloc.reports.document import Document, Section
+from tolalloc.reports.tellers.simulation import error_figure, range_text, rest_row, run_figures, steady_row
+from tolalloc.study.answer import Answer
+from tolalloc.study.inquiries.simulate import simulated
 
 IMPLIED = 3.67e7
 """Stiffness of every pin contact at which 16 to 17 carry, as xi2015's printed angles imply [N/m]."""
@@ -30,6 +29,7 @@ STEEL, RIGID_STEEL = "steel line contact, 12 mm", "the same, rigid joints"
 SOFT = f"{IMPLIED:.3g} N/m at every pin, rigid joints"
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"
 TORQUE, SPEED = -572.0, 525.0
+Simulated = Answer[SimulationResult]
 OTHERS = ((TORQUE, SPEED / 2), (TORQUE / 2, SPEED), (TORQUE / 4, SPEED))
 """Torques on the carrier and input speeds at which the prototype is asked again [N·m, rpm]."""
 
@@ -47,12 +47,12 @@ def readings() -> dict[str, Reducer]:
     }
 
 
-def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> SimulationAnswer:
+def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> Simulated:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
     asked = SimulationRequest(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
     with shown_progress("ms") as progress:
-        return simulate(replace(prepare_simulation(asked), reducer=reducer), progress)
+        return simulated(replace(prepare_simulation(asked), reducer=reducer), progress)
 
 
 def missing() -> str:
@@ -64,7 +64,7 @@ def missing() -> str:
     return ""
 
 
-def difference_section(results: list[SimulationAnswer]) -> Section:
+def difference_section(results: list[SimulationResult]) -> Section:
     """Return how the prototype departs from the static model under other loads and speeds."""
     table = pd.DataFrame(
         {
@@ -88,7 +88,7 @@ def difference_section(results: list[SimulationAnswer]) -> Section:
     )
 
 
-def answer(found: dict[str, dict[str, SimulationAnswer]], lacking: str) -> tuple[str, ...]:
+def answer(found: dict[str, dict[str, SimulationResult]], lacking: str) -> tuple[str, ...]:
     """Return what the engines agree on and what they do not."""
     models = {name: by_engine[MODEL] for name, by_engine in found.items()}
     first = models[STEEL]
@@ -121,21 +121,22 @@ def build(quick: bool) -> Document:
     engines = (MODEL, "newmark") if lacking else (MODEL, "newmark", PROTOTYPE)
     for each in engines:  # compiled functions load at first use, which is no computing time
         run(readings()[STEEL], each, quick=True)
-    found = {name: {each: run(reducer, each, quick) for each in engines} for name, reducer in readings().items()}
+    told = {name: {each: run(reducer, each, quick) for each in engines} for name, reducer in readings().items()}
+    found = {name: {each: own.result for each, own in by_engine.items()} for name, by_engine in told.items()}
     rows = [
         {"pin contact": name, **row}
         for name, by_engine in found.items()
-        for row in (by_engine[MODEL].rest_row, *(each.steady_row for each in by_engine.values()))
+        for row in (rest_row(by_engine[MODEL]), *(steady_row(each) for each in by_engine.values()))
     ]
     table, shown = pd.DataFrame(rows), MODEL if lacking else PROTOTYPE
     differences: tuple[Section, ...] = ()
     if not lacking:
-        others = [run(readings()[SOFT], PROTOTYPE, quick, *other) for other in OTHERS]
+        others = [run(readings()[SOFT], PROTOTYPE, quick, *other).result for other in OTHERS]
         differences = (difference_section([found[SOFT][PROTOTYPE], *others]),)
     cautions = (
-        f"{name}, {each.engine}: {text}"
-        for name, by_engine in found.items()
-        for each in by_engine.values()
+        f"{name}, {engine}: {text}"
+        for name, by_engine in told.items()
+        for engine, each in by_engine.items()
         for text in each.warnings
     )
     return Document(
@@ -167,7 +168,7 @@ def build(quick: bool) -> Document:
         ),
         assumptions=(
             f"pin contacts: {STEEL}, or {SOFT}, in place of the reducer's own law",
-            *found[STEEL][shown].assumptions,
+            *told[STEEL][shown].assumptions,
         ),
         summary={"engines": table.astype(object).where(table.notna(), None).to_dict("records")},
     )

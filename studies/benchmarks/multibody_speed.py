@@ -26,15 +26,15 @@ from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.dynamics.motion import Damping
 from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
-from tolalloc.reducers.simulation.answer import SimulationAnswer
-from tolalloc.reducers.simulation.request import (
+from tolalloc.reducers.simulation import (
     INTEGRATORS,
     PreparedSimulation,
     SimulationRequest,
+    SimulationResult,
     prepare_simulation,
+    simulate,
     with_ideal_gears,
 )
-from tolalloc.reducers.simulation.run import simulate
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.compiled import use_threads
 
@@ -52,13 +52,13 @@ def prepared(engine: str, step: float) -> PreparedSimulation:
     return replace(asked, reducer=with_ideal_gears(asked.reducer))
 
 
-def run(engine: str, step: float) -> SimulationAnswer:
+def run(engine: str, step: float) -> SimulationResult:
     """Return what an engine says at a time step."""
     with shown_progress("ms") as shown:
         return simulate(prepared(engine, step), shown)
 
 
-def last_turn(results: SimulationAnswer) -> tuple[np.ndarray, np.ndarray]:
+def last_turn(results: SimulationResult) -> tuple[np.ndarray, np.ndarray]:
     """Return times and transmission error of the last part [s, arcsec]."""
     time = results.series.time
     last = time > 0.3

@@ -9,17 +9,16 @@ import pytest
 
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.simulation.answer import AtRest, SimulationAnswer, TimeSeries
-from tolalloc.reducers.simulation.figures import error_figure, line
-from tolalloc.reducers.simulation.sentences import range_text
+from tolalloc.reducers.simulation import AtRest, SimulationRequest, SimulationResult, TimeSeries
 from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.simulation import SimulationTeller, error_figure, line, range_text, series_table
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
 TIMES = 5001
 PASS = 525 / 60 / RATIO * 39 * 40
 
 
-def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: float = 0.0) -> SimulationAnswer:
+def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: float = 0.0) -> SimulationResult:
     """Steady throughout; the transmission error is a pin pass of 0.2″ with a little added by motion."""
     time = STEP * np.arange(TIMES)
     wave, ones = 0.1 * np.sin(2 * np.pi * PASS * time) * ARCSECOND, np.ones(TIMES)
@@ -41,12 +40,12 @@ def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: f
         output_torque=-LOAD * ones,
         pin_forces=pins,
     )
-    return SimulationAnswer(
-        header=Header(name="exact", model="RV-40E", assumptions=("steel",)),
+    return SimulationResult(
+        asked=SimulationRequest(engine="newmark"),
         reducer=load_reducer("rv40e_xi2015"),
-        engine="newmark",
         speed=SPEED,
         torque=-LOAD,
+        mass_damping=500.0,
         series=series,
         steady=slice(2501, TIMES),
         crank_turns=1,
@@ -54,6 +53,10 @@ def results(lost: float = 0.0, added: float = 0.0, spike: float = 0.0, wobble: f
         natural_frequency=4500.0,
         seconds=1.0,
     )
+
+
+def told(found: SimulationResult, unit: str = "exact") -> SimulationTeller:
+    return SimulationTeller(found, Header(name=unit, model="RV-40E", assumptions=("steel",)))
 
 
 def test_numbers_of_the_steady_part():
@@ -70,7 +73,7 @@ def test_numbers_of_the_steady_part():
 
 
 def test_the_answer_says_what_is_found_and_why():
-    said = " ".join(results(lost=0.02, added=0.05, spike=25.0).sentences)
+    said = " ".join(told(results(lost=0.02, added=0.05, spike=25.0)).sentences)
     for words in (
         "6.4815 rpm, a ratio of 81.0000",
         "98.000 % leave",
@@ -83,45 +86,47 @@ def test_the_answer_says_what_is_found_and_why():
     ):
         assert words in said
     for frequency, what in ((200.0, "near 1 times the pin pass"), (8.0, "near order 78 and order 80")):
-        assert what in " ".join(replace(results(), natural_frequency=frequency).sentences)
-    assert "of constant stiffness" in " ".join(replace(results(), natural_frequency=None).sentences)
-    assert "not motion alone" in " ".join(replace(results(), engine="exudyn").sentences)
+        assert what in " ".join(told(replace(results(), natural_frequency=frequency)).sentences)
+    assert "of constant stiffness" in " ".join(told(replace(results(), natural_frequency=None)).sentences)
+    assert "not motion alone" in " ".join(told(replace(results(), asked=SimulationRequest(engine="exudyn"))).sentences)
 
 
 def test_vibrations_of_the_step_are_not_taken_for_the_reducers():
-    assert results().warnings == ()
-    assert "Do not use the transmission error" in results(wobble=0.02).warnings[0]
+    assert told(results()).warnings == ()
+    assert results(wobble=0.02).ringing == "transmission error"
+    assert "Do not use the transmission error" in told(results(wobble=0.02)).warnings[0]
     calm = results()
     turning = replace(calm.series, output_acceleration=(-1.0) ** np.arange(TIMES))
-    assert "Do not use the output acceleration" in replace(calm, series=turning).warnings[0]
+    assert "Do not use the output acceleration" in told(replace(calm, series=turning)).warnings[0]
 
 
 @pytest.mark.parametrize("lost", [0.01, -0.01])
 def test_power_that_does_not_close_is_said(lost):
-    assert "are not steady" in results(lost=lost).warnings[0]
+    assert results(lost=lost).is_unsettled
+    assert "are not steady" in told(results(lost=lost)).warnings[0]
 
 
 def test_a_deviation_that_decays_is_said():
     calm = results()
     decaying = 5 * ARCSECOND * np.exp(-np.arange(TIMES) / 1000) * np.cos(0.02 * np.arange(TIMES))
     series = replace(calm.series, transmission_error=calm.series.transmission_error + decaying)
-    assert any("are not steady" in warning for warning in replace(calm, series=series).warnings)
+    assert replace(calm, series=series).is_unsettled
+    assert not calm.is_unsettled
 
 
 def test_a_short_stretch_is_said_for_a_unit_with_errors():
-    calm = results()
-    found = replace(calm, header=replace(calm.header, name="table4")).warnings
+    found = told(results(), "table4").warnings
     assert len(found) == 1
     assert "9.3 s" in found[0]
 
 
 def test_tables_have_every_step_and_both_sides():
     found = results()
-    series = found.series_table
+    series = series_table(found)
     assert len(series) == TIMES
     assert all("[" in name for name in series)
     assert series["transmission error [arcsec]"].abs().max() == pytest.approx(0.1, rel=1e-3)
-    steady = found.steady_table.set_index("quantity")
+    steady = told(found).steady_table.set_index("quantity")
     assert steady.loc["largest pin force [N]"].tolist() == [1000.0, 1000.0]
     assert steady.loc["ratio [-]", "at rest"] == ""
     assert (range_text(4, 4), range_text(4, 5)) == ("4", "4…5")
@@ -144,7 +149,7 @@ def test_figures_show_as_many_pin_passes_as_asked():
 
 
 def test_the_document_names_its_load_and_engine():
-    document = results().document
+    document = told(results()).document
     assert "525 rpm" in document.subtitle
     assert "-572 N·m" in document.subtitle
     assert document.summary["in motion"]["engine"] == "newmark"

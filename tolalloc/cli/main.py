@@ -24,7 +24,6 @@ from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.series import series
-from tolalloc.cli.simulate import simulate
 from tolalloc.cli.whatif import whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 
@@ -65,7 +64,7 @@ _COMMANDS = (
     diagnose,
     assemble,
     mount,
-    simulate,
+    inquiry_command("simulate"),
     schema,
     doctor,
 )

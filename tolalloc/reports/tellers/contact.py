@@ -27,6 +27,8 @@ _METHODS = ("linear method", "law at every pin")
 """Both ways in which one disc is loaded, as legends call them."""
 _ON_TERMINAL = ("quantity", "one disc, law at every pin", "all discs, bearings yielding")
 """Columns of the loaded contact that a terminal has room for; the report has all."""
+_LAWS = {"logarithmic": "law_logarithmic", "constant": "law_constant", "table2": "law_table2"}
+"""Contact law → what a sentence calls it."""
 _FROM_CRANK = "angle of the pin from the crank direction [°]"
 
 
@@ -55,7 +57,7 @@ class ContactTeller(Teller[ContactResult]):
         """Clearance, and how the pins carry with bearings that yield and with rigid ones."""
         found, single, yielding = self.result.assessment, self.result.assessment.single, self.result.yielding
         clearance, pins = found.clearance, found.single.pins_in_contact
-        law = _say(f"law_{found.reducer.stiffness.pin_contact_law}")
+        law = _say(_LAWS[found.reducer.stiffness.pin_contact_law])
         said = [
             _say(
                 "clearance",

@@ -1,1 +1,0 @@
-"""A reducer through a speed and a torque profile, beside the static model."""
