@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from tolalloc.reports.figure import Series as Series
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
+    from tolalloc.study import numeric as numeric
     from tolalloc.study.problem import Effort as Effort
     from tolalloc.study.problem import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -113,10 +114,11 @@ _WHERE = {
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "models.function_model",
     "model": ("models.function_model", "model"),
+    "numeric": ("study.numeric", ""),
     "reducer": "reducers.choice",
     "run_script": "cli.main",
 }
-"""Public name → where it stands, with its name there if that is another one."""
+"""Public name → where it stands, with its name there if that is another one, empty for a whole module."""
 
 _INQUIRIES = ("contact", "costs", "modify", "simulate", "te")
 """Questions that need no study, asked by a function of their own name and by the command of the same."""
@@ -137,7 +139,8 @@ def __getattr__(name: str) -> Any:
     if place is None:
         raise AttributeError(f"module 'tolalloc' has no attribute {name!r}")
     module, own = place if isinstance(place, tuple) else (place, name)
-    return getattr(import_module(f"tolalloc.{module}"), own)
+    found = import_module(f"tolalloc.{module}")
+    return getattr(found, own) if own else found
 
 
 def __dir__() -> list[str]:

@@ -139,4 +139,6 @@ def test_every_sentence_has_a_teller_and_every_teller_its_sentences():
         known = set(tomllib.loads(path.read_text(encoding="utf-8")))
         sure, possible = (set().union(*(keys[at] for keys in said[name])) for at in (0, 1))
         assert sure <= known, f"{path.name} has no {sorted(sure - known)}"
-        assert known <= possible, f"nobody says {sorted(known - possible)} of {path.name}"
+        begun = tuple(text for text in possible if text.endswith("_"))  # such as that of f"law_{law}"
+        unsaid = [key for key in known - possible if not key.startswith(begun)]
+        assert not unsaid, f"nobody says {sorted(unsaid)} of {path.name}"

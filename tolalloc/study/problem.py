@@ -77,7 +77,7 @@ class Limit(NamedFields):
 
 @dataclass(frozen=True, kw_only=True)
 class Effort(NamedFields):
-    """How much a study may compute: full unless numbers are given.
+    """How much a study may compute.
 
     Parameters
     ----------
