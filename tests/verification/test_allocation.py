@@ -14,9 +14,9 @@ from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal
 from tolalloc.allocation.front.pareto_front import exact_front
 from tolalloc.allocation.search.zone_allocation import Programs, aimed, allocate, kept_stacks, scale_in_proportion
-from tolalloc.allocation.space.constraint import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.output_sample import OutputSample
+from tolalloc.allocation.space.problem import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.space.requirement import AtCpk, AtYield, Requirement, WorstCase
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits

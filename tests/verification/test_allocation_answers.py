@@ -7,12 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import tolalloc.allocation.front.robustness as module
+import tolalloc.allocation.front.what_if as module
 from tests.builders import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.model import Reciprocal, SumOfCosts, Weighted
-from tolalloc.allocation.front.robustness import COST_CHANGE, Robustness, Variant, robustness
-from tolalloc.allocation.front.trade import QuantileResponse, SettingTrade, cost_at_yield, setting_trade
+from tolalloc.allocation.front.what_if import (
+    COST_CHANGE,
+    QuantileResponse,
+    Robustness,
+    SettingTrade,
+    Variant,
+    cost_at_yield,
+    robustness,
+    setting_trade,
+)
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.zone_allocation import allocate
 from tolalloc.allocation.space.effort import SearchEffort

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from tolalloc.allocation.cost.fit import best_fit, fits
 from tolalloc.allocation.cost.model import (
     Combined,
     CostModel,
@@ -18,7 +17,7 @@ from tolalloc.allocation.cost.model import (
     SumOfCosts,
     reciprocal_squared,
 )
-from tolalloc.allocation.cost.points import OUTER_ERROR, Points, Spline, Tabulated
+from tolalloc.allocation.cost.points import OUTER_ERROR, Points, Spline, Tabulated, best_fit, fits
 from tolalloc.exceptions import InputError
 
 ZONES = np.geomspace(2.0, 30.0, 10)

@@ -14,10 +14,9 @@ from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.genetic import nondominated
 from tolalloc.allocation.front.pareto_front import pareto_front
 from tolalloc.allocation.front.pareto_problem import DesignProblem
-from tolalloc.allocation.front.trade import QuantileResponse
-from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.front.what_if import QuantileResponse
 from tolalloc.allocation.space.effort import FrontEffort
-from tolalloc.allocation.space.problem import Stack
+from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.reducers.settings import RADIAL

@@ -14,8 +14,14 @@ from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
-from tolalloc.allocation.front.robustness import Robustness, robustness
-from tolalloc.allocation.front.trade import QuantileResponse, SettingTrade, cost_at_yield, setting_trade
+from tolalloc.allocation.front.what_if import (
+    QuantileResponse,
+    Robustness,
+    SettingTrade,
+    cost_at_yield,
+    robustness,
+    setting_trade,
+)
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import (
     GradedAllocation,

@@ -17,8 +17,7 @@ from tolalloc.allocation.answer.sentences import assumptions, sentences, warning
 from tolalloc.allocation.answer.tables import requirements_table
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
 from tolalloc.allocation.front.pareto_front import Fronts
-from tolalloc.allocation.front.robustness import Robustness
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation

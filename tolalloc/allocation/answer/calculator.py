@@ -22,7 +22,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.answer.cost_formulas import cost_formula, number
 from tolalloc.allocation.answer.dimensions import dimensions
 from tolalloc.allocation.answer.sentences import amounts_convention, drawn_amounts
-from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.currency import in_currency
 from tolalloc.reports.excel import Formula, keep_values

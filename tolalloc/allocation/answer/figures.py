@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.answer import tables
 from tolalloc.allocation.front.pareto_front import Fronts
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import SettingTrade
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.figure import Figure, HeatMap, Series

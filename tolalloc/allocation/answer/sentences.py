@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolalloc.allocation.answer.tables import limit_price
-from tolalloc.allocation.front.robustness import COST_CHANGE, SAME
+from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.feature_frame import callout_assumptions

@@ -9,8 +9,7 @@ import pandas as pd
 
 from tolalloc.allocation.search.candidates import ALONE, GRADES
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
-from tolalloc.allocation.space.constraint import OneSidedConstraint
-from tolalloc.allocation.space.problem import Solution
+from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.cost.unit_price import YieldLadder
-from tolalloc.allocation.front.robustness import Robustness
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.wording import quantity
 

@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from tolalloc.allocation.cost.fit import best_fit
 from tolalloc.allocation.cost.model import (
     ClosedForm,
     Combined,
@@ -21,7 +20,7 @@ from tolalloc.allocation.cost.model import (
     ReciprocalPower,
     reciprocal_squared,
 )
-from tolalloc.allocation.cost.points import Points, ShopPoints, Spline, Tabulated, load_shop_points, points_of
+from tolalloc.allocation.cost.points import Points, ShopPoints, Spline, Tabulated, best_fit, load_shop_points, points_of
 from tolalloc.drawings.drawing import Costs
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
 from tolalloc.drawings.sources import Source, known_as, meant

@@ -21,10 +21,9 @@ from tolalloc.allocation.front.pareto_problem import (
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import front
 from tolalloc.allocation.search.zone_allocation import Programs
-from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import FrontEffort
-from tolalloc.allocation.space.problem import Solution, Stack
+from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError

@@ -10,8 +10,8 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.model import Response
 

@@ -9,10 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.space.constraint import OneSidedConstraint, QuantileBound, root_sum_square_stack
 from tolalloc.allocation.space.output_sample import LimitedSample
-from tolalloc.allocation.space.problem import Solution, Stack
-from tolalloc.allocation.space.requirement import Check, RootSumSquare, Sampled
+from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack, root_sum_square_stack
+from tolalloc.allocation.space.requirement import Check, QuantileBound, RootSumSquare, Sampled
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.monte_carlo import CONFIDENCE
 from tolalloc.capability.near_limit import SolvedUnits

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.constraint import OneSidedConstraint, QuantileBound
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.requirement import AtYield, Check, Sampled
+from tolalloc.allocation.space.problem import OneSidedConstraint
+from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Sampled
 from tolalloc.allocation.verify.independent_sample import IndependentSample, Screen, SolvedPart, UnitSolver
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE

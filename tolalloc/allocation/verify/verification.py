@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.output_sample import DesignSample
+from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import Check, Requirement
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolalloc.allocation.cost.fit import CostFit, ShopFit
 from tolalloc.allocation.cost.model import ClosedForm
+from tolalloc.allocation.cost.points import CostFit, ShopFit
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from tolalloc.allocation.cost.fit import ShopFit, shop_fits
-from tolalloc.allocation.cost.points import currency_of_prices, load_shop_points
+from tolalloc.allocation.cost.points import ShopFit, currency_of_prices, load_shop_points, shop_fits
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
