@@ -45,7 +45,7 @@ def test_they_are_read_and_written_back(tmp_path):
 
 def test_they_stand_beside_the_source_in_every_answer_and_in_the_next_table(tmp_path):
     asked = study(ta.drawing(written(tmp_path)))
-    ranking = asked.rank().ranking.set_index("source")
+    ranking = asked.rank().to_frame().set_index("source")
     assert ranking.loc["a", "own id"] == "4711-12"
     allocation = asked.allocate()
     assert allocation.drawing_table.set_index("source").loc["b", "own id"] == "4711-13"

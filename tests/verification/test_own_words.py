@@ -38,7 +38,7 @@ def answers():
 
 def test_label_and_drawing_stand_beside_the_id(answers):
     ranking, allocation = answers
-    for frame in (ranking.ranking, allocation.drawing_table):
+    for frame in (ranking.to_frame(), allocation.drawing_table):
         found = frame.set_index("source")
         at = list(frame.columns).index("source")
         assert list(frame.columns[at : at + 3]) == ["source", "drawing", "label"]
@@ -68,4 +68,4 @@ def test_a_number_of_a_drawing_stays_a_text(tmp_path):
 
 def test_a_table_without_them_has_no_empty_columns():
     bare = [{name: value for name, value in row.items() if name not in ("label", "drawing")} for row in ROWS]
-    assert not {"label", "drawing"} & {*study(bare).rank(effort="quick").ranking.columns}
+    assert not {"label", "drawing"} & {*study(bare).rank(effort="quick").to_frame().columns}

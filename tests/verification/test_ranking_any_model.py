@@ -17,9 +17,10 @@ from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.progress import RunRecord
-from tolalloc.sensitivity.answer import RankingAnswer, rank
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
-from tolalloc.sensitivity.measures import Measures
+from tolalloc.sensitivity.measures import Measures, rank
+from tolalloc.sensitivity.result import RankingResult
+from tolalloc.study.answer import Answer
 
 GAP, PLAY = "gap [mm]", "play [deg]"
 EFFORT = RankingEffort(
@@ -92,8 +93,8 @@ class Silent:
         pass
 
 
-def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
-    record, header = RunRecord(Silent(), portrait_of(model).outcomes), Header(name="links", model="", seed=1)
+def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> Answer[RankingResult]:
+    record = RunRecord(Silent(), portrait_of(model).outcomes)
     asked = Measures(
         model=model,
         errors=ERRORS,
@@ -103,11 +104,13 @@ def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> RankingAnswer:
         seeds=SeedTree(1),
         largest_failed_share=0.01,
     )
-    return rank(asked, record, header)
+    result = rank(asked, record)
+    header = Header(name="links", model=model.name, seed=1, statuses=record.counts, stages=record.stages)
+    return Answer(kind="ranking", header=header, result=result)
 
 
 @pytest.fixture(scope="module")
-def answer() -> RankingAnswer:
+def answer() -> Answer[RankingResult]:
     return ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)})
 
 
@@ -127,47 +130,50 @@ def test_the_answer_speaks_of_the_outputs_by_name_and_unit(answer):
 
 
 def test_the_ranking_is_that_of_the_closed_form(answer):
-    assert answer.indices.sources == ("a", "b")
-    np.testing.assert_allclose(answer.indices.total, [0.9, 0.1], atol=0.05)
-    np.testing.assert_allclose(answer.local.at_nominal, [3e-3, -1e-3], rtol=1e-6)
-    assert answer.choice.chosen is not None
+    assert answer.result.indices.sources == ("a", "b")
+    np.testing.assert_allclose(answer.result.indices.total, [0.9, 0.1], atol=0.05)
+    np.testing.assert_allclose(answer.result.local.at_nominal, [3e-3, -1e-3], rtol=1e-6)
+    assert answer.result.choice.chosen is not None
     assert [frame["requirement"] for frame in answer.summary["requirements"]] == ["gap", "play"]
 
 
 @pytest.mark.slow
 def test_a_lower_limit_is_an_upper_one_of_the_output_with_its_sign_turned(answer):
     turned = ranked({PLAY: Limits(lower=1.95)})
-    yields = turned.sample.evaluation.values[:, 0] >= 1.95
-    assert turned.outputs == (PLAY, GAP)
-    assert turned.beyond.interval.estimate == pytest.approx(yields.mean())
-    assert turned.limit_spoken == "the lower limit of 1.95°"
+    yields = turned.result.sample.evaluation.values[:, 0] >= 1.95
+    assert turned.result.outputs == (PLAY, GAP)
+    assert turned.result.beyond.interval.estimate == pytest.approx(yields.mean())
+    assert any("Beyond the lower limit of 1.95°" in sentence for sentence in turned.sentences)
     assert turned.summary["lower limit [deg]"] == 1.95
     # Only b moves it, and its 95 % quantile is 1.945: its zone alone may close to 0.91 of itself.
-    assert (np.isnan(turned.inverse.factor[0]), np.isinf(turned.inverse.factor[0])) in ((True, False), (False, True))
-    assert turned.inverse.low[1] <= 0.05 / 0.0548 <= turned.inverse.high[1]
+    assert (np.isnan(turned.result.inverse.factor[0]), np.isinf(turned.result.inverse.factor[0])) in (
+        (True, False),
+        (False, True),
+    )
+    assert turned.result.inverse.low[1] <= 0.05 / 0.0548 <= turned.result.inverse.high[1]
 
 
 @pytest.mark.slow
 def test_two_limits_count_the_units_beyond_either():
     both = ranked({GAP: Limits(lower=0.98, upper=1.02)})
-    values = both.sample.evaluation.values[:, 0]
+    values = both.result.sample.evaluation.values[:, 0]
     inside = (values >= 0.98) & (values <= 1.02)
-    assert both.beyond.interval.estimate == pytest.approx(inside.mean())
+    assert both.result.beyond.interval.estimate == pytest.approx(inside.mean())
     assert any("inside the limits" in sentence or "beyond the limits" in sentence for sentence in both.sentences)
 
 
 @pytest.mark.slow
 def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
     found = ranked({GAP: Limits(upper=1.02), PLAY: Limits(lower=1.9)}, Chain(deviation=0.01))
-    assert found.indices.sources == ("a", "b", "scale")
-    at = found.sobol.sources.index("scale")
-    assert (found.sobol.indices.total[:, at] > 0.01).all()
-    share, variance = found.indices.total[at], found.sobol.indices.variance[0]
+    assert found.result.indices.sources == ("a", "b", "scale")
+    at = found.result.sobol.sources.index("scale")
+    assert (found.result.sobol.indices.total[:, at] > 0.01).all()
+    share, variance = found.result.indices.total[at], found.result.sobol.indices.variance[0]
     assert share == pytest.approx(0.01**2 / variance, rel=0.15)
     effect = found.summary["not known of the model"]
     assert effect["sigma of a unit [mm]"] == pytest.approx(0.01, rel=0.01)
     assert effect["total index ST [-]"] == pytest.approx(share)
-    assert found.effect.first_order.root_mean_square < 1e-12
-    assert found.local.sources == ("a", "b")
+    assert found.result.effect.first_order.root_mean_square < 1e-12
+    assert found.result.local.sources == ("a", "b")
     assert any(sentence.startswith("Not knowing scale") for sentence in found.sentences)
     assert ranked({GAP: Limits(upper=1.02)}).summary.keys().isdisjoint({"not known of the model"})

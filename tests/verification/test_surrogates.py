@@ -16,6 +16,8 @@ from tolalloc.models.model import Evaluation, Response
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
+from tolalloc.reports.tellers.ranking import chosen_surrogate
+from tolalloc.reports.tellers.ranking_tables import quantile_name, shortfalls, surrogate_table
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     fit_quadratic_form,
@@ -30,7 +32,6 @@ from tolalloc.sensitivity.surrogate.validation import (
     answers_of,
     choose,
     cross_validate,
-    shortfalls,
 )
 
 COLUMNS = ("a", "b", "c")
@@ -156,8 +157,8 @@ def test_the_quantile_compared_is_the_one_asked_for_and_is_named():
     assert found[0.9].quantile_error != found[0.9973].quantile_error
     choice = choose(Exact(noise=1.0), (Fixed(Exact()),), x, SeedTree(1), quantile=0.9)
     assert choice.scores[0].quantile == found[0.9].quantile
-    assert choice.table["error of the 90 % quantile [arcsec]"] == [found[0.9].quantile_error]
-    assert replace(choice.scores[0], target=0.99995).quantile_name == "99.995 % quantile"
+    assert surrogate_table(choice)["error of the 90 % quantile [arcsec]"].tolist() == [found[0.9].quantile_error]
+    assert quantile_name(replace(choice.scores[0], target=0.99995)) == "99.995 % quantile"
     off = replace(GOOD, quantile_error=3.0)
     assert shortfalls(off) == ("its 99.73 % quantile is off by 6.0%, more than 2.0%",)
     with pytest.raises(InputError, match="quantile"):
@@ -189,8 +190,8 @@ def test_the_best_of_those_that_pass_is_fitted_to_all_answers():
     assert choice.scores[choice.best].name == "best"
     assert choice.chosen is best.response
     assert best.shown[-1].shape[0] == 200
-    assert "best: Q² = 1.000 on 200 answers" in choice.reason
-    assert "its 99.73 % quantile off by 0.0%" in choice.reason
+    assert "best: Q² = 1.000 on 200 answers" in chosen_surrogate(choice)
+    assert "its 99.73 % quantile off by 0.0%" in chosen_surrogate(choice)
 
 
 def test_once_little_is_left_to_gain_no_other_candidate_is_tried():
@@ -198,7 +199,7 @@ def test_once_little_is_left_to_gain_no_other_candidate_is_tried():
     choice = choose(Exact(), (good, other, regression()), samples(200), SeedTree(0))
     assert [score.name for score in choice.scores] == ["good"] and choice.scores[0].q2 >= ENOUGH_Q2
     assert choice.untried == ("other", "regression") and not other.shown
-    assert choice.reason.endswith("Not tried, as no more can be gained: other, regression.")
+    assert chosen_surrogate(choice).endswith("Not tried, as no more can be gained: other, regression.")
 
 
 def test_a_candidate_that_may_not_be_used_does_not_end_the_search():
@@ -210,7 +211,7 @@ def test_a_candidate_that_may_not_be_used_does_not_end_the_search():
 
 def test_below_the_gate_nothing_stands_in():
     poor = choose(Exact(noise=3.0), (regression(),), samples(200), SeedTree(0))
-    assert poor.chosen is None and "Q² = " in poor.reason and "is below 0.95" in poor.reason
+    assert poor.chosen is None and "Q² = " in chosen_surrogate(poor) and "is below 0.95" in chosen_surrogate(poor)
 
 
 @pytest.mark.parametrize(
@@ -268,9 +269,9 @@ def test_folds_and_candidates_must_exist():
 
 def test_the_table_has_a_row_per_candidate_and_a_unit_per_number():
     choice = choose(Exact(), (Fixed(Exact(noise=1.0)), regression()), samples(60), SeedTree(1))
-    assert choice.table["candidate"] == ["fixed", "regression"]
-    assert choice.table["rms error [arcsec]"] == [score.rms_error for score in choice.scores]
-    for header, column in choice.table.items():
+    assert surrogate_table(choice)["candidate"].tolist() == ["fixed", "regression"]
+    assert surrogate_table(choice)["rms error [arcsec]"].tolist() == [score.rms_error for score in choice.scores]
+    for header, column in surrogate_table(choice).items():
         assert len(column) == 2
         assert isinstance(column[0], str) or header.endswith("]")
 

@@ -14,12 +14,16 @@ from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.differences import derived
-from tolalloc.models.model import Model, Response, ResponseWithDerivatives
+from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives
+from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.progress import RunRecord
+from tolalloc.sensitivity.derivatives import classical_estimate, derivative_measures, local_derivatives
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
-from tolalloc.sensitivity.screening import MomentIndependent, moment_independent
+from tolalloc.sensitivity.result import RankingResult
+from tolalloc.sensitivity.screening import MomentIndependent, elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, sobol_indices
+from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, sobol_indices
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     quadratic_regression,
@@ -198,4 +202,74 @@ def _first(sample: MonteCarlo, units: int) -> MonteCarlo:
     return MonteCarlo(
         x=sample.x[:units],
         evaluation=replace(evaluation, values=evaluation.values[:units], status=evaluation.status[:units]),
+    )
+
+
+def rank(asked: Measures, record: RunRecord) -> RankingResult:
+    """Return what drives the outputs of a model at the zones of its drawing.
+
+    Parameters
+    ----------
+    asked
+        What may be measured.
+    record
+        Keeps statuses and times.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is not allowed.
+    SolveError
+        Too many units failed.
+    """
+    measures, model, effort = replace(asked, model=asked.model.observed(record.observe)), asked.model, asked.effort
+    leading, spectra, own = measures.leading, model.spectra, measures.experiment
+    with one_blas_thread():
+        with record.stage("random units"):
+            sample = measures.sample()
+        with record.stage("Sobol indices"):
+            effect = measures.uncertain(sample)
+            sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
+            dimensions = measures.dimensions(sobol.convergence.history[-1].blocks)
+        with record.stage("Sobol, second seed"):
+            again = measures.second_seed(sobol.convergence.history[-1].blocks)
+        with record.stage("other measures"):
+            derived = measures.derived(sample)
+            shapley = measures.shapley()
+            local = local_derivatives(own("local", derived), effort.derivative_units)
+            derivatives = derivative_measures(own("derivatives", derived), effort.derivative_units)
+            effects = elementary_effects(own("effects", measures.response), effort.trajectories)
+            moments = measures.moments(sample)
+            classical = classical_estimate(own("classical", measures.response))
+        with record.stage("units out of the limit"):
+            reject, beyond = measures.reject(sample), measures.beyond(sample)
+        with record.stage("surrogates"):
+            choice = measures.choice(sample)
+        with record.stage("zones alone"):
+            inverse = measures.inverse(choice)
+            if isinstance(choice.chosen, KeepsTables):
+                choice.chosen.put_away()
+    return RankingResult(
+        model=model,
+        errors=asked.errors,
+        limits=asked.limits,
+        target=asked.target,
+        outputs=measures.outputs,
+        sample=sample,
+        design=effort.design,
+        sobol=sobol,
+        dimensions=dimensions,
+        replication=sobol.of(leading).replicated_by(again),
+        orders=order_contribution(sobol, spectra) if spectra else None,
+        effect=effect,
+        shapley=shapley,
+        classical=classical,
+        local=local,
+        derivatives=derivatives,
+        effects=effects,
+        moments=moments,
+        reject=reject,
+        inverse=inverse,
+        beyond=beyond,
+        choice=choice,
     )

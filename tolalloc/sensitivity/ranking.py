@@ -214,17 +214,6 @@ class Convergence:
         """Whether the last step reached the probability asked for."""
         return self.history[-1].probability >= self.probability
 
-    @property
-    def status(self) -> str:
-        """One sentence for a person."""
-        last = self.history[-1]
-        verdict = "is stable" if self.stable else "is not stable at the largest number of blocks allowed"
-        return (
-            f"The order of the first {len(last.first)} over the outputs with a limit, sources of one group taken "
-            f"alike, {verdict}: {last.probability:.0%} of the resamples of {last.blocks} blocks have it, asked for are "
-            f"{self.probability:.0%}."
-        )
-
 
 def until_converged(
     resampled: Callable[[int], Resampled],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -47,18 +46,6 @@ class UncertainEffect:
     sigma: float  # Standard deviation of one unit's output from the sources alone, root-mean-square over units [output]
     sigma_of_mean: float  # Standard deviation of the mean over all units, which the sources shift together [output]
     first_order: FirstOrderError  # First order against model
-
-    def summary(self, total: float, unit: str) -> dict[str, Any]:
-        """Return the effect for a program, with its total index in the ranking and the unit of the output."""
-        return {
-            "source": " + ".join(source.name for source in self.sources),
-            "total index ST [-]": total,
-            f"sigma of a unit [{unit}]": self.sigma,
-            f"sigma of the mean [{unit}]": self.sigma_of_mean,
-            f"first-order error at 2 sigma, rms [{unit}]": self.first_order.root_mean_square,
-            f"first-order error at 2 sigma, largest [{unit}]": self.first_order.largest,
-            f"effect at 2 sigma, rms [{unit}]": self.first_order.effect,
-        }
 
 
 def uncertain_effect(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tolalloc.allocation.cost.process_costs import currency_of_costs, load_process_costs, priced
@@ -17,6 +17,7 @@ from tolalloc.models.model import Model
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
+from tolalloc.running.progress import RunRecord
 from tolalloc.study.problem import Limit, Problem
 
 
@@ -169,3 +170,9 @@ class Prepared:
                 *(self.study.drawing.notes if self.study.drawing else ()),
             ),
         )
+
+    def header_after(self, record: RunRecord) -> Header:
+        """Return the header with what a run has counted: how its units ended, and what each stage took."""
+        header = self.header
+        assumptions = tuple(dict.fromkeys(header.assumptions))
+        return replace(header, assumptions=assumptions, statuses=record.counts, stages=record.stages)

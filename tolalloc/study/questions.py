@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tolalloc.reports.answer import Answer as Told
     from tolalloc.reports.document import Document
     from tolalloc.running.progress import RunRecord
+    from tolalloc.sensitivity.result import RankingResult
 
 _ZONES = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
 
@@ -65,10 +66,9 @@ class Ranking(Question):
 
     kind: ClassVar[str] = "ranking"
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[RankingResult]:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
-        from tolalloc.sensitivity.answer import rank
-        from tolalloc.sensitivity.measures import Measures
+        from tolalloc.sensitivity.measures import Measures, rank
 
         study = prepared.study
         asked = Measures(
@@ -80,7 +80,8 @@ class Ranking(Question):
             seeds=SeedTree(study.seed).child("rank"),
             largest_failed_share=study.largest_failed_share,
         )
-        return rank(asked, record, prepared.header)
+        result = rank(asked, record)
+        return Answer(kind=self.kind, header=prepared.header_after(record), result=result)
 
 
 @dataclass(frozen=True, kw_only=True)

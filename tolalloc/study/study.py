@@ -23,7 +23,7 @@ from tolalloc.study.questions import Allocation, Calculation, Question, Ranking,
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer
     from tolalloc.reports.answer import Answer as Told
-    from tolalloc.sensitivity.answer import RankingAnswer
+    from tolalloc.sensitivity.result import RankingResult
 
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
 
@@ -174,9 +174,9 @@ class Study(Problem):
 
     def rank(
         self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
-    ) -> RankingAnswer:
+    ) -> Answer[RankingResult]:
         """Return which error drives which output."""
-        return cast("RankingAnswer", self.ask("ranking", effort, progress))
+        return cast("Answer[RankingResult]", self.ask("ranking", effort, progress))
 
     def allocate(
         self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None

@@ -15,8 +15,8 @@ from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.document import Section
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.ranking_tables import sobol_table
 from tolalloc.reports.wording import quantity, short, with_unit
-from tolalloc.sensitivity.driver_tables import sobol_table
 
 if TYPE_CHECKING:
     from tolalloc.allocation.answer.answer import AllocationAnswer

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -19,6 +19,14 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
+LARGEST_QUANTILE_ERROR = 0.02
+"""Largest error of the quantile over the quantile with which a surrogate is used [-]."""
+ENOUGH_Q2 = 0.99
+"""Q² of a surrogate that may be used above which no other is tried: what is left to gain is not worth its fit [-]."""
+LARGEST_FAILED_SHARE = 0.01
+"""Largest share of failed predictions with which a surrogate is used [-]."""
+Shortfall = Literal["q2", "quantile", "failed"]
+"""What keeps a candidate from being used."""
 FOLDS = 5
 FEWEST_OF_FOLD = 2
 """Samples of a fold, without which its error has no scatter [-]."""
@@ -79,9 +87,19 @@ class Score:
         return self.quantile_error / self.quantile
 
     @property
-    def quantile_name(self) -> str:
-        """Which quantile is compared."""
-        return f"{100 * self.target:.6g} % quantile"
+    def failed_share(self) -> float:
+        """Failed predictions over all [-]."""
+        return self.failed / self.held_out
+
+    @property
+    def shortfalls(self) -> tuple[Shortfall, ...]:
+        """What keeps the candidate from being used; nothing if it has earned its place."""
+        passed: dict[Shortfall, bool] = {
+            "q2": self.q2 >= NEEDED_Q2,
+            "quantile": abs(self.quantile_share) <= LARGEST_QUANTILE_ERROR,
+            "failed": self.failed_share <= LARGEST_FAILED_SHARE,
+        }
+        return tuple(name for name, enough in passed.items() if not enough)
 
 
 def answers_of(
@@ -196,31 +214,6 @@ def _seconds(response: Response, x: Float[np.ndarray, "sample column"]) -> float
     return float((perf_counter() - start) / x.shape[0])
 
 
-LARGEST_QUANTILE_ERROR = 0.02
-"""Largest error of the quantile over the quantile with which a surrogate is used [-]."""
-ENOUGH_Q2 = 0.99
-"""Q² of a surrogate that may be used above which no other is tried: what is left to gain is not worth its fit [-]."""
-LARGEST_FAILED_SHARE = 0.01
-"""Largest share of failed predictions with which a surrogate is used [-]."""
-
-
-def shortfalls(score: Score) -> tuple[str, ...]:
-    """Return what a candidate fails in, one phrase each; nothing if it has earned its place."""
-    quantile_error, failed = abs(score.quantile_share), score.failed / score.held_out
-    checks = (
-        (score.q2 >= NEEDED_Q2, f"Q² = {score.q2:.3f} is below {NEEDED_Q2:g}"),
-        (
-            quantile_error <= LARGEST_QUANTILE_ERROR,
-            f"its {score.quantile_name} is off by {quantile_error:.1%}, more than {LARGEST_QUANTILE_ERROR:.1%}",
-        ),
-        (
-            failed <= LARGEST_FAILED_SHARE,
-            f"{failed:.1%} of its predictions fail, more than {LARGEST_FAILED_SHARE:.1%}",
-        ),
-    )
-    return tuple(phrase for passed, phrase in checks if not passed)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """Candidates, what they are worth, and the one that was chosen."""
@@ -231,36 +224,6 @@ class Choice:
     failed: int  # Answers to learn from that failed and were left out [-]
     best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
     chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
-
-    @property
-    def reason(self) -> str:
-        """Sentence that says why."""
-        score = self.scores[self.best]
-        if self.chosen is None:
-            return f"No surrogate is used; the best, {score.name}, does not pass: {'; '.join(shortfalls(score))}."
-        untried = f" Not tried, as no more can be gained: {', '.join(self.untried)}." if self.untried else ""
-        return (
-            f"The surrogate is {score.name}: Q² = {score.q2:.3f} on {score.held_out} answers that it had not seen, its "
-            f"{score.quantile_name} off by {abs(score.quantile_share):.1%}.{untried}"
-        )
-
-    @property
-    def table(self) -> dict[str, list[str] | list[float] | list[int]]:
-        """Columns of a table with one row per candidate, by headers that state the unit."""
-        unit, quantile = self.output[self.output.rindex("[") :], self.scores[self.best].quantile_name
-        return {
-            "candidate": [score.name for score in self.scores],
-            "Q² [-]": [score.q2 for score in self.scores],
-            f"rms error {unit}": [score.rms_error for score in self.scores],
-            f"error of the {quantile} {unit}": [score.quantile_error for score in self.scores],
-            f"error of the {quantile} [%]": [score.quantile_share * 100 for score in self.scores],
-            "predictions per second [1/s]": [score.per_second for score in self.scores],
-            "speed over the response [-]": [score.speed for score in self.scores],
-            "trained on [-]": [score.trained for score in self.scores],
-            "held out [-]": [score.held_out for score in self.scores],
-            "failed [-]": [score.failed for score in self.scores],
-            "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in self.scores],
-        }
 
 
 def choose(
@@ -309,9 +272,9 @@ def choose(
     scores = list[Score]()
     for candidate in candidates:
         scores.append(cross_validate(candidate, answers, quantile))
-        if scores[-1].q2 >= ENOUGH_Q2 and not shortfalls(scores[-1]):
+        if scores[-1].q2 >= ENOUGH_Q2 and not scores[-1].shortfalls:
             break
-    passed = [at for at, score in enumerate(scores) if not shortfalls(score)]
+    passed = [at for at, score in enumerate(scores) if not score.shortfalls]
     best = max(passed or range(len(scores)), key=lambda at: scores[at].q2)
     return Choice(
         output=response.outputs[0],

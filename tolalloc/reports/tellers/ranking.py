@@ -1,0 +1,609 @@
+"""What drives a model's outputs, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.drawings.tolerance_table import table_frame
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.portrait import Portrait, portrait_of
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.tellers import ranking_tables as tables
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import QUICK_RUN, quantity, sign_of
+from tolalloc.sensitivity.ranking import Convergence
+from tolalloc.sensitivity.result import RankingResult
+from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.surrogate.validation import Choice
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_RARE = 1000.0
+"""Units of a million from which a share is said in percent [-]."""
+_SLIGHT = 0.05
+"""Share of a wave's variance below which a second source is not named for it [-]."""
+_MOSTLY = 0.5
+"""Share of a wave's variance from single sources above which they are named for it [-]."""
+_NAMED = 3
+"""Sources that the answer names [-]."""
+_SHOWN = 24
+"""Rows of a picture; the table has all [-]."""
+_LINE = 14
+"""Letters of a line in the head of a heat map [-]."""
+_say = Sentences("ranking")
+
+
+class RankingTeller(Teller[RankingResult]):
+    """What is said of a ranking."""
+
+    shown: ClassVar[tuple[str, ...]] = (
+        *("source", "contribution [%]", "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"),
+    )
+
+    @property
+    def title(self) -> str:
+        """Which model, in which study."""
+        return _say("title", model=self.header.model, study=self.header.name)
+
+    @property
+    def subtitle(self) -> str:
+        """Sources, conditions and seed."""
+        conditions = (super().subtitle,) if self.header.conditions else ()
+        count = _say("subtitle_sources", count=len(self.result.errors.active))
+        return ", ".join((count, *conditions, _say("subtitle_seed", seed=self.header.seed)))
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """Who drives the leading output, each order and the units out of the limits."""
+        found = self.result
+        return (
+            *_drivers(found.dimensions or found.indices),
+            _converged(found.sobol.convergence),
+            *self._replicated(),
+            *self._orders(),
+            *self._uncertain(),
+            self._rejects(),
+            self._beyond(),
+            self._opening(),
+            chosen_surrogate(found.choice),
+            *self._portrait.remarks,
+        )
+
+    @cached_property
+    def _portrait(self) -> Portrait[Any]:
+        """Words and pictures of the model."""
+        return portrait_of(self.result.model)
+
+    @property
+    def _output(self) -> str:
+        """What a sentence calls the leading output."""
+        return self._portrait.spoken(self.result.leading)
+
+    @property
+    def _unit(self) -> str:
+        """Unit of the leading output."""
+        return unit_of(self.result.leading)
+
+    @property
+    def _sign(self) -> str:
+        """What follows a number of the leading output."""
+        return sign_of(self._unit)
+
+    @property
+    def _wave_unit(self) -> str:
+        """Unit of the waves of the model's spectra."""
+        return unit_of(next(iter(self.result.model.spectra.values()))[0])
+
+    @property
+    def _limits(self) -> str:
+        """What a sentence calls the limits of the leading output."""
+        limits = self.result.limits[self.result.leading]
+        if limits.lower is None:
+            return _say("limit_upper", limit=limits.upper, sign=self._sign)
+        if limits.upper is None:
+            return _say("limit_lower", limit=limits.lower, sign=self._sign)
+        return _say("limit_both", lower=limits.lower, upper=limits.upper, sign=self._sign)
+
+    @property
+    def _the_limits(self) -> str:
+        """What a sentence calls the limits as a thing."""
+        limits = self.result.limits[self.result.leading]
+        if limits.lower is None:
+            return _say("the_limit", limit=self._limits)
+        return self._limits if limits.upper is None else _say("the_limits", limit=self._limits)
+
+    def _turned(self, value: float) -> str:
+        """Return a value of the one-sided output in words, a tenth where a hundredth of the spread is not said."""
+        digits = ".1f" if float(np.ptp(self.result.sample.values)) > 1.0 else ".3g"
+        read = self.result.one_sided.read(value)
+        if self.result.limits[self.result.leading].width is None:
+            return f"{read:{digits}}{self._sign}"
+        return _say("value_beyond" if read > 0 else "value_inside", value=f"{abs(read):{digits}}", sign=self._sign)
+
+    def _replicated(self) -> Iterator[str]:
+        """Yield what a second seed made of the promised orders, if any was promised."""
+        found = self.result.replication
+        if found.promised:
+            yield _say(
+                "replication",
+                reproduced=found.reproduced,
+                promised=found.promised,
+                confidence=found.confidence,
+                share=found.share,
+            )
+
+    def _orders(self) -> Iterator[str]:
+        """Yield who makes the strongest orders."""
+        found = self.result.orders
+        if found is None:
+            return
+        for at in np.argsort(-found.deviation, kind="stable")[:_NAMED]:
+            first, total = np.nan_to_num(found.first[at]), np.nan_to_num(found.total[at])
+            alone = first.sum() > _MOSTLY
+            share = first if alone else total
+            largest = np.argsort(-share, kind="stable")[:2]
+            leading = largest[share[largest] >= min(_SLIGHT, share.max())]
+            due = "order_together"
+            if alone:
+                due = "order_alone" if share[leading].sum() > _MOSTLY else "order_several"
+            yield _say(
+                "order",
+                order=found.orders[at],
+                deviation=found.deviation[at],
+                sign=sign_of(self._wave_unit),
+                due=_say(due),
+                names=" and ".join(
+                    _say("order_name", source=found.sources[source], share=share[source]) for source in leading
+                ),
+            )
+
+    def _uncertain(self) -> Iterator[str]:
+        """Yield what not knowing the model itself does, if anything is not known."""
+        effect = self.result.effect
+        if effect is None:
+            return
+        yield _say(
+            "uncertain",
+            names=" + ".join(source.name for source in effect.sources),
+            output=self._output,
+            sigma=effect.sigma,
+            sigma_of_mean=effect.sigma_of_mean,
+            sign=self._sign,
+            units=effect.first_order.units,
+            changes=effect.first_order.changes,
+            error=effect.first_order.root_mean_square,
+            largest=effect.first_order.largest,
+            effect=effect.first_order.effect,
+        )
+
+    def _rejects(self) -> str:
+        """Return what drives the units out."""
+        found, at = self.result.reject, int(np.argmax(self.result.reject.excess))
+        low, high = found.lift_interval[:, at]
+        return _say(
+            "rejects",
+            where=self._the_limits if found.is_limit else _say("worst_share", value=self._turned(found.threshold)),
+            outside=found.outside,
+            units=found.units,
+            source=found.sources[at],
+            lift=found.lift[at],
+            low=low,
+            high=high,
+        )
+
+    def _beyond(self) -> str:
+        """Return the share of units beyond the limit, and how it is known."""
+        found = self.result.beyond
+        share = found.parts_per_million
+        allowed = (1 - self.result.target) * 1e6
+        key, scale = ("beyond_share", 1e4) if share.estimate >= _RARE else ("beyond_rare", 1.0)
+        return _say(
+            key,
+            limit=self._limits,
+            share=share.estimate / scale,
+            low=share.low / scale,
+            high=share.high / scale,
+            allowed=allowed / scale,
+            verdict=found.verdict,
+        )
+
+    def _opening(self) -> str:
+        """Return which zone has the least and the most room."""
+        found, target = self.result.inverse, self.result.target
+        finite = np.flatnonzero(np.isfinite(found.factor))
+        quantile = self.result.one_sided.of_sample(self.result.sample).quantile(target)
+        if finite.size:
+            at = finite[np.argmin(found.factor[finite])] if found.meets else finite[np.argmax(found.factor[finite])]
+            key = "opening_least" if found.meets else "opening_easiest"
+            opening = _say(key, source=found.sources[at], factor=found.factor[at])
+        else:
+            opening = _say("opening_any" if found.meets else "opening_none")
+        return _say("kept", target=target, value=self._turned(quantile), opening=opening)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on the answer."""
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
+        result, replication = self.result, self.result.replication
+        if self.header.quick:
+            yield QUICK_RUN
+        if not result.sobol.convergence.stable:
+            yield _say("unsettled")
+        if result.errors.is_correlated:
+            yield _say("correlated")
+        if replication.promised and replication.share < replication.confidence:
+            yield _say("not_replicated")
+        if result.design is not SamplingDesign.MONTE_CARLO:
+            yield _say("spread", design=result.design.value)
+        if not result.reject.is_limit:
+            yield _say("few_keep" if result.beyond.estimate.probability > 0.5 else "few_outside")
+        yield from (_say("caution", caution=caution) for caution in result.beyond.estimate.cautions)
+        yield from (_say("constant", output=output) for output in result.sobol.constant)
+        if result.sobol.dropped:
+            yield _say("dropped", blocks=result.sobol.dropped)
+        if result.effect and result.effect.first_order.fails:
+            error, names = result.effect.first_order, " + ".join(source.name for source in result.effect.sources)
+            yield _say("rough", names=names, error=error.root_mean_square, effect=error.effect, sign=self._sign)
+        yield from self._portrait.cautions(np.array([setting.value for setting in result.model.settings]))
+        if self.header.failed:
+            yield _say("failed", units=self.header.failed)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        model = self.result.model
+        settings = " and ".join(quantity(setting.name) for setting in model.settings)
+        return (
+            *self.header.assumptions,
+            _say("as_stated"),
+            _say("correlations" if self.result.errors.is_correlated else "independent"),
+            *((_say("settings", names=settings),) if settings else ()),
+            _say("no_drift"),
+            *(_say("first_order", source=source.name) for source in model.uncertain),
+        )
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Drivers, limits, and what the answer rests on."""
+        return (*self._driver_sections(), *self._limit_sections(), *self._trust_sections())
+
+    @cached_property
+    def _requirements(self) -> pd.DataFrame:
+        return tables.capability_table(self.result)
+
+    def _driver_sections(self) -> Iterator[Section]:
+        """Yield which error drives what: the leading output, all requirements, each order."""
+        result = self.result
+        pairs = tables.pairs_table(result.indices)
+        yield Section(
+            heading=_say("drivers_heading", output=self._output),
+            paragraphs=(_say("drivers"),),
+            figures=(self._ranking_figure(),),
+            tables=(
+                ("ranking", tables.ranking_table(result)),
+                *(((pairs.name, pairs.frame()),) if pairs.rows else ()),
+                ("growth", tables.convergence_table(result)),
+            ),
+        )
+        if result.dimensions is not None:
+            yield Section(
+                heading=_say("dimensions_heading", output=self._output),
+                paragraphs=(_say("dimensions"),),
+                tables=(("dimensions", tables.dimensions_table(result, result.dimensions)),),
+                unfolded=True,
+                first=True,
+            )
+        if result.shapley is not None:
+            yield Section(
+                heading=_say("correlated_heading"),
+                paragraphs=result.errors.correlation.mappings(result.errors.sources),
+                tables=(("Shapley effects", tables.shapley_table(result.shapley)),),
+            )
+        names = ", ".join(quantity(name) for name in result.sobol.ranked)
+        blocks, others = result.sobol.blocks, result.sobol.blocks_of_others
+        yield Section(
+            heading=_say("overall_heading"),
+            paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others),),
+            figures=(self._requirements_figure(),),
+            tables=(("all requirements", tables.overall_table(result)),),
+        )
+        if result.orders is not None:
+            note = f"{self._portrait.spectra_note}; " if self._portrait.spectra_note else ""
+            yield Section(
+                heading=_say("orders_heading"),
+                paragraphs=(f"{note}{_say('orders', blocks=others)}",),
+                figures=(self._orders_figure(),),
+                tables=(("orders", tables.orders_table(result, self._wave_unit)),),
+            )
+        total = result.indices.total
+        shares = dict(zip(result.indices.sources, (total / total.sum()).tolist(), strict=True))
+        yield from self._portrait.moving(result.errors, result.sample.unit_at(0.5)[0], shares, "median unit")
+
+    def _limit_sections(self) -> tuple[Section, ...]:
+        """Return what the limits do: yield, units beyond them, and how far each zone may open."""
+        result = self.result
+        return (
+            Section(
+                heading=_say("yield_heading"),
+                figures=(self._sample_figure(),),
+                tables=(
+                    ("requirements", self._requirements),
+                    ("beyond the limit", tables.beyond_table(result)),
+                    ("stack-up", tables.stack_up_table(result, f"{self._output} [{self._unit}]")),
+                ),
+            ),
+            Section(
+                heading=_say("rejects_heading"),
+                figures=(self._reject_figure(),),
+                tables=(("rejects", tables.reject_table(result.reject)),),
+            ),
+            Section(
+                heading=_say("alone_heading"),
+                figures=tuple(self._inverse_figures()),
+                tables=(("alone", tables.inverse_table(result)),),
+            ),
+        )
+
+    def _trust_sections(self) -> tuple[Section, ...]:
+        """Return what the answer rests on: other measures, surrogates, distributions, work done."""
+        result = self.result
+        moments, statuses = result.moments, self.header.statuses.items()
+        return (
+            Section(
+                heading=_say("measures_heading"),
+                paragraphs=(_say("measures", pawn=moments.pawn_dummy, delta=moments.delta_dummy),),
+                tables=(("measures", tables.measures_table(result)),),
+            ),
+            Section(
+                heading=_say("surrogates_heading"),
+                paragraphs=(chosen_surrogate(result.choice),),
+                tables=(("surrogates", tables.surrogate_table(result.choice)),),
+            ),
+            Section(
+                heading=_say("mapping_heading"),
+                tables=(
+                    ("mapping", tables.mapping_table(result)),
+                    *tables.measured_tables(result),
+                    ("tolerances", table_frame(result.errors.sources, cost_unit=self.header.cost_unit)),
+                ),
+            ),
+            Section(
+                heading=_say("work_heading"),
+                paragraphs=(
+                    ", ".join(_say("work", units=count, outcome=outcome) for outcome, count in statuses if count),
+                ),
+                tables=(("work", tables.work_table(self.header)),),
+            ),
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The whole answer for a program, units in the names."""
+        result, header, sobol = self.result, self.header, self.result.sobol
+        beyond, limits = result.beyond, result.limits[result.leading]
+        sides = (("", limits.upper), ("lower ", limits.lower))
+        return {
+            "study": header.name,
+            "study hash": header.digest,
+            self._portrait.kind: header.model,
+            **header.conditions,
+            **{f"{side}limit [{self._unit}]": limit for side, limit in sides if limit is not None},
+            "yield target [-]": result.target,
+            "seed": header.seed,
+            "quick": header.quick,
+            "ranking": tables.ranked(result.indices),
+            "Sobol blocks [-]": sobol.blocks,
+            "Sobol blocks dropped [-]": sobol.dropped,
+            "samples of the Sobol analysis [-]": sobol.samples,
+            "order of the first places is stable": sobol.convergence.stable,
+            "pairs promised [-]": result.replication.promised,
+            "pairs a second seed shows [-]": result.replication.reproduced,
+            "requirements": self._requirements.replace({np.nan: None}).to_dict("records"),
+            "probability beyond the limit [-]": beyond.estimate.probability,
+            "yield [-]": beyond.interval.estimate,
+            "yield interval 95 % [-]": [beyond.interval.low, beyond.interval.high],
+            "surrogate": chosen_surrogate(result.choice),
+            **({self._portrait.uncertain_name: self._effect()} if result.effect else {}),
+            "statuses": dict(header.statuses),
+            "warnings": list(self.warnings),
+        }
+
+    def _effect(self) -> dict[str, Any]:
+        """Return what not knowing the model does, for a program."""
+        effect, indices, unit = self.result.effect, self.result.indices, self._unit
+        assert effect is not None
+        names, error = [source.name for source in effect.sources], effect.first_order
+        return {
+            "source": " + ".join(names),
+            "total index ST [-]": sum(float(indices.total[indices.sources.index(name)]) for name in names),
+            f"sigma of a unit [{unit}]": effect.sigma,
+            f"sigma of the mean [{unit}]": effect.sigma_of_mean,
+            f"first-order error at 2 sigma, rms [{unit}]": error.root_mean_square,
+            f"first-order error at 2 sigma, largest [{unit}]": error.largest,
+            f"effect at 2 sigma, rms [{unit}]": error.effect,
+        }
+
+    def _ranking_figure(self) -> Figure:
+        """Return total and first-order indices of the leading output with their intervals."""
+        indices = self.result.indices
+        rows = indices.order[:_SHOWN]
+        bars = (
+            ("total index", indices.total, indices.total_interval),
+            ("first-order index", indices.first, indices.first_interval),
+        )
+        return Figure(
+            name="ranking",
+            title=_say("ranking_figure", output=self._output),
+            x_label="Sobol index [-]",
+            series=tuple(
+                Series(
+                    label=_say("with_interval", name=name),
+                    kind="bars",
+                    x=[indices.sources[at] for at in rows],
+                    y=[max(values[at], 0.0) for at in rows],
+                    low=[max(interval[0, at], 0.0) for at in rows],
+                    high=[max(interval[1, at], 0.0) for at in rows],
+                )
+                for name, values, interval in bars
+            ),
+        )
+
+    def _requirements_figure(self) -> HeatMap:
+        """Return the total index of every source for every requirement."""
+        sobol = self.result.sobol
+        outputs = [name for name in self.result.outputs if name not in sobol.constant]
+        rows = sobol.overall.order[:_SHOWN]
+        return HeatMap(
+            name="requirements",
+            title=_say("requirements_figure"),
+            columns=[_broken(quantity(name)) for name in outputs],
+            rows=[sobol.sources[at] for at in rows],
+            label="total Sobol index [-]",
+            values=[[float(sobol.indices.total[sobol.position(name), at]) for name in outputs] for at in rows],
+        )
+
+    def _orders_figure(self) -> HeatMap:
+        """Return the share of every source in the wave of every order."""
+        found, sign = self.result.orders, sign_of(self._wave_unit)
+        assert found is not None
+        first = np.nan_to_num(found.first)
+        rows = tables.largest_first(first.max(axis=0))[:_SHOWN]
+        return HeatMap(
+            name="orders",
+            title=_say("orders_figure"),
+            columns=[f"{order}\n{own:.2g}{sign}" for order, own in zip(found.orders, found.deviation, strict=True)],
+            rows=[found.sources[at] for at in rows],
+            x_label=_say("orders_axis"),
+            label="share of the wave's variance [-]",
+            values=[[max(float(value), 0.0) for value in first[:, at]] for at in rows],
+        )
+
+    def _sample_figure(self) -> Figure:
+        """Return the leading output of the random units."""
+        limits, name = self.result.limits[self.result.leading], self._output
+        ends = [limit for limit in (limits.lower, limits.upper) if limit is not None]
+        return Figure(
+            name=name.replace("-", "_").replace(" ", "_"),
+            title=_say("sample_figure", output=f"{name[0].upper()}{name[1:]}"),
+            x_label=self.result.leading,
+            y_label="share of the units [%]",
+            series=(Series(label="random units", kind="histogram", x=list(self.result.sample.values)),),
+            vertical=tuple((limit, _say("limit_line", limit=limit, sign=self._sign)) for limit in ends),
+        )
+
+    def _reject_figure(self) -> Figure:
+        """Return how much larger the deviations of the units outside are, summed over the columns of each source."""
+        found = self.result.reject
+        rows = tables.largest_first(found.excess)[: _SHOWN // 2]
+        low, high = found.excess_interval
+        return Figure(
+            name="rejects",
+            title=_say("rejects_figure"),
+            x_label=_say("rejects_axis"),
+            series=(
+                Series(
+                    label=_say("with_interval", name="excess"),
+                    kind="bars",
+                    x=[found.sources[at] for at in rows],
+                    y=list(found.excess[rows]),
+                    low=list(low[rows]),
+                    high=list(high[rows]),
+                ),
+            ),
+            vertical=((0.0, "no part"),),
+        )
+
+    def _inverse_figures(self) -> Iterator[Figure]:
+        """Yield the zones now and what they may be alone; nothing if no zone has such a value."""
+        found = self.result.inverse
+        rows = [at for at in tables.tightest_first(found) if np.isfinite(found.zone[at])][:_SHOWN]
+        if not rows:
+            return
+        now = np.array([source.zone / MICROMETRE for source in self.result.errors.active])[rows]
+        names = [found.sources[at] for at in rows]
+        yield Figure(
+            name="alone",
+            title=_say("alone_may_open" if found.meets else "alone_may_stay"),
+            x_label="zone [µm]",
+            series=(
+                Series(label="now", kind="bars", x=names, y=list(now)),
+                Series(
+                    label="alone, with its 90 % interval",
+                    kind="bars",
+                    x=names,
+                    y=list(found.zone[rows] / MICROMETRE),
+                    low=list(now * found.low[rows]),
+                    high=list(now * found.high[rows]),
+                ),
+            ),
+        )
+
+
+def _drivers(sobol: SobolIndices) -> Iterator[str]:
+    """Yield who drives the leading output, and how sure each place is."""
+    interval, among = sobol.total_interval, sobol.among_first(min(_NAMED, len(sobol.sources)))
+    following = {pair.before: pair.probability for pair in sobol.neighbours}
+    for place, at in enumerate(sobol.order[:_NAMED], start=1):
+        yield _say(
+            "driver",
+            place=place,
+            source=sobol.sources[at],
+            total=sobol.total[at],
+            low=interval[0, at],
+            high=interval[1, at],
+            named=_NAMED,
+            among=among[at],
+            before=_say("driver_before", probability=following[at]) if at in following else "",
+        )
+
+
+def _converged(found: Convergence) -> str:
+    """Return whether the order of the first places is stable."""
+    last = found.history[-1]
+    return _say(
+        "convergence",
+        count=len(last.first),
+        verdict=_say("converged" if found.stable else "not_converged"),
+        share=last.probability,
+        blocks=last.blocks,
+        asked=found.probability,
+    )
+
+
+def chosen_surrogate(choice: Choice) -> str:
+    """Return which surrogate is used and why."""
+    score = choice.scores[choice.best]
+    if choice.chosen is None:
+        return _say("surrogate_none", name=score.name, shortfalls="; ".join(tables.shortfalls(score)))
+    return _say(
+        "surrogate",
+        name=score.name,
+        q2=score.q2,
+        held_out=score.held_out,
+        quantile=tables.quantile_name(score),
+        error=abs(score.quantile_share),
+        untried=f" {_say('surrogate_untried', names=', '.join(choice.untried))}" if choice.untried else "",
+    )
+
+
+def _broken(name: str) -> str:
+    """Return a name on several lines."""
+    lines = [""]
+    for word in name.split():
+        if len(lines[-1]) + len(word) > _LINE and lines[-1]:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return "\n".join(lines)
+
+
+TELLER = RankingTeller

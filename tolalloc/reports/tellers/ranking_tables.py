@@ -1,0 +1,496 @@
+"""The tables of a ranking: who drives what, what the limits do, and what the answer rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.tolerance_table import with_own_words
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.feature_frame import Frames, callout
+from tolalloc.reports.header import Header
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import quantity
+from tolalloc.sensitivity.inverse import InverseSensitivity
+from tolalloc.sensitivity.ranking import Neighbours
+from tolalloc.sensitivity.result import OutputCapability, RankingResult
+from tolalloc.sensitivity.shapley import ShapleyEffects
+from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
+from tolalloc.sensitivity.surrogate.validation import (
+    LARGEST_FAILED_SHARE,
+    LARGEST_QUANTILE_ERROR,
+    Choice,
+    Score,
+)
+from tolalloc.sensitivity.target import TargetSensitivity
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_say = Sentences("ranking")
+
+
+def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
+    """Return a table whose rows are positions in arrays.
+
+    Parameters
+    ----------
+    name
+        Name of its sheet and file.
+    columns
+        Header → what stands at every position, or what says it of one.
+    rows
+        The positions in the order of the table.
+    """
+    made = (Column(header=header, value=_reader(own)) for header, own in columns.items())
+    return Table[int](name=name, columns=tuple(made), rows=list(rows))
+
+
+def _reader(column: Any) -> Any:
+    return column if callable(column) else column.__getitem__
+
+
+def largest_first(values: Sequence[float] | np.ndarray) -> list[int]:
+    """Return the positions of values, largest first, equal ones in their order."""
+    return [int(at) for at in np.argsort(-np.asarray(values), kind="stable")]
+
+
+def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
+    """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
+    share = sobol.total / sobol.total.sum() * 100
+    first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
+    among, following = sobol.among_first(min(3, len(sobol.sources))), {pair.before: pair for pair in sobol.neighbours}
+    place = {at: number for number, at in enumerate(sobol.order, start=1)}
+    return of_positions(
+        "ranking",
+        {
+            "rank [-]": place,
+            "source": sobol.sources,
+            "contribution [%]": share,
+            "cumulative [%]": lambda at: share[sobol.order[: place[at]]].sum(),
+            "total index ST [-]": sobol.total,
+            "ST low 5 % [-]": total[0],
+            "ST high 95 % [-]": total[1],
+            "first index S1 [-]": sobol.first,
+            "S1 low 5 % [-]": first[0],
+            "S1 high 95 % [-]": first[1],
+            "S1 reading": [_say("zero" if is_zero else "above_zero") for is_zero in sobol.first_is_zero],
+            "rank low 5 % [-]": rank[0],
+            "rank high 95 % [-]": rank[1],
+            "P(among first 3) [%]": among * 100,
+            "P(before the next) [%]": lambda at: following[at].probability * 100 if at in following else np.nan,
+            "more blocks to tell it from the next [-]": lambda at: _blocks(following.get(at)),
+        },
+        sobol.order,
+    ).frame()
+
+
+def _blocks(pair: Neighbours | None) -> str:
+    """Return how many more Sobol blocks would tell a source from the next one."""
+    if pair is None or pair.more_blocks is None:
+        return ""
+    return _say("told_apart") if pair.separated else _say("more_blocks", blocks=float(f"{pair.more_blocks:.2g}"))
+
+
+def ranking_table(result: RankingResult) -> pd.DataFrame:
+    """Return the ranking of the leading output, with the zone and the root mean square derivative beside it."""
+    frame = sobol_table(result.indices)
+    zones = dict(zip((source.name for source in result.errors.active), result.errors.zones / MICROMETRE, strict=False))
+    sens = dict(zip(result.local.sources, result.local.root_mean_square, strict=True))
+    frame = frame.assign(
+        **{
+            "zone [µm]": [zones.get(name, np.nan) for name in frame["source"]],
+            f"Sens, root mean square [{unit_of(result.leading)}/µm]": [
+                sens.get(name, np.nan) for name in frame["source"]
+            ],
+        }
+    )
+    return with_own_words(frame, "source", {own.name: (own,) for own in result.errors.active})
+
+
+def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
+    """Return the ranking for a program."""
+    interval, among = sobol.total_interval, sobol.among_first(min(3, len(sobol.sources)))
+    return of_positions(
+        "ranking",
+        {
+            "source": sobol.sources,
+            "total index [-]": sobol.total,
+            "interval 90 % [-]": lambda at: interval[:, at].tolist(),
+            "first index [-]": sobol.first,
+            "P(among first 3) [-]": among,
+        },
+        sobol.order,
+    ).records()
+
+
+def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame:
+    """Return the dimensions of the drawing, largest part in the variance first, with what stands on the drawing."""
+    by_group: dict[str, list[Source]] = {}
+    for source in result.errors.active:
+        by_group.setdefault(source.group or source.name, []).append(source)
+    low, high = found.total_interval * 100
+    members = [[own for name in joined.split(" + ") for own in by_group.get(name, ())] for joined in found.sources]
+    frame = of_positions(
+        "dimensions",
+        {
+            "dimension": found.sources,
+            "places [-]": lambda at: len(members[at]),
+            "as written [mm]": lambda at: Frames(dict.fromkeys(map(callout, members[at]))),
+            "part in the variance (total index) [%]": found.total * 100,
+            "low 5 % [%]": low,
+            "high 95 % [%]": high,
+            "alone (first-order index) [%]": np.maximum(found.first, 0.0) * 100,
+        },
+        found.order,
+    ).frame()
+    return with_own_words(frame, "dimension", by_group)
+
+
+def pairs_table(sobol: SobolIndices) -> Table[int]:
+    """Return what pairs of sources add only together, the largest first; empty unless second order was asked for."""
+    low, high = sobol.second_interval
+    return of_positions(
+        "pairs",
+        {
+            "source": [sobol.sources[one] for one, _ in sobol.pairs],
+            "with": [sobol.sources[other] for _, other in sobol.pairs],
+            "second index S2 [-]": sobol.second,
+            "S2 low 5 % [-]": low,
+            "S2 high 95 % [-]": high,
+        },
+        largest_first(sobol.second),
+    )
+
+
+def overall_table(result: RankingResult) -> pd.DataFrame:
+    """Return one ranking over all outputs with a limit: the largest total index of each source and where it has it."""
+    overall, sobol = result.sobol.overall, result.sobol
+    interval, rank = overall.total_interval, overall.rank_interval
+    varying = [output for output in result.outputs if output not in sobol.constant]
+    return of_positions(
+        "all requirements",
+        {
+            "rank [-]": {at: number for number, at in enumerate(overall.order, start=1)},
+            "source": overall.sources,
+            "largest ST where limited [-]": overall.total,
+            "low 5 % [-]": interval[0],
+            "high 95 % [-]": interval[1],
+            "rank low 5 % [-]": rank[0],
+            "rank high 95 % [-]": rank[1],
+            "drives most": [quantity(name) for name in overall.drives],
+            **{f"ST {quantity(output)} [-]": sobol.indices.total[sobol.position(output)] for output in varying},
+        },
+        overall.order,
+    ).frame()
+
+
+def convergence_table(result: RankingResult) -> pd.DataFrame:
+    """Return how the first places settled as the blocks grew."""
+    names, history = result.sobol.sources, result.sobol.convergence.history
+    return of_positions(
+        "growth",
+        {
+            "blocks [-]": [step.blocks for step in history],
+            "first places": [", ".join(names[at] for at in step.first) for step in history],
+            "share of the resamples with this order [%]": [step.probability * 100 for step in history],
+        },
+        range(len(history)),
+    ).frame()
+
+
+def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
+    """Return what each source adds to the wave of each order, alone and with others."""
+    found = result.orders
+    assert found is not None
+    first, total = found.first_interval, found.total_interval
+    columns: dict[str, Column[tuple[int, int]]] = {}
+
+    def add(header: str, value: Any) -> None:
+        columns[header] = Column(header=header, value=value)
+
+    add("order of the output turn [-]", lambda row: found.orders[row[0]])
+    add(f"standard deviation of the wave [{unit}]", lambda row: found.deviation[row[0]])
+    add("source", lambda row: found.sources[row[1]])
+    for name, short, shares, ends in (
+        ("share alone [-]", "alone", found.first, first),
+        ("share with others [-]", "with others", found.total, total),
+    ):
+        add(name, lambda row, shares=shares: shares[row])
+        add(f"{short} low 5 % [-]", lambda row, ends=ends: ends[row[0], 0, row[1]])
+        add(f"{short} high 95 % [-]", lambda row, ends=ends: ends[row[0], 1, row[1]])
+    rows = [(at, source) for at in range(len(found.orders)) for source in largest_first(found.total[at])]
+    return Table(name="orders", columns=tuple(columns.values()), rows=rows).frame()
+
+
+def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
+    """Return the Shapley effects on the leading output, the largest first."""
+    interval, rank = found.interval(0), found.rank_interval(0)
+    return of_positions(
+        "Shapley effects",
+        {
+            "source": found.sources,
+            "Shapley effect [-]": found.effects[0],
+            "low 5 % [-]": interval[0],
+            "high 95 % [-]": interval[1],
+            "rank low 5 % [-]": rank[0],
+            "rank high 95 % [-]": rank[1],
+        },
+        largest_first(found.effects[0]),
+    ).frame()
+
+
+def capability_table(result: RankingResult) -> pd.DataFrame:
+    """Return every requirement with its distribution, capability and yield."""
+
+    def limited(own: OutputCapability, value: Any) -> Any:
+        return np.nan if own.limits is None or own.inside is None else value(own)
+
+    def able(own: OutputCapability, name: str) -> Any:
+        found = None if own.capability is None else getattr(own.capability, name)
+        return np.nan if found is None else found
+
+    def end(own: OutputCapability, name: str) -> float:
+        found = None if own.limits is None else getattr(own.limits, name)
+        return np.nan if found is None else found
+
+    values: dict[str, Any] = {
+        "requirement": lambda own: quantity(own.output),
+        "unit": lambda own: unit_of(own.output),
+        "Mean": lambda own: own.mean,
+        "Sigma": lambda own: own.deviation,
+        "Min": lambda own: own.least,
+        "Max": lambda own: own.most,
+        f"{result.target:.2%} quantile, low 2.5 %": lambda own: own.quantile.low,
+        f"{result.target:.2%} quantile, high 97.5 %": lambda own: (
+            own.quantile.high if np.isfinite(own.quantile.high) else _say("too_small")
+        ),
+        "LSL": lambda own: end(own, "lower"),
+        "USL": lambda own: end(own, "upper"),
+        "Yield [%]": lambda own: limited(own, lambda own: own.inside.estimate * 100),
+        "Yield low 2.5 % [%]": lambda own: limited(own, lambda own: own.inside.low * 100),
+        "Yield high 97.5 % [%]": lambda own: limited(own, lambda own: own.inside.high * 100),
+        "% out [%]": lambda own: limited(own, lambda own: (1 - own.inside.estimate) * 100),
+        "PPM [1e-6]": lambda own: limited(own, lambda own: (1 - own.inside.estimate) * 1e6),
+        "OK": lambda own: limited(own, lambda own: "yes" if own.inside.bound >= result.target else "no"),
+        "Pp [-]": lambda own: able(own, "pp"),
+        "Ppk [-]": lambda own: able(own, "ppk"),
+        "PPM if normal [1e-6]": lambda own: able(own, "normal_ppm"),
+    }
+    columns = tuple(Column[OutputCapability](header=header, value=value) for header, value in values.items())
+    table = Table(name="requirements", columns=columns, rows=result.capabilities)
+    return table.frame().dropna(axis="columns", how="all")
+
+
+def beyond_table(result: RankingResult) -> pd.DataFrame:
+    """Return the share beyond the limit by every method that was asked."""
+    found = result.beyond
+    rows = list(dict.fromkeys((*found.estimates, found.estimate)))
+    return of_positions(
+        "beyond the limit",
+        {
+            "method": [item.method for item in rows],
+            "probability beyond the limit [-]": [item.probability for item in rows],
+            "standard error [-]": [item.standard_error for item in rows],
+            "coefficient of variation [-]": [item.coefficient_of_variation for item in rows],
+            "units solved [-]": [item.calls for item in rows],
+            "relied on": ["yes" if item is found.estimate else "no" for item in rows],
+            "cautions": ["; ".join(item.cautions) for item in rows],
+        },
+        range(len(rows)),
+    ).frame()
+
+
+def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
+    """Return worst case, root-sum-square and Monte Carlo side by side, of an output with its unit."""
+    sample, classical = result.sample, result.classical
+    rows = (
+        ("worst case", classical.worst_case, _say("worst_case")),
+        ("root-sum-square", classical.root_sum_square, _say("root_sum_square")),
+        ("Monte Carlo mean", float(sample.values.mean()), _say("real_model")),
+        (f"Monte Carlo {result.target:.2%} quantile", sample.quantile(result.target), _say("real_model")),
+    )
+    headers = ("estimate", output, "assumes")
+    columns = dict(zip(headers, zip(*rows, strict=True), strict=True))
+    return of_positions("stack-up", columns, range(len(rows))).frame()
+
+
+def reject_table(found: TargetSensitivity) -> pd.DataFrame:
+    """Return what the units outside have in common, the strongest source first."""
+    first, lift, excess = found.first_interval, found.lift_interval, found.excess_interval
+    return of_positions(
+        "rejects",
+        {
+            "source": found.sources,
+            "excess [-]": found.excess,
+            "excess low 5 % [-]": excess[0],
+            "excess high 95 % [-]": excess[1],
+            "columns [-]": found.columns,
+            "lift [-]": found.lift,
+            "lift low 5 % [-]": lift[0],
+            "lift high 95 % [-]": lift[1],
+            "target index S1 [-]": found.first,
+            "target S1 low 5 % [-]": first[0],
+            "target S1 high 95 % [-]": first[1],
+            "p-value of no effect [-]": found.p_value,
+            "median of all [µm]": found.median / MICROMETRE,
+            "median outside [µm]": found.median_outside / MICROMETRE,
+        },
+        largest_first(found.excess),
+    ).frame()
+
+
+def tightest_first(found: InverseSensitivity) -> list[int]:
+    """Return the positions of sources, those first that cannot meet the limit alone, then the smallest factor."""
+    return [int(at) for at in np.lexsort((found.factor, ~np.isnan(found.factor)))]
+
+
+def inverse_table(result: RankingResult) -> pd.DataFrame:
+    """Return how far each zone may open alone, or must close."""
+    found = result.inverse
+    return of_positions(
+        "alone",
+        {
+            "source": found.sources,
+            "zone now [µm]": [source.zone / MICROMETRE for source in result.errors.active],
+            "factor alone [-]": found.factor,
+            "factor low 5 % [-]": found.low,
+            "factor high 95 % [-]": found.high,
+            "zone alone [µm]": found.zone / MICROMETRE,
+            "reading": [_reading(value) for value in found.factor],
+        },
+        tightest_first(found),
+    ).frame()
+
+
+def _reading(factor: float) -> str:
+    """Return a factor as words."""
+    if np.isnan(factor):
+        return _say("cannot_meet")
+    if np.isinf(factor):
+        return _say("does_not_matter")
+    return _say("may_open", share=factor - 1) if factor >= 1 else _say("must_close", share=1 - factor)
+
+
+def measures_table(result: RankingResult) -> pd.DataFrame:
+    """Return every measure of every source side by side, in the order of the total index."""
+    sobol, local, unit = result.indices, result.local, unit_of(result.leading)
+    effects, moments, bounds = result.effects, result.moments, result.derivatives
+    spread, distance = effects.mu_star_interval(0), moments.delta_interval
+    columns = {
+        "total index ST [-]": (sobol.sources, sobol.total),
+        "bound of ST by derivatives [-]": (bounds.sources, bounds.bound),
+        "bound low 5 % [-]": (bounds.sources, bounds.bound_interval[0]),
+        "bound high 95 % [-]": (bounds.sources, bounds.bound_interval[1]),
+        f"Morris mu* [{unit}]": (effects.sources, effects.mu_star[0]),
+        f"mu* low 5 % [{unit}]": (effects.sources, spread[0]),
+        f"mu* high 95 % [{unit}]": (effects.sources, spread[1]),
+        f"Morris sigma [{unit}]": (effects.sources, effects.sigma[0]),
+        "PAWN [-]": (moments.sources, moments.pawn),
+        "delta [-]": (moments.sources, moments.delta),
+        "delta low 5 % [-]": (moments.sources, distance[0]),
+        "delta high 95 % [-]": (moments.sources, distance[1]),
+        f"Sens at nominal [{unit}/µm]": (local.sources, local.at_nominal),
+        f"Sens, root mean square [{unit}/µm]": (local.sources, local.root_mean_square),
+        f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
+    }
+    if result.shapley:
+        columns["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
+    named = dict.fromkeys(sobol.sources[at] for at in sobol.order)
+    names = list(named | dict.fromkeys(name for sources, _ in columns.values() for name in sources))
+    by_name = {header: dict(zip(sources, values, strict=True)) for header, (sources, values) in columns.items()}
+    aligned = {header: [own.get(name, np.nan) for name in names] for header, own in by_name.items()}
+    return of_positions("measures", {"source": names, **aligned}, range(len(names))).frame()
+
+
+def quantile_name(score: Score) -> str:
+    """Return which quantile of a surrogate is compared."""
+    return _say("quantile", share=100 * score.target)
+
+
+def shortfalls(score: Score) -> tuple[str, ...]:
+    """Return what a candidate for a surrogate fails in, one phrase each; nothing if it has earned its place."""
+    said = {
+        "q2": _say("short_q2", q2=score.q2, needed=NEEDED_Q2),
+        "quantile": _say(
+            "short_quantile",
+            quantile=quantile_name(score),
+            error=abs(score.quantile_share),
+            allowed=LARGEST_QUANTILE_ERROR,
+        ),
+        "failed": _say("short_failed", failed=score.failed_share, allowed=LARGEST_FAILED_SHARE),
+    }
+    return tuple(said[name] for name in score.shortfalls)
+
+
+def surrogate_table(choice: Choice) -> pd.DataFrame:
+    """Return the surrogates with their errors on units that they had not seen."""
+    unit, scores = choice.output[choice.output.rindex("[") :], choice.scores
+    quantile = quantile_name(scores[choice.best])
+    return of_positions(
+        "surrogates",
+        {
+            "candidate": [score.name for score in scores],
+            "Q² [-]": [score.q2 for score in scores],
+            f"rms error {unit}": [score.rms_error for score in scores],
+            f"error of the {quantile} {unit}": [score.quantile_error for score in scores],
+            f"error of the {quantile} [%]": [score.quantile_share * 100 for score in scores],
+            "predictions per second [1/s]": [score.per_second for score in scores],
+            "speed over the response [-]": [score.speed for score in scores],
+            "trained on [-]": [score.trained for score in scores],
+            "held out [-]": [score.held_out for score in scores],
+            "failed [-]": [score.failed for score in scores],
+            "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in scores],
+        },
+        range(len(scores)),
+    ).frame()
+
+
+def mapping_table(result: RankingResult) -> pd.DataFrame:
+    """Return how every zone became a distribution, and where the zone comes from."""
+    rows = [(source.name, source.mapping, source.note) for source in result.errors.active]
+    rows += [(source.name, source.mapping, _say("not_on_drawing")) for source in result.model.uncertain]
+    names, mappings, notes = zip(*rows, strict=True)
+    columns = {"source": names, "zone → distribution": mappings, "note of the table": notes}
+    return of_positions("mapping", columns, range(len(rows))).frame()
+
+
+def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """Return how the measured parts of each source were fitted, one table for all; none if no parts were measured."""
+    rows = [
+        (source.name, source.measured.fit, fitted)
+        for source in result.errors.active
+        if source.measured
+        for fitted in source.measured.fit.fits
+    ]
+    columns = {
+        "source": [name for name, _, _ in rows],
+        "parts [-]": [fit.parts for _, fit, _ in rows],
+        "mean [µm]": [fit.mean / MICROMETRE for _, fit, _ in rows],
+        "sigma [µm]": [fit.deviation / MICROMETRE for _, fit, _ in rows],
+        "Cp [-]": [fit.cp for _, fit, _ in rows],
+        "Cpk [-]": [fit.cpk for _, fit, _ in rows],
+        "distribution": [fitted.distribution.value for _, _, fitted in rows],
+        "AIC [-]": [fitted.aic for _, _, fitted in rows],
+        "Kolmogorov–Smirnov distance [-]": [fitted.distance for _, _, fitted in rows],
+        "best": ["yes" if fitted is fit.best else "no" for _, fit, fitted in rows],
+    }
+    table = of_positions("measured parts", columns, range(len(rows)))
+    return ((table.name, table.frame()),) if rows else ()
+
+
+def work_table(header: Header) -> pd.DataFrame:
+    """Return what each stage took, and how its units ended."""
+    names, stages = list(header.stages), list(header.stages.values())
+    columns = {
+        "stage": names,
+        "units [-]": [own["units"] for own in stages],
+        "seconds [s]": [own["seconds"] for own in stages],
+        "units per second [1/s]": [own["units per second"] for own in stages],
+    }
+    return of_positions("work", columns, range(len(names))).frame()

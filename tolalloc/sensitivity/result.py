@@ -1,0 +1,109 @@
+"""What drives a model's outputs, and how sure that is: the numbers behind a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tolalloc.capability.indices import Capability, Limits, QuantileInterval, capability, quantile_interval
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, Yield, proportion
+from tolalloc.capability.yield_at_limit import YieldAtLimit
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.models.model import Model
+from tolalloc.sensitivity.derivatives import ClassicalEstimate, DerivativeMeasures, LocalDerivatives
+from tolalloc.sensitivity.inverse import InverseSensitivity
+from tolalloc.sensitivity.ranking import Replication
+from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent
+from tolalloc.sensitivity.shapley import ShapleyEffects
+from tolalloc.sensitivity.sobol import OrderContribution, SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.surrogate.validation import Choice
+from tolalloc.sensitivity.target import TargetSensitivity
+from tolalloc.sensitivity.uncertain import UncertainEffect
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputCapability:
+    """One output of the random units: its distribution, and where it is limited its capability and yield."""
+
+    output: str  # Its name with its unit
+    # Mean, standard deviation, smallest and largest value of the good units [output]
+    mean: float
+    deviation: float
+    least: float
+    most: float
+    quantile: QuantileInterval  # Quantile at the target yield with its 95 % interval [output]
+    limits: Limits | None  # Its limits, if it has any [output]
+    inside: Yield | None  # Share that keeps them; units without an answer count as outside
+    capability: Capability | None  # Indices; none without limits, or where the output does not vary
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankingResult:
+    """What drives a model's outputs, and how sure that is."""
+
+    model: Model  # What answered
+    errors: ErrorModel  # Sources, their distributions and correlations
+    limits: Mapping[str, Limits]  # Output → limits; the first one leads
+    target: float  # Share of units that must keep a limit [-]
+    outputs: tuple[str, ...]  # Names of all outputs, in the order of the sample's columns, the leading one first
+    # Random units with all these outputs, and how they are spread
+    sample: MonteCarlo
+    design: SamplingDesign
+    sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
+    # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
+    dimensions: SobolIndices | None
+    replication: Replication  # How much of the ranking a second seed has shown
+    orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
+    # What not knowing the model itself does to the leading output; none where all of it is known
+    effect: UncertainEffect | None
+    shapley: ShapleyEffects | None  # Effects of correlated sources; none where all are independent
+    classical: ClassicalEstimate  # What a hand calculation says
+    # Derivatives by each source, and what they bound
+    local: LocalDerivatives
+    derivatives: DerivativeMeasures
+    # Measures beside Sobol's
+    effects: ElementaryEffects
+    moments: MomentIndependent
+    reject: TargetSensitivity  # What drives the units out of the limits
+    inverse: InverseSensitivity  # How far each zone may open alone
+    beyond: YieldAtLimit  # Probability of a leading output beyond its limits
+    choice: Choice  # Surrogates of the model with their errors
+
+    @property
+    def leading(self) -> str:
+        """Name of the leading output with its unit."""
+        return self.outputs[0]
+
+    @cached_property
+    def indices(self) -> SobolIndices:
+        """Sobol indices of the leading output."""
+        return self.sobol.of(self.leading)
+
+    @cached_property
+    def one_sided(self) -> OneSided:
+        """The leading output against its limits."""
+        return OneSided(response=self.model.reading((self.leading,)), limits=self.limits[self.leading])
+
+    @cached_property
+    def capabilities(self) -> tuple[OutputCapability, ...]:
+        """Every output with its distribution, capability and yield."""
+        return tuple(self._capability(at, output) for at, output in enumerate(self.outputs))
+
+    def _capability(self, at: int, output: str) -> OutputCapability:
+        evaluation, limits = self.sample.evaluation, self.limits.get(output)
+        values, units = evaluation.values[evaluation.good, at], evaluation.status.size
+        return OutputCapability(
+            output=output,
+            mean=float(values.mean()),
+            deviation=float(values.std(ddof=1)),
+            least=float(values.min()),
+            most=float(values.max()),
+            quantile=quantile_interval(values, self.target),
+            limits=limits,
+            inside=proportion(units, units - values.size + limits.outside(values)) if limits else None,
+            capability=capability(values, limits) if limits and np.ptp(values) > 0 else None,
+        )
