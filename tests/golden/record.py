@@ -32,9 +32,11 @@ _UNSTEADY = (
     (r"\d{4}-\d\d-\d\d", "DATE"),
     (r"Compiling the kernel.*\n", ""),
     (r", \d+ units/s", ", # units/s"),
+    (r'(computing time \[s\](": |,))[\d.e+,-]*\d', r"\g<1>0"),
+    (r"(│ computing time \[s\]).*$", r"\1"),
 )
 """What no two runs or machines have in common, and what stands for it."""
-_TIMED = re.compile(r"seconds \[s\]|per second|speed over")
+_TIMED = re.compile(r"seconds \[s\]|per second|speed over|computing time")
 """Headers of columns that hold how long something took."""
 _BLOCKS = {"p", "h1", "h2", "h3", "li", "div", "section", "summary", "dt", "dd", "figcaption", "br"}
 

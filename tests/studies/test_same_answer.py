@@ -1,0 +1,122 @@
+"""A question that needs no study gives the same answer to who calls ``ta`` and to who types the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tolalloc as ta
+from tests.golden.record import steady
+from tests.studies.command import tolalloc
+from tolalloc.exceptions import InputError, TolallocError
+
+RV40E = {"reducer": "rv40e_xi2015"}
+SHORT = {"speed": 5250, "ramp": 0.02, "duration": 0.06, "step": 1e-5}
+
+
+def same(word: str, *positional: object, typed: str = "", **named: object) -> ta.Answer:
+    """Return what ``ta`` answers, once the command with the same words says the same.
+
+    The options of the command are those of ``typed``, and one for each named argument.
+    """
+    answer = getattr(ta, word)(*positional, **named)
+    given = [part for name, value in named.items() if value is not True for part in (f"--{name}", value)]
+    done = tolalloc(word, *positional, *given, *typed.split(), "--json")
+    assert done.returncode == 0, done.stderr
+    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    return answer
+
+
+def _plain(summary: dict[str, Any]) -> Any:
+    """Return a summary as a program reads it, without what no two runs have in common."""
+    return json.loads(steady(json.dumps(summary, ensure_ascii=False), Path("/")))
+
+
+@pytest.fixture
+def shop(tmp_path):
+    path = tmp_path / "shop.csv"
+    rows = [f"ground,{zone},µm,{0.5 + 40 / zone}\n" for zone in (5, 8, 12, 20, 40)]
+    path.write_text("process,tolerance [unit],unit,cost [cost units]\n" + "".join(rows), encoding="utf-8")
+    return path
+
+
+def test_costs(shop):
+    answer = same("costs", shop)
+    assert [fit.process for fit in answer.result] == ["ground"]
+
+
+@pytest.mark.slow
+def test_te():
+    answer = same("te", typed="--attribute", reducer="rv20e", unit="table4", attributed=True)
+    assert answer.result.attribution is not None
+    assert next(iter(answer.header.statuses.values())) == answer.result.equilibria.carrier_angle.size
+
+
+def test_contact():
+    answer = same("contact", **RV40E, torque=-572, phases=1)
+    assert answer.result.assessment.single.force.max() == pytest.approx(1144, abs=1)
+
+
+@pytest.mark.slow
+def test_modify():
+    answer = same("modify", "li2018", **RV40E, radial=15)
+    assert answer.result.best.amounts / 1e-6 == pytest.approx([35.9679, 20.9679], abs=1e-4)
+
+
+@pytest.mark.slow
+def test_simulate():
+    answer = same("simulate", **RV40E, **SHORT, torque=-572)
+    assert answer.result.ratio == pytest.approx(81, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("word", "given", "said"),
+    [
+        ("te", {"torque": 0}, "ta.te: torque is 0.0; allowed is -1670 to 1670 N·m, but not 0."),
+        ("te", {"torque": "rated"}, "ta.te: torque is 'rated'; allowed is a number."),
+        ("te", {"attributed": 1}, "ta.te: attributed is 1; allowed is True or False."),
+        ("contact", {"phases": 0}, "ta.contact: phases is 0; allowed is 1 to 3600."),
+        ("contact", {"phases": 1.5}, "ta.contact: phases is 1.5; allowed is a whole number."),
+        ("contact", {"width": 0}, "ta.contact: width is 0.0; allowed is 0.5 to 200 mm."),
+        ("modify", {"method": "li2018", "radial": -5}, "ta.modify: radial is '-5 µm'; allowed is 0 to 1000 µm."),
+        ("simulate", {"torque": 5}, "ta.simulate: torque is 5.0; allowed is -1670 N·m to below 0"),
+        ("simulate", {"speed": 0}, "ta.simulate: speed is 0.0; allowed is a number above 0."),
+        ("costs", {"shop": 3}, "ta.costs: shop is 3; allowed is a path."),
+    ],
+)
+def test_a_refusal_names_the_argument(word, given, said):
+    with pytest.raises(InputError) as error:
+        getattr(ta, word)(**given)
+    assert str(error.value).startswith(said)
+
+
+def test_a_value_without_its_name_or_of_no_field_is_refused():
+    with pytest.raises(InputError, match=r"tolalloc te: 'rv20e' stands without its name; write reducer=\.\.\.\."):
+        ta.te("rv20e")
+    with pytest.raises(InputError, match=r"tolalloc modify: method is missing"):
+        ta.modify()
+    with pytest.raises(TolallocError, match="field 'reductor' is not known; the nearest known is reducer"):
+        ta.te(reductor="rv20e")
+
+
+@pytest.mark.parametrize("given", [{"profile": "disc.csv"}, {"write_to": "new.reducer.toml"}])
+def test_no_file_is_written_about_a_reducer_that_nobody_named(given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"^reducer is missing: where a file is written the reducer must be named"):
+        ta.modify("li2018", **given)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_files_are_written_from_a_script_as_from_the_command(tmp_path):
+    files = {"profile": str(tmp_path / "disc.csv"), "write_to": tmp_path / "new.reducer.toml"}
+    ta.modify("li2018", **RV40E, **files, points=100)
+    done = tolalloc("modify", "li2018", *("--reducer", "rv40e_xi2015", "--points", "100"),
+                    *("--profile", tmp_path / "typed.csv", "--write", tmp_path / "typed.reducer.toml"))  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for ending in (".csv", ".reducer.toml"):
+        made, typed = (next(tmp_path.glob(f"{stem}{ending}")).read_bytes() for stem in ("[dn]*", "typed"))
+        assert made == typed
