@@ -12,7 +12,7 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
-from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reducers.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.picture.blocks import scene_record
 from tolalloc.reports.picture.moving import MovingPicture

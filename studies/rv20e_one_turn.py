@@ -11,10 +11,9 @@ import numpy as np
 
 import tolalloc as ta
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
-from tolalloc.reducers.equivalent.attribution import attribute
 from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, both_directions, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.equivalent.outputs import attribute, forces
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.reports.document import Document, Section

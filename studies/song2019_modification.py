@@ -14,9 +14,8 @@ from published.modification_comparison import algorithms_table, compared, compar
 import tolalloc as ta
 from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
-from tolalloc.reducers.cycloid.assessment import assess
-from tolalloc.reducers.cycloid.mesh import flank_angle
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.loaded_contact import assess
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
 from tolalloc.reducers.modification import METRICS, ModificationRequest, reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer

@@ -14,9 +14,14 @@ from scipy.optimize import brentq
 import tolalloc as ta
 from tolalloc.reading.units import DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import formula_gap
-from tolalloc.reducers.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.reducers.cycloid.mesh import normals
-from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
+from tolalloc.reducers.cycloid.loaded_contact import (
+    LoadedContact,
+    PressedDiscs,
+    default_phases,
+    pressed,
+    pressed_linear,
+)
+from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section

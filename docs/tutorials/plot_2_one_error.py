@@ -18,9 +18,9 @@ import numpy as np
 
 import tolalloc as ta
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
-from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.outputs import order_spectrum
-from tolalloc.reducers.equivalent.pins import pin_contact
+from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.study.prepared import Prepared
 
 study = ta.Study(

@@ -39,8 +39,8 @@ from tolalloc.reducers.dynamics.motion import (
 )
 from tolalloc.reducers.dynamics.simulation import Steps, simulate
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.running.blas import one_blas_thread

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from numpy_tables import Tables, condensed_tables
 
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
+from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer
 
 _ANGLES_AT_ONCE = 64

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.reducers.equivalent.kinematics import Coordinates
-from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.equivalent.springs import Coordinates, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 
 _RIDGE = 1e-13  # of the largest stiffness; makes of a singular tangent a long step downhill

@@ -19,8 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
-from tolalloc.reducers.equivalent.answers import count_statuses
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, count_statuses
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 

@@ -22,7 +22,7 @@ def pin_contact_as_printed(
 
     Sound where T > 0, on the concave part of the tooth. On the convex part, T < 0, it exceeds that of a flat flank,
     and it is singular or negative where the pin is larger than half the radius of the path of its centre; the model
-    then takes `tolalloc.reducers.cycloid.contact_stiffness.pin_contact_table2`.
+    then takes `tolalloc.reducers.cycloid.loaded_contact.pin_contact_table2`.
     """
     shortening, pins, cosine = stage.shortening, stage.pin_count, np.cos(pin_angle)
     path = stage.pin_circle_radius * (1 + shortening**2 - 2 * shortening * cosine) ** 1.5

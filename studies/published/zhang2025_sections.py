@@ -23,8 +23,8 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers.equivalent.line_load import contact_pattern
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import contact_pattern
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse

@@ -11,7 +11,7 @@ import pytest
 
 import tolalloc as ta
 from tests.studies.command import tolalloc
-from tolalloc.reducers.cycloid.assessment import assess
+from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.reducer.files import PRESETS
 

@@ -13,8 +13,7 @@ from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import ReducerChoice
-from tolalloc.reducers.equivalent.preload import preload
-from tolalloc.reducers.rigidity import rated_pin_force
+from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 

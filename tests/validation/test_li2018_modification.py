@@ -10,8 +10,7 @@ import pytest
 from studies.published.li2018_genetic import LI2018, binary_search
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.reducers.cycloid.mesh import flank_angle
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
 from tolalloc.reducers.modification import closed_form, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 

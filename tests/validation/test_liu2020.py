@@ -16,9 +16,8 @@ import pytest
 
 from tests.validation_manual import shown
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
-from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import order_spectrum
 
 PUBLISHED = np.loadtxt(Path(__file__).parent / "rv20e_table4_curves.csv", delimiter=",", skiprows=1)

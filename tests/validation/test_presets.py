@@ -16,12 +16,17 @@ from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
-from tolalloc.reducers.equivalent.perfect import exact_loop
-from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.equivalent.perfect import (
+    FACTOR,
+    against_catalogue,
+    exact_loop,
+    preload,
+    rated_pin_force,
+    twist_shares,
+)
+from tolalloc.reducers.reducer.bearings import SLIDING_FRICTION
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
-from tolalloc.reducers.reducer.friction import SLIDING_FRICTION
 from tolalloc.reducers.reducer.unit_file import load_unit
-from tolalloc.reducers.rigidity import FACTOR, against_catalogue, rated_pin_force, twist_shares
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
 

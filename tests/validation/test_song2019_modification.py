@@ -13,8 +13,7 @@ from studies.published.modification_searches import Recorder, polish
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
-from tolalloc.reducers.cycloid.mesh import flank_angle
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
 from tolalloc.reducers.modification import reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification
 

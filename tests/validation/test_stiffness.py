@@ -9,7 +9,7 @@ import pytest
 
 from studies.published.liu2020_table2 import mesh_as_printed, pin_contact_as_printed
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reducers.cycloid.contact_stiffness import pin_contact_table2
+from tolalloc.reducers.cycloid.loaded_contact import pin_contact_table2
 from tolalloc.reducers.reducer.design import CycloidStage
 from tolalloc.reducers.reducer.files import (
     PRESETS,
@@ -19,18 +19,16 @@ from tolalloc.reducers.reducer.files import (
     write_identified_stiffness,
 )
 from tolalloc.reducers.reducer.stiffness import (
+    TAPER_ANGLE,
     IdentifiedStiffness,
     Material,
-    contact_modulus,
-    line_contact,
-    pin_bending,
-)
-from tolalloc.reducers.reducer.table2 import (
-    TAPER_ANGLE,
     ball_bearing,
     ball_coefficient_as_printed,
+    contact_modulus,
     gear_mesh,
     largest_preload,
+    line_contact,
+    pin_bending,
     roller_bearing,
     shaft_support,
 )

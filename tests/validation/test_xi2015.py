@@ -18,8 +18,14 @@ from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import formula_gap
-from tolalloc.reducers.cycloid.loaded_contact import PAIR_SHARE, LoadedContact, PressedDiscs, default_phases
-from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
+from tolalloc.reducers.cycloid.loaded_contact import (
+    PAIR_SHARE,
+    LoadedContact,
+    PressedDiscs,
+    default_phases,
+    pressed,
+    pressed_linear,
+)
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 

@@ -13,10 +13,9 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 from scipy.special import lambertw
 
-from tolalloc.reducers.cycloid.contact_stiffness import equivalent_length
+from tolalloc.reducers.cycloid.loaded_contact import equivalent_length
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import HARMONICS, Coordinates
-from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 
 Response = tuple[np.ndarray, np.ndarray, np.ndarray]

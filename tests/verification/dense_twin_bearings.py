@@ -16,10 +16,9 @@ from scipy.special import ellipe
 
 from tests.verification.dense_twin import DenseModel, Interface, Response, interface, play_response
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
-from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.equivalent.springs import HARMONICS, SpringGroup
+from tolalloc.reducers.reducer.bearings import BallBearing, RollerBearing, RollingBearing
 from tolalloc.reducers.reducer.design import Clearances, Reducer
-from tolalloc.reducers.reducer.rolling_bearing import BallBearing, RollerBearing, RollingBearing
 
 
 def hertz(bearing: BallBearing) -> float:

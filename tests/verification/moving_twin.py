@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
 from tolalloc.reducers.dynamics.motion import Inertia, SpeedProfile
-from tolalloc.reducers.equivalent.kinematics import HARMONICS, Coordinates
+from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates
 from tolalloc.reducers.reducer.design import Reducer
 
 

@@ -14,8 +14,8 @@ from tolalloc.assembly.steps import AssemblyStep, check_steps
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import crank_disc
-from tolalloc.reducers.equivalent.kinematics import Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 
 SHORT = """

@@ -21,7 +21,7 @@ from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, Tra
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.line_load import ContactPattern
+from tolalloc.reducers.equivalent.outputs import ContactPattern
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.charts import chart
 

@@ -24,10 +24,9 @@ from tests.random_cases import Case, random_case, random_reducer, random_unit, s
 from tests.validation_manual import shown
 from tests.verification.dense_twin import DenseModel, dense_model
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import Coordinates
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
+from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Reducer
 
 SEEDS = seeds(40)

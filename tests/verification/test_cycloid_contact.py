@@ -18,10 +18,14 @@ from tests.random_cases import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.cycloid.loaded_contact import LoadedContact, PressedDiscs, default_phases
-from tolalloc.reducers.cycloid.pressed import pressed, pressed_linear
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.cycloid.loaded_contact import (
+    LoadedContact,
+    PressedDiscs,
+    default_phases,
+    pressed,
+    pressed_linear,
+)
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.reducer.design import Clearances, CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer

@@ -9,8 +9,7 @@ import pytest
 
 from tests.random_cases import is_angle, random_case, random_units, seeds
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 
 

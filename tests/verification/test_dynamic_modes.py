@@ -14,10 +14,9 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, generalised_alpha, inertia_of, motion_of, newmark
 from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.kinematics import Coordinates
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import load_reducer
 

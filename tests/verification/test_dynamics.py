@@ -26,9 +26,8 @@ from tolalloc.reducers.dynamics.motion import (
     nominal_acceleration,
 )
 from tolalloc.reducers.dynamics.simulation import Simulated, simulate
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.running.compiled import thread_count, use_threads
 

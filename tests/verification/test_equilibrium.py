@@ -14,12 +14,11 @@ from tests.validation_manual import shown
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LOGARITHMIC
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.answers import Status
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.condensation import spring_groups
-from tolalloc.reducers.equivalent.kinematics import Coordinates
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.running.compiled import thread_count, use_threads
 
 CASES = 200

@@ -13,16 +13,24 @@ from tests.builders import prepared
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCMINUTE
-from tolalloc.reducers.equivalent.friction import FrictionAtTorque, friction_torques, sliding_ways
-from tolalloc.reducers.equivalent.friction_loop import friction_loop, twist_of_friction
-from tolalloc.reducers.equivalent.hysteresis import DRAWN, TURN_ANGLES, hysteresis_loop, loop_torques
+from tolalloc.reducers.equivalent.hysteresis import (
+    DRAWN,
+    TURN_ANGLES,
+    FrictionAtTorque,
+    Play,
+    friction_loop,
+    friction_torques,
+    hysteresis_loop,
+    loop_torques,
+    sliding_ways,
+    twist_of_friction,
+)
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved
-from tolalloc.reducers.equivalent.play import Play
-from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.equivalent.perfect import preload
+from tolalloc.reducers.reducer.bearings import CONTACTS, Friction, loss_factor
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
-from tolalloc.reducers.reducer.friction import CONTACTS, Friction, loss_factor
 
 ANGLES = TURN_ANGLES[::3]
 NONE = Friction(**dict.fromkeys(CONTACTS, 0.0))

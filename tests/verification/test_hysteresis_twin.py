@@ -14,9 +14,8 @@ from tests.verification.dense_twin import DenseModel, dense_model, least_energy
 from tests.verification.dense_twin_bearings import standing, turning, with_bearings, with_secants
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.files import validated
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop, own_load_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.own_loads import own_load_loop
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer

@@ -34,8 +34,8 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_degrees

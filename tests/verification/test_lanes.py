@@ -10,15 +10,21 @@ from tests.random_cases import random_units
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.solvers.guesses import guess_next, make_history
-from tolalloc.reducers.equivalent.solvers.lane_solver import solve_tile_at
-from tolalloc.reducers.equivalent.solvers.lanes import WIDTH, aligned, load, logarithm, spread, store
-from tolalloc.reducers.equivalent.solvers.line_contact import DEEPEST, line_contact
-from tolalloc.reducers.equivalent.solvers.problem import values_of
-from tolalloc.reducers.equivalent.solvers.tile import ROW, TILE, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
+from tolalloc.reducers.equivalent.solvers.batch import (
+    BATCH,
+    ROW,
+    make_batch,
+    make_history,
+    nonzero_rows,
+    nonzero_waves,
+    solve_batch_at,
+    start_next,
+)
+from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
+from tolalloc.reducers.equivalent.solvers.pressing import DEEPEST, line_contact
+from tolalloc.reducers.equivalent.solvers.simd import WIDTH, aligned, load, logarithm, spread, store
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.running.compiled import jit
@@ -81,19 +87,19 @@ def test_line_contact_has_the_same_bits_alone_and_among_others(generator):
 
 def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     """A wrong tangent or balance would leave them to the solver for one sample: the same answers, many times slower."""
-    units, angle = random_units(table4, rv20e.columns, generator, TILE), np.array([0.3])
+    units, angle = random_units(table4, rv20e.columns, generator, BATCH), np.array([0.3])
     columns, tables = rv20e.error_columns, rv20e.tables_at(angle)
-    layout, careful = columns.layout, np.empty(TILE, np.bool_)
-    values = np.empty((TILE, layout.end))
+    layout, careful = columns.layout, np.empty(BATCH, np.bool_)
+    values = np.empty((BATCH, layout.end))
     values_of(units, -1.0, layout, columns.map, values)
-    tile = make_tile(layout, tables.load.shape[2], tables.contact_stiffness.shape[1], ROW)
-    tile.values[:, :TILE] = values.T
-    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
-    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
-    solve_tile_at(LINEAR, (0, 0), 0, tables, layout, rows, waves, teeth_deviate, TILE, tile, careful)
+    batch = make_batch(layout, tables.load.shape[2], tables.contact_stiffness.shape[1], ROW)
+    batch.values[:, :BATCH] = values.T
+    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
+    solve_batch_at(LINEAR, (0, 0), 0, tables, layout, rows, waves, teeth_deviate, BATCH, batch, careful)
     settled = ~careful
     found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
-    np.testing.assert_allclose(tile.rotation[:TILE][settled], found[settled], rtol=1e-9)
+    np.testing.assert_allclose(batch.rotation[:BATCH][settled], found[settled], rtol=1e-9)
     assert careful.mean() < 0.1
 
 
@@ -105,13 +111,13 @@ def test_what_repeats_with_the_crank_and_changes_evenly_is_guessed_exactly(gener
     q, history = aligned(size, ROW), make_history(turn, size)
     for angle in range(angles - 1):
         q[:] = curve[angle]
-        guess_next(angle, turn, used, q, history)
+        start_next(angle, turn, used, q, history)
         if angle >= 2 * turn:
             np.testing.assert_allclose(q[:, :used], curve[angle + 1, :, :used], rtol=1e-12, atol=1e-12)
     q, history = aligned(size, ROW), make_history(0, size)
     for angle in range(4):
         q[:] = repeated[0] + angle * change
-        guess_next(angle, 0, used, q, history)
+        start_next(angle, 0, used, q, history)
         expected = repeated[0] + (angle + 1) * change if angle else repeated[0]
         np.testing.assert_allclose(q[:, :used], expected[:, :used], rtol=1e-12, atol=1e-12)
 
@@ -130,7 +136,7 @@ def test_guesses_from_turns_of_the_crank_are_nearer_and_lead_to_the_same_equilib
         q, history, found = aligned(6, ROW), make_history(turn, 6), []
         for angle in range(935):
             q[:, :24] = by_turns.retained[:, angle].T
-            guess_next(angle, turn, 24, q, history)
+            start_next(angle, turn, 24, q, history)
             found.append(np.abs(q[:, :24] - by_turns.retained[:, angle + 1].T))
         return float(np.median(found[48:]))
 

@@ -10,20 +10,20 @@ import pytest
 from tests.random_cases import random_reducer
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
-from tolalloc.reducers.cycloid.contact_stiffness import peak_pressure
-from tolalloc.reducers.cycloid.mesh import normals
+from tolalloc.reducers.cycloid.loaded_contact import peak_pressure
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
+from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
-from tolalloc.reducers.equivalent.line_load import (
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import (
     LineContact,
+    Solved,
     contact_pattern,
     line_contact,
     peak_line_load,
     unit_pressure,
 )
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import OutputsResponse
 

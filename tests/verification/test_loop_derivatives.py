@@ -15,7 +15,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.response.loop_derivatives import DIFFERENTIABLE
+from tolalloc.reducers.response.outputs import DIFFERENTIABLE
 
 UNITS = 12
 STEP = 1e-10

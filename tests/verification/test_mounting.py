@@ -31,10 +31,9 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
-from tolalloc.reducers.equivalent.interfaces import crank_disc
-from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.interfaces import crank_disc, dense_rows
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.pins import dense_rows
+from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse

@@ -17,8 +17,8 @@ import pytest
 from tests.builders import prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.equivalent.kinematics import Positions
-from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reducers.equivalent.springs import Positions
+from tolalloc.reducers.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.page import as_json, asset
 from tolalloc.reports.picture.blocks import block, coarse_block, scene_record, values_of

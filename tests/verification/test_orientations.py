@@ -16,9 +16,8 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Response
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
-from tolalloc.reducers.equivalent.line_load import peak_line_load
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
 

@@ -10,13 +10,12 @@ import pytest
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.attribution import attribute
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
-from tolalloc.reducers.equivalent.kinematics import Coordinates
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, forces, load_share, order_spectrum
+from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, attribute, forces, load_share, order_spectrum
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
+from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import load_reducer
 

@@ -10,8 +10,8 @@ import pytest
 from tests.builders import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
-from tolalloc.reducers.equivalent.answers import Status, count_statuses
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.equivalent.model import Status, count_statuses
 from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 

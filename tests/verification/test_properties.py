@@ -12,9 +12,8 @@ from tolalloc.drawings.drawing import Drawing, load_drawing
 from tolalloc.drawings.sources import ANGULAR
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.reducer.files import load_identified_stiffness, write_identified_stiffness
+from tolalloc.reducers.reducer.files import IDENTIFIABLE, load_identified_stiffness, write_identified_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.reducer.stiffness_records import IDENTIFIABLE
 from tolalloc.reports.excel import write_sheets
 
 Row = dict[str, object]

@@ -11,9 +11,9 @@ from tests.builders import prepared as baseline
 from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
+from tolalloc.reducers.equivalent.model import Status
 from tolalloc.reducers.equivalent.outputs import forces, radial_clearance
 from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse

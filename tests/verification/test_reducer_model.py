@@ -19,9 +19,8 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.kernel import KernelResponse, StiffnessResponse
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
-from tolalloc.reducers.response.stiffness import StiffnessResponse
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 

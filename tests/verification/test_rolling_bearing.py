@@ -12,11 +12,16 @@ from tests.validation_manual import shown
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.reducer.bearings import BallBearing, RollerBearing
+from tolalloc.reducers.reducer.design import at_torque, compliances, interface_forces
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer, with_stiffness
-from tolalloc.reducers.reducer.rolling_bearing import BallBearing, RollerBearing
-from tolalloc.reducers.reducer.series import at_torque, compliances, interface_forces
-from tolalloc.reducers.reducer.shafts import Crankshaft, bore_flexibility, shaft_flexibility
-from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness, Material
+from tolalloc.reducers.reducer.stiffness import (
+    Crankshaft,
+    IdentifiedStiffness,
+    Material,
+    bore_flexibility,
+    shaft_flexibility,
+)
 
 STEEL = Material(elastic_modulus=206e9, poisson_ratio=0.3)
 NEEDLES = RollerBearing(rollers=12, roller_diameter=4e-3, roller_length=10e-3, pitch_diameter=20e-3)

@@ -14,17 +14,16 @@ from tolalloc.exceptions import SolveError, UnknownNameError
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import linear_clearance
 from tolalloc.reducers.cycloid.solvers import LAWS
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_forces
+from tolalloc.reducers.cycloid.solvers.pins import pin_forces
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import both_directions
-from tolalloc.reducers.equivalent.kinematics import Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.scene.places import is_placed, place_of, places_of
-from tolalloc.reducers.scene.scene import Scene, scene_of
+from tolalloc.reducers.scene import Scene, is_placed, place_of, places_of, scene_of
 from tolalloc.reports.picture.blocks import scene_record, values_of
 from tolalloc.reports.picture.pose import Pose
 

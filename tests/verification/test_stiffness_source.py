@@ -19,10 +19,10 @@ from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.response.stiffness import (
+from tolalloc.reducers.response.kernel import (
     NAME,
     SEEN,
+    KernelResponse,
     StiffnessResponse,
     stiffness_source,
 )

@@ -15,7 +15,7 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Response
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.stand_ins import ContactCandidate, Corrected, CurveCandidate, corrected
+from tolalloc.reducers.surrogates import ContactCandidate, Corrected, CurveCandidate, corrected
 from tolalloc.reports.tellers.ranking import chosen_surrogate
 from tolalloc.reports.tellers.ranking_tables import quantile_name, shortfalls, surrogate_table
 from tolalloc.sensitivity.surrogate.regression import (

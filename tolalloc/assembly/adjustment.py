@@ -25,7 +25,7 @@ from tolalloc.assembly.tolerances import (
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 

@@ -23,10 +23,9 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
-from tolalloc.reducers.equivalent.answers import OUTCOMES
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import OUTCOMES, EquivalentModel
+from tolalloc.reducers.reducer.design import at_torque
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.series import at_torque
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord

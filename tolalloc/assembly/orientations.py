@@ -21,12 +21,10 @@ from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.line_load import ContactPattern, contact_pattern, peak_line_load, unit_pressure
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.equivalent.outputs import ContactPattern, Solved, contact_pattern, peak_line_load, unit_pressure
+from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.series import at_torque
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import Answer, OutputsResponse, Reading
 
@@ -47,7 +45,7 @@ class TransmissionCurves:
     line_load: Float[np.ndarray, "sample angle"]  # Largest line load of pins and teeth [N/m]
     pressure: Float[np.ndarray, "sample angle"]  # Largest Hertz pressure of pins and teeth [Pa]
     pins_in_contact: Float[np.ndarray, "sample angle"]  # Pins that carry load, all discs [-]
-    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.reducers.equivalent.answers.Status` [-]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.reducers.equivalent.model.Status` [-]
 
 
 def transmission_curves(

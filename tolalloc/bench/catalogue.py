@@ -12,12 +12,10 @@ import numpy as np
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
-from tolalloc.reducers.equivalent.perfect import exact_loop
-from tolalloc.reducers.reducer.design import Catalogue, Reducer
-from tolalloc.reducers.reducer.rolling_bearing import RollingBearing
-from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.equivalent.perfect import exact_loop, twist_shares
+from tolalloc.reducers.reducer.bearings import RollingBearing
+from tolalloc.reducers.reducer.design import Catalogue, Reducer, at_torque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.rigidity import twist_shares
 from tolalloc.reports.answer import Answer
 from tolalloc.reports.document import Section
 from tolalloc.reports.header import Header

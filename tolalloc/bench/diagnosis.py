@@ -31,7 +31,7 @@ from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
-from tolalloc.reducers.equivalent.answers import OUTCOMES
+from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reports.header import Header

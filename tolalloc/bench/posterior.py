@@ -18,7 +18,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE
-from tolalloc.reducers.equivalent.answers import Equilibria
+from tolalloc.reducers.equivalent.model import Equilibria
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.chunks import map_chunks
 

@@ -14,9 +14,8 @@ from tolalloc.bench.parameters import BIAS, TORQUE, Parameter, box, values_at
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.answers import Derivatives
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel
+from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.sensitivity.surrogate.regression import BoxPolynomial, fit_box_polynomial
 

@@ -134,7 +134,7 @@ def announce_compilation(room: str = "equivalent") -> None:
     """Say what the next minute is spent on where a room of this version has not run on this machine before."""
     from tolalloc.running.compiled import is_kept
 
-    module, lasts = {"equivalent": ("turn", "some twenty seconds"), "cycloid": ("distance", "some seconds")}[room]
+    module, lasts = {"equivalent": ("turn", "some twenty seconds"), "cycloid": ("pins", "some seconds")}[room]
     if not is_kept(module):
         note(f"Compiling the kernel for this machine: {lasts}, once.", dim=True)
 

@@ -29,8 +29,7 @@ from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.files import ReducerRecord, load_reducer
-from tolalloc.reducers.reducer.stiffness_records import IdentifiedStiffnessRecord
+from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
 from tolalloc.reducers.reducer.unit_file import UnitRecord
 
 

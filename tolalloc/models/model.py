@@ -105,7 +105,7 @@ class ResponseWithDerivatives(Protocol):
 class KeepsTables(Protocol):
     """What keeps tables, and makes them again when they are needed."""
 
-    def put_away(self) -> None:
+    def release(self) -> None:
         """Let go of the tables."""
         ...
 
@@ -264,7 +264,7 @@ class Model(ABC):
         """Return what is counted of some random units when a study is checked, units in the names."""
         return {}
 
-    def put_away(self) -> None:  # noqa: B027
+    def release(self) -> None:  # noqa: B027
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
 
 

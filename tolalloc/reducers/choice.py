@@ -16,12 +16,11 @@ from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
 from tolalloc.reducers.equivalent.model import EquivalentModel, remembered_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
-from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
-from tolalloc.reducers.reducer.series import at_torque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.reducers.response.kernel import KernelResponse

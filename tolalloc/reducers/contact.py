@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.assessment import Assessment, assess, pin_moment
-from tolalloc.reducers.equivalent.line_load import peak_line_load, unit_pressure
-from tolalloc.reducers.equivalent.outputs import Solved, load_share
+from tolalloc.reducers.cycloid.loaded_contact import Assessment, assess, pin_moment
+from tolalloc.reducers.equivalent.outputs import Solved, load_share, peak_line_load, unit_pressure
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.reducer.design import Reducer
 

@@ -17,23 +17,27 @@ from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
-from tolalloc.reducers.equivalent.perfect import exact_loop
-from tolalloc.reducers.equivalent.preload import preload
+from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.reducer.unit_file import BuiltUnit
-from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.response.loop_derivatives import DIFFERENTIABLE, loop_derivatives
+from tolalloc.reducers.response.kernel import (
+    SEEN,
+    KernelResponse,
+    OutputsWithStiffness,
+    StiffnessResponse,
+    stiffness_source,
+)
 from tolalloc.reducers.response.outputs import (
+    DIFFERENTIABLE,
     WITH_FRICTION,
     OutputsResponse,
     limited_outputs,
+    loop_derivatives,
     readings_of,
     wave_outputs,
     with_orders,
 )
-from tolalloc.reducers.response.stiffness import SEEN, OutputsWithStiffness, StiffnessResponse, stiffness_source
-from tolalloc.reducers.rigidity import rated_pin_force
 from tolalloc.reducers.settings import clearance_settings, torque_condition
 from tolalloc.running.chunks import Mapper
 
@@ -184,9 +188,9 @@ class ReducerModel(Model):
         """Return the model whose kernel has its chunks solved by a mapper."""
         return replace(self, kernel=replace(self.kernel, mapper=mapper))
 
-    def put_away(self) -> None:
+    def release(self) -> None:
         """Let go of the kernel's tables."""
-        self.kernel.put_away()
+        self.kernel.release()
 
     @property
     def conditions(self) -> Mapping[str, float | str]:
@@ -263,7 +267,7 @@ class ReducerModel(Model):
 
     def stand_ins(self) -> tuple[Any, ...]:
         """Return the contact at fewer angles and, for few columns, a regression of the curve."""
-        from tolalloc.reducers.stand_ins import ContactCandidate, CurveCandidate
+        from tolalloc.reducers.surrogates import ContactCandidate, CurveCandidate
 
         contact = tuple(ContactCandidate(kernel=self.kernel, angles=angles) for angles in _ANGLES)
         return contact if len(self.columns) > _MOST_COLUMNS else (*contact, CurveCandidate(kernel=self.kernel))

@@ -28,13 +28,11 @@ from tolalloc.reducers.dynamics.prototype import RIGID, TimeCourse, TimeSteps, p
 from tolalloc.reducers.dynamics.prototype import engine as multibody_engine
 from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
 from tolalloc.reducers.dynamics.speeds import modes
-from tolalloc.reducers.equivalent.answers import Status
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import forces
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.series import at_torque
 from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.running.progress import Progress
 

@@ -9,27 +9,23 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import SolveError
-from tolalloc.reducers.equivalent.answers import Equilibria, Extremes, Status, count_statuses
-from tolalloc.reducers.equivalent.attribution import Attribution, attribute
-from tolalloc.reducers.equivalent.friction_loop import FrictionLoop, friction_loop
 from tolalloc.reducers.equivalent.hysteresis import (
     LOOP_ANGLES,
     LOST_MOTION,
     TURN_ANGLES,
+    FrictionLoop,
     HysteresisLoop,
     both_directions,
+    friction_loop,
     hysteresis_loop,
+    own_load_loop,
 )
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Orders, Solved, order_spectrum
-from tolalloc.reducers.equivalent.own_loads import own_load_loop
-from tolalloc.reducers.equivalent.perfect import exact_unit
-from tolalloc.reducers.equivalent.preload import Preload, preload
-from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Extremes, Status, count_statuses
+from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, order_spectrum
+from tolalloc.reducers.equivalent.perfect import Preload, exact_unit, preload, rated_pin_force
+from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.unit_file import BuiltUnit
-from tolalloc.reducers.rigidity import rated_pin_force
 
 
 @dataclass(frozen=True, kw_only=True)

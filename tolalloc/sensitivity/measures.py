@@ -248,7 +248,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         with record.stage("zones alone"):
             inverse = measures.inverse(choice)
             if isinstance(choice.chosen, KeepsTables):
-                choice.chosen.put_away()
+                choice.chosen.release()
     return RankingResult(
         model=model,
         errors=asked.errors,

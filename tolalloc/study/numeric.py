@@ -20,9 +20,8 @@ from jaxtyping import Float, Int
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.files import read_toml, shipped_or_path, validated
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord
-from tolalloc.reducers.reducer.series import at_torque
 
 __all__ = [
     "Clearance",

@@ -249,7 +249,7 @@ def run(
 
         document = _document(prepared, answers)
         if study.model is not None:
-            prepared.model.put_away()  # drawing the figures takes as much memory
+            prepared.model.release()  # drawing the figures takes as much memory
         for answer in answers.values():
             answer.add_files(beside)
         write_document(document, beside)

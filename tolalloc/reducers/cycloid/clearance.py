@@ -11,8 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE
-from tolalloc.reducers.cycloid.mesh import Angles, normals
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.tooth_profile import Angles, ToothProfile, normals
 from tolalloc.reducers.reducer.design import CycloidStage, Modification
 
 _ROUNDING = 1e-13  # clearance that counts as none [m]
@@ -72,7 +71,7 @@ def exact_clearance(
     profiles: Sequence[ToothProfile], pin_angle: Float[np.ndarray, " pin"], rotation: Rotation = 0.0
 ) -> Float[np.ndarray, "profile pin"]:
     """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m]."""
-    from tolalloc.reducers.cycloid.solvers.distance import FIELDS, pin_clearances
+    from tolalloc.reducers.cycloid.solvers.pins import FIELDS, pin_clearances
 
     designs, clearance = np.empty((len(profiles), FIELDS)), np.empty((len(profiles), pin_angle.size))
     for row, profile in zip(designs, profiles, strict=True):

@@ -1,20 +1,102 @@
-"""Pins and teeth under torque: rotation, forces, loaded zone and pressure, at every phase of the pins."""
+"""Pins and teeth under torque: rotation, forces, loaded zone and pressure, at every phase of the pins.
+
+How stiff one pin against one tooth is: what every contact law takes, along the whole tooth.
+
+Loaded contact by Li Lixing's linear method and by the contact law at every pin.
+
+What a modification does: clearance, pins that carry, forces, pressure and backlash, in one record.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi
+from math import exp, pi
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.exceptions import InputError
-from tolalloc.reducers.cycloid.clearance import FLANK, Clearance, Gap, clearance_of, gap_of
-from tolalloc.reducers.cycloid.contact_stiffness import peak_pressure
-from tolalloc.reducers.cycloid.mesh import normals, pin_angles
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.cycloid.clearance import FLANK, LARGE, Clearance, Gap, clearance_of, gap_of, is_large
+from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
+from tolalloc.reducers.cycloid.solvers.pins import pin_forces
+from tolalloc.reducers.cycloid.tooth_profile import (
+    Angles,
+    ToothProfile,
+    flank_angle,
+    normals,
+    path_curvature,
+    pin_angles,
+    require_sound,
+)
+from tolalloc.reducers.reducer.design import CycloidStage, Reducer
+from tolalloc.reducers.reducer.stiffness import Stiffness
+
+APPROACH = 2.0 / 3.0
+"""Constant of the approach F/c·(ln(cL/F) + 2/3) of pin and tooth: Roark's and Li Lixing's, who write it
+2/3 + ln(16·r·ρ/(2a)²) with Hertz's half width a [-]."""
+
+
+def contact_stiffness(
+    stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles
+) -> tuple[Float[np.ndarray, "*angles"], Float[np.ndarray, "*angles"]]:
+    """Return what `pin_force` takes of pins against the teeth that they meet.
+
+    First of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]. Then ln(λ/1 m)
+    of the logarithmic law [-].
+    """
+    contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
+    if law == "table2":
+        contact = pin_contact_table2(stage, stiffness.pin_contact, pin_angle)
+    log_length = np.log(equivalent_length(stage, pin_angle))
+    if law == "logarithmic":
+        # A spring in series adds F/k to F/c·ln(cλ/F), which a longer λ does as well.
+        log_length = log_length + 2.0 * stiffness.pin_contact / stiffness.pin_bending
+    else:
+        contact = contact / (1.0 + contact / stiffness.pin_bending)
+    return contact, log_length
+
+
+def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return K_djk along the tooth: C(ρ−r)/(ρ+r) on the concave part, C on the convex part [N/m].
+
+    With the curvature κ of the pin centre's path it is C/(1 + 2rκ). The printed formula with its signed curvature is
+    singular or negative on the convex part for pin radii above about 2.5 mm on an RV-20E, so only the concave part
+    follows the print.
+
+    References
+    ----------
+    liu2020, Table 2 (K_djk).
+    """
+    return np.asarray(convex_stiffness / (1 + 2 * stage.pin_radius * np.maximum(path_curvature(stage, pin_angle), 0.0)))
+
+
+def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return λ = L·exp(2/3) of the approach F/c·ln(cλ/F), theory page equation (30) [m].
+
+    L is the radius of curvature of the path of the pin's centre on the disc: the flank's radius plus r_rp where the
+    flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
+    alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length
+    is an assumption.
+    """
+    bend = np.abs(path_curvature(stage, pin_angle))
+    return np.asarray(exp(APPROACH) / np.maximum(bend, 1 / stage.pin_circle_radius))
+
+
+def peak_pressure(
+    stage: CycloidStage, contact_modulus: float, pin_angle: Angles, force: Float[np.ndarray, "*angles"]
+) -> Float[np.ndarray, "*angles"]:
+    """Return Hertz's peak pressure √(F·E*/(πb·R)), R from the pin and the tooth's own curvature where it touches [Pa].
+
+    E* is that of pin and disc, the angle φ that of the pins from the crank direction [rad], the force theirs [N].
+    """
+    path, pin = path_curvature(stage, pin_angle), stage.pin_radius
+    # 1/R = 1/r + 1/ρ with ρ = −1/κ − r of the tooth, convex positive.
+    sum_of_curvatures = 1 / pin - path / (1 + pin * path)
+    return np.asarray(np.sqrt(force * contact_modulus * sum_of_curvatures / (np.pi * stage.face_width)))
+
 
 PAIR_SHARE = 0.55
 """Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
@@ -140,4 +222,272 @@ def loaded(
         pressure=peak_pressure(stage, reducer.contact_modulus, angles, force),
         torque=stage.disc_pitch_radius * (lever * force).sum(axis=2),
         zone=_zones(gap, rotations, closed.first_contact),
+    )
+
+
+_ITERATIONS = 500
+_SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
+
+
+def pressed_linear(
+    discs: PressedDiscs, phase: Float[np.ndarray, " phase"], deflection: float | None = None
+) -> LoadedContact:
+    """Return the contact by Li Lixing's method: forces in proportion to the compressions.
+
+    Without a deflection δ_max [m] it is iterated until it is the approach under the largest force, by the reducer's
+    law with the curvature at φ0.
+
+    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
+
+    Raises
+    ------
+    InputError
+        The deflection reaches no pin.
+    SolveError
+        The iteration does not settle.
+
+    References
+    ----------
+    xi2015, equations (5)–(7); Li Lixing (1984).
+    """
+    stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
+    gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
+    lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
+
+    def shares(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
+        return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
+
+    def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+        return np.asarray(discs.torque / (stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))))
+
+    nearest = np.where(lever > _SHORTEST, distance / np.maximum(lever, _SHORTEST), np.inf).min(axis=(1, 2))
+    if deflection is not None:
+        if deflection <= nearest.max():
+            raise InputError(
+                f"{discs.reducer.name}: a deflection of {deflection / MICROMETRE:.3g} µm reaches no pin; "
+                f"allowed is above {nearest.max() / MICROMETRE:.3g} µm."
+            )
+        depth = np.full(phase.size, deflection)
+        method = "Li Lixing's linear method, deflection given"
+    else:
+        depth = _iterated(discs, nearest, largest_force)
+        method = "Li Lixing's linear method"
+    force = largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth)
+    return loaded(discs, method, phase, depth, force)
+
+
+def _iterated(
+    discs: PressedDiscs,
+    nearest: Float[np.ndarray, " phase"],
+    largest_force: Callable[[Float[np.ndarray, " phase"]], Float[np.ndarray, " phase"]],
+) -> Float[np.ndarray, " phase"]:
+    """Return the deflections that are the approach under their own largest force [m].
+
+    The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
+    middle of what brackets the answer where that mean leaves it and at every third step, as the mean may creep.
+    """
+    low, high = nearest, np.full(nearest.size, np.inf)
+    lever = discs.reducer.cycloid_stage.disc_pitch_radius
+    depth = nearest + _approach(discs.reducer, np.full(nearest.size, discs.torque / lever))
+    for step in range(1, _ITERATIONS + 1):
+        wanted = _approach(discs.reducer, largest_force(depth))
+        if (np.abs(wanted - depth) <= 1e-13 * depth).all() or (high - low <= 1e-15 * depth).all():
+            return np.asarray(depth)
+        low, high = np.where(wanted > depth, depth, low), np.where(wanted > depth, high, depth)
+        mean, middle = 0.5 * (depth + wanted), 0.5 * (low + np.minimum(high, 4 * depth))
+        depth = np.where((low < mean) & (mean < high) & (step % 3 != 0), mean, middle)
+    raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
+
+
+def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+    """Return how far pin and tooth at φ0 approach each other under forces [m]."""
+    stage, stiffness = reducer.cycloid_stage, reducer.stiffness
+    contact, log_length = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
+    if LAWS[stiffness.pin_contact_law] == LINEAR:
+        return np.asarray(force / contact)
+    scale = 2 * contact
+    return np.asarray(force / scale * (np.log(scale / force) + log_length))
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Pins of all phases, pressed by a deflection of the discs."""
+
+    discs: PressedDiscs
+    pin_angle: Float[np.ndarray, "phase pin"]  # Angle φ of the pins of all discs [rad]
+
+    @cached_property
+    def _gap(self) -> Gap:
+        return gap_of(self.discs.profile, self.discs.clearance.exact)
+
+    @cached_property
+    def _lever(self) -> Float[np.ndarray, "phase pin"]:
+        stage = self.discs.reducer.cycloid_stage
+        return np.asarray(stage.disc_pitch_radius * normals(stage.shortening, self.pin_angle).lever)
+
+    @cached_property
+    def _contact(self) -> tuple[Float[np.ndarray, "phase pin"], Float[np.ndarray, "phase pin"]]:
+        reducer = self.discs.reducer
+        return contact_stiffness(reducer.cycloid_stage, reducer.stiffness, self.pin_angle)
+
+    def forces(
+        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
+    ) -> Float[np.ndarray, "some pin"]:
+        """Return the forces of all pins at some phases, each under its own deflection [N]."""
+        reducer, (contact, log_length) = self.discs.reducer, self._contact
+        rotation = self.discs.clearance.rotation + deflection / reducer.cycloid_stage.disc_pitch_radius
+        angles = self.pin_angle[phase]
+        compression = -self._gap(angles, np.repeat(rotation[:, np.newaxis], angles.shape[1], axis=1))
+        law, force = LAWS[reducer.stiffness.pin_contact_law], np.empty(compression.size)
+        pin_forces(law, contact[phase].ravel(), log_length[phase].ravel(), compression.ravel(), force)
+        return force.reshape(compression.shape)
+
+    def torque(
+        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
+    ) -> Float[np.ndarray, " some"]:
+        """Return the torques of the pins on the discs [N·m]."""
+        return np.asarray((self._lever[phase] * self.forces(deflection, phase)).sum(axis=1))
+
+    def deflection(self) -> Float[np.ndarray, " phase"]:
+        """Return the deflections at which the torques balance [m].
+
+        Raises
+        ------
+        InputError
+            A pin would be pressed in by more than its radius.
+        """
+        from scipy.optimize import elementwise
+
+        wanted, deepest = self.discs.torque, self.discs.reducer.cycloid_stage.pin_radius
+        phase = np.arange(len(self.pin_angle))
+        high, short = np.full(phase.size, MICROMETRE), phase
+        while (short := short[self.torque(high[short], short) < wanted]).size:
+            if high[short].max() >= deepest:
+                raise InputError(
+                    f"{self.discs.reducer.name}: torque {wanted:.6g} N·m on the discs is beyond any contact: pins "
+                    f"would be pressed in by more than their radius; allowed is below "
+                    f"{self.torque(high[short], short).min():.3g} N·m."
+                )
+            high[short] = np.minimum(2 * high[short], deepest)
+        found = elementwise.find_root(
+            lambda depth, at: self.torque(depth, at) - wanted,
+            (np.zeros(phase.size), high),
+            args=(phase,),
+            tolerances={"xrtol": 1e-13},
+        )
+        return np.asarray(found.x)
+
+
+def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
+    """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
+
+    Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
+
+    Raises
+    ------
+    InputError
+        The torque would press a pin in by more than its radius.
+    """
+    angles = discs.pin_angles(phase)
+    balance = _Balance(discs, angles.reshape(phase.size, -1))
+    deflection, law = balance.deflection(), discs.reducer.stiffness.pin_contact_law
+    force = balance.forces(deflection, np.arange(phase.size))
+    return loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
+
+
+_ROUNDING = 1e-12  # difference of amounts that counts as none [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment:
+    """One modification under one torque."""
+
+    reducer: Reducer  # The reducer, with the contact law in use
+    torque: float  # Torque on the carrier [N·m]
+    share: float  # Share of it on the more loaded disc [-]
+    profile: ToothProfile  # The ground profile
+    clearance: Clearance  # Clearance in use, linear or exact
+    exact_clearance: Clearance  # Clearance by exact distances, to compare with
+    linear: LoadedContact  # The more loaded disc by Li Lixing's linear method
+    single: LoadedContact  # The more loaded disc by the contact law at every pin
+    together: LoadedContact  # All discs turning by the same angle, their bearings rigid
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before trusting the numbers."""
+        stage, amounts, found = self.reducer.cycloid_stage, self.reducer.modification, []
+        if is_large(stage, amounts):
+            found.append(
+                f"The modification is above {LARGE / MICROMETRE:g} µm, too large for the linear formula: "
+                + ("exact distances were taken." if self.clearance.exact else "ask for exact distances.")
+            )
+        if amounts.shift > amounts.equidistant * stage.flank_ratio + _ROUNDING:
+            found.append(
+                "Δr_rp·√(1−K1²) is below Δr_p: the first contact is not at arccos K1, where Li Lixing's formula "
+                f"closes the gap, and the formula is off by up to {self.clearance.formula_error / MICROMETRE:.2g} µm."
+            )
+        if self.torque > self.reducer.load.rated_torque:
+            found.append(f"The torque is above the rated {self.reducer.load.rated_torque:g} N·m.")
+        return tuple(found)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source prints."""
+        count, law = self.reducer.disc_count, self.reducer.stiffness.pin_contact_law
+        supports = "half grooves" if self.reducer.stiffness.pin_bending == float("inf") else "two supports"
+        return (
+            f"the most loaded of {count} discs carries {self.share:.3g} of the torque ({PAIR_SHARE:g} of two)",
+            f"{law} contact law; the pins rest in {supports}",
+            "no errors: every pin and tooth at its place, discs turning about their centres",
+            "lever of a pin force: that of the exact tooth",
+            *self.reducer.assumptions,
+        )
+
+
+def disc_share(discs: int) -> float:
+    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-]."""
+    return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
+
+
+def pin_moment(reducer: Reducer, torque: float) -> float:
+    """Return the moment of all pin forces about the centres of their discs under a torque on the carrier [N·m].
+
+    The housing holds what the sun does not, T·(1 − 1/i). All pin forces pass through the pole, e·zp from the housing's
+    centre and e·zc from the disc's, so of that moment zc/zp is left about the disc.
+    """
+    stage = reducer.cycloid_stage
+    return torque * (1.0 - 1.0 / reducer.ratio) * stage.disc_teeth / stage.pin_count
+
+
+def assess(
+    reducer: Reducer, torque: float, *, law: str = "logarithmic", exact: bool | None = None, phases: int = 72
+) -> Assessment:
+    """Return what the reducer's modification does under a torque.
+
+    Pins bend if the reducer says so; the torque has either sign [N·m], the law is one of
+    `tolalloc.reducers.cycloid.solvers.LAWS`, the phases lie within one pin pitch. Distances are exact by default
+    where the
+    modification is too large for the linear formula.
+
+    Raises
+    ------
+    InputError
+        The profile cannot be ground, interferes with the pins, or the torque is beyond any contact.
+    """
+    reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
+    profile, torque = ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification), abs(torque)
+    require_sound(profile, reducer.name)
+    share, phase = disc_share(reducer.disc_count), default_phases(reducer, phases)
+    one = PressedDiscs(reducer=reducer, torque=share * torque, exact=exact)
+    every = PressedDiscs(reducer=reducer, torque=pin_moment(reducer, torque), discs=reducer.disc_count, exact=exact)
+    return Assessment(
+        reducer=reducer,
+        torque=torque,
+        share=share,
+        profile=profile,
+        clearance=one.clearance,
+        exact_clearance=one.clearance if one.clearance.exact else clearance_of(profile, exact=True),
+        linear=pressed_linear(one, phase),
+        single=pressed(one, phase),
+        together=pressed(every, phase),
     )

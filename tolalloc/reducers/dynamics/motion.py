@@ -12,8 +12,7 @@ from jaxtyping import Float, Int
 from numpy.polynomial import Polynomial
 
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
-from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 
 BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}

@@ -17,13 +17,13 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.reducers.cycloid.contact_stiffness import contact_stiffness
+from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.solvers import LAWS
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.dynamics.motion import Damping, Inertia
 from tolalloc.reducers.dynamics.simulation import Progress, untold
 from tolalloc.reducers.dynamics.solvers.pin_forces import Mesh, fill_forces, fill_pin_forces
-from tolalloc.reducers.equivalent.kinematics import Positions
+from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.design import Reducer
 
 _KNOTS = 513  # of a smooth step: its straight pieces miss the cubic by less than a millionth of the step

@@ -19,8 +19,8 @@ from tolalloc.reducers.equivalent.condensation import (
     retained_coordinates,
     rotation_scale,
 )
-from tolalloc.reducers.equivalent.kinematics import Coordinates, Positions
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.design import Reducer
 
 _STEPS_AT_ONCE = 512
@@ -200,12 +200,12 @@ class Simulated:
     output_acceleration: Float[np.ndarray, "sample time"]
     # Torque that drives the sun gear; times its speed it is the input power. The sun's own inertia is not in it [N·m].
     input_torque: Float[np.ndarray, "sample time"]
-    # Number of pins that carry load, `tolalloc.reducers.equivalent.answers.Status`, unbalanced over largest force [-]
+    # Number of pins that carry load, `tolalloc.reducers.equivalent.model.Status`, unbalanced over largest force [-]
     pins_in_contact: UInt16[np.ndarray, "sample time disc"]
     status: UInt8[np.ndarray, "sample time"]
     residual: Float[np.ndarray, "sample time"]
     # At the times asked for: deviations q from the nominal motion, in the order of
-    # `tolalloc.reducers.equivalent.kinematics.Coordinates`, and their derivatives [m, rad, and per s, per s²]
+    # `tolalloc.reducers.equivalent.springs.Coordinates`, and their derivatives [m, rad, and per s, per s²]
     displacement: Float[np.ndarray, "sample observed coordinate"]
     velocity: Float[np.ndarray, "sample observed coordinate"]
     acceleration: Float[np.ndarray, "sample observed coordinate"]

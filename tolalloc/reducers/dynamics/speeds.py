@@ -11,13 +11,11 @@ from jaxtyping import Bool, Float, Int, UInt8
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reducers.dynamics.motion import Damping, Inertia, Integrator, SpeedProfile, motion_of
 from tolalloc.reducers.dynamics.simulation import simulate
-from tolalloc.reducers.equivalent.answers import Status
 from tolalloc.reducers.equivalent.condensation import bilateral_groups
-from tolalloc.reducers.equivalent.kinematics import Positions
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.interfaces import pin_contact
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
-from tolalloc.reducers.equivalent.pins import pin_contact
-from tolalloc.reducers.equivalent.springs import vector_columns
+from tolalloc.reducers.equivalent.springs import Positions, vector_columns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +25,7 @@ class Modes:
     carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
     # Natural frequencies; the first is zero but for rounding where no pin carries [Hz]
     frequency: Float[np.ndarray, "angle mode"]
-    # Change of every coordinate of `tolalloc.reducers.equivalent.kinematics.Coordinates`, of any sign, such that
+    # Change of every coordinate of `tolalloc.reducers.equivalent.springs.Coordinates`, of any sign, such that
     # every mode
     # has unit modal mass [1/√kg, rotations rad/√(kg·m²)]
     shape: Float[np.ndarray, "angle mode coordinate"]
@@ -166,7 +164,7 @@ class OrdersAgainstSpeed:
     unsettled: Float[np.ndarray, "sample speed"]
     status: UInt8[
         np.ndarray, "sample speed"
-    ]  # Worst value of `tolalloc.reducers.equivalent.answers.Status` of all steps [-]
+    ]  # Worst value of `tolalloc.reducers.equivalent.model.Status` of all steps [-]
 
 
 def orders_against_speed(

@@ -15,12 +15,12 @@ from tolalloc.reducers.equivalent.solvers.records import CONVERGED, AngleSearch,
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.running.compiled import compile_elsewhere, is_kept
 
-_FILES = ("extremes", "interpolation", "lending", "refinement", "searches")
+_FILES = ("extremes", "workspace")
 
 
 def compile_ahead(discs: int) -> None:
     """Let a second process compile the search for a number of discs, unless it is kept."""
-    if not is_kept("refinement"):
+    if not is_kept("extremes"):
         modules = {f"tolalloc.reducers.equivalent.solvers.{name}" for name in _FILES}
         compile_elsewhere(modules, "tolalloc.reducers.equivalent.compiled_ahead", str(discs))
 

@@ -13,10 +13,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.columns import Columns, columns_of
-from tolalloc.reducers.equivalent.interfaces import carrier_support, crank_carrier, crank_disc, gear_mesh, sun_support
-from tolalloc.reducers.equivalent.kinematics import HARMONICS, Coordinates, Positions
-from tolalloc.reducers.equivalent.pins import PinContact, dense_rows, pin_contact
-from tolalloc.reducers.equivalent.springs import SpringGroup, harmonic_waves
+from tolalloc.reducers.equivalent.interfaces import (
+    PinContact,
+    carrier_support,
+    crank_carrier,
+    crank_disc,
+    dense_rows,
+    gear_mesh,
+    pin_contact,
+    sun_support,
+)
+from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 
 GROUPS: tuple[Callable[[Positions], SpringGroup], ...] = (

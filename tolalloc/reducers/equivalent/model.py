@@ -1,22 +1,28 @@
-"""The equivalent model of a reducer: errors in, equilibria and transmission error out."""
+"""The equivalent model of a reducer: errors in, equilibria and transmission error out.
+
+What the kernel answers: how a solution ended, equilibria over a turn, extremes, derivatives.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from functools import cached_property, lru_cache
 from math import pi
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.equivalent.answers import Derivatives, Equilibria, Extremes
 from tolalloc.reducers.equivalent.columns import Columns
 from tolalloc.reducers.equivalent.condensation import CondensedAngles, condense, error_columns
-from tolalloc.reducers.equivalent.kinematics import HARMONICS
 from tolalloc.reducers.equivalent.solvers.records import (
     CONVERGED,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    NOT_RESISTED,
     OUT_OF_RANGE,
     AngleSearch,
     SolvedDerivatives,
@@ -24,8 +30,90 @@ from tolalloc.reducers.equivalent.solvers.records import (
     SolverDesign,
     design_of,
 )
-from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.reducer.design import Reducer, at_torque
+
+
+class Status(IntEnum):
+    """Outcome of an equilibrium; the larger, the worse."""
+
+    CONVERGED = CONVERGED
+    NOT_CONVERGED = NOT_CONVERGED
+    NOT_RESISTED = NOT_RESISTED
+    NOT_FINITE = NOT_FINITE
+    OUT_OF_RANGE = OUT_OF_RANGE
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in words."""
+        return {
+            Status.CONVERGED: "equilibrium found",
+            Status.NOT_CONVERGED: "no equilibrium within the allowed number of Newton steps",
+            Status.NOT_RESISTED: "no pin resists the torque in its direction",
+            Status.NOT_FINITE: "an error value is not a finite number",
+            Status.OUT_OF_RANGE: "an output error beyond a tenth of the pin pitch, too far for small displacements",
+        }[self]
+
+
+OUTCOMES: Mapping[int, str] = {int(item): item.sentence for item in Status}
+"""Status → outcome in words."""
+
+
+def count_statuses(status: Integer[np.ndarray, "..."]) -> Mapping[str, int]:
+    """Return how often each outcome occurred, by its sentence; every outcome is listed."""
+    return {item.sentence: int(np.count_nonzero(status == item)) for item in Status}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibria:
+    """Equilibria of samples at carrier angles: what every output is read from."""
+
+    # The nominal design, its error columns and the values that they move, its condensed tables at the angles
+    reducer: Reducer
+    columns: Columns
+    tables: CondensedAngles
+    errors: Float[np.ndarray, "sample column"]  # Deviations in the order of the model's columns [m, angles rad]
+    torque: float  # Torque on the carrier [N·m]
+    carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
+    transmission_error: Float[np.ndarray, "sample angle"]  # Carrier rotation beyond θc, output side [rad]
+    # Coordinates that pins and play touch, the discs' x, y, r_d·θ first [m]
+    retained: Float[np.ndarray, "sample angle coordinate"]
+    status: UInt8[np.ndarray, "sample angle"]  # Values of `tolalloc.reducers.equivalent.model.Status` [-]
+    residual: Float[np.ndarray, "sample angle"]  # Largest component of the unbalanced force over the largest force [-]
+    pins_in_contact: UInt16[np.ndarray, "sample angle"]  # Number of pins that carry load, all discs [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extremes:
+    """Largest and smallest transmission error of each sample over one output turn."""
+
+    # Extremes of the transmission error, output side [rad]
+    largest: Float[np.ndarray, " sample"]
+    smallest: Float[np.ndarray, " sample"]
+    carrier_angle: Float[np.ndarray, "sample 2"]  # Where they occur [rad]
+    remaining: Float[np.ndarray, " sample"]  # What still finer angles may add to the peak-to-peak, an estimate [rad]
+    # Equilibria solved; worst status and largest residual over the largest force of the sample's angles [-]
+    solves: Int[np.ndarray, " sample"]
+    status: UInt8[np.ndarray, " sample"]
+    residual: Float[np.ndarray, " sample"]
+
+    @property
+    def peak_to_peak(self) -> Float[np.ndarray, " sample"]:
+        """Peak-to-peak transmission error [rad]."""
+        return np.asarray(self.largest - self.smallest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivatives:
+    """Exact derivatives of an output, sample by sample or angle by angle."""
+
+    # By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)]
+    by_error: Float[np.ndarray, "item column"]
+    by_torque: Float[np.ndarray, " item"]
+    # By the relative change of each stiffness of `tolalloc.reducers.reducer.stiffness.Stiffness` [rad]
+    by_stiffness: dict[str, Float[np.ndarray, " item"]]
+    status: UInt8[np.ndarray, " item"]  # Worst status of the equilibria behind them [-]
+
 
 _FEW_ANGLES = 256
 """Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
@@ -95,7 +183,7 @@ class EquivalentModel:
         angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
         return angle, self.tables_at(angle)
 
-    def put_away(self) -> None:
+    def release(self) -> None:
         """Let go of the tables; they are made again when they are needed."""
         for name in ("_tables", "_turn"):
             vars(self).pop(name, None)

@@ -1,18 +1,29 @@
-"""The reducer without part errors, its bearings yielding: the one answer on forces that every command gives."""
+"""The reducer without part errors, its bearings yielding: the one answer on forces that every command gives.
+
+Units whose parts press each other before any torque acts: forces of the pins, and what turning them takes.
+
+How stiff a reducer is: against its catalogue, and which part yields how much of the twist.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop, sliding_ways
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved
-from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.series import at_torque
+from tolalloc.reducers.equivalent.outputs import Solved, forces
+from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 PHASES = 72
 """Phases of one pin pitch at which a reducer without errors is solved, for forces over the turn [-]."""
@@ -46,3 +57,107 @@ def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
     return Solved.of(model.equilibria(exact_unit(model), torque, span * np.arange(PHASES) / PHASES))
+
+
+PRELOAD_ASSUMPTION = "friction torque of the pins without load: discs sliding on pins alone, largest over the turn"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preload:
+    """What presses in a unit without torque: under the 0.01 % of the rated torque at which backlash is read."""
+
+    pin_force: Float[np.ndarray, " sample"]  # Largest force of a pin over one output turn [N]
+    friction_torque: Float[np.ndarray, " sample"]  # Largest of the pins over the turn, at the output [N·m]
+    status: UInt8[np.ndarray, " sample"]  # Worst status of the turn [-]
+
+
+def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Preload:
+    """Return what presses in every unit without torque.
+
+    A disc turns against the housing about its pole, so at a pin it slides with the output speed times the distance of
+    contact and pole, R_p·√S − r_rp; friction torque µ·ΣF·(R_p·√S − r_rp).
+    """
+    reducer = model.reducer
+    torque = -BACKLASH * reducer.load.rated_torque
+    solved = model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES)
+    found = forces(solved).pins
+    ways = sliding_ways(reducer, TURN_ANGLES)
+    return Preload(
+        pin_force=np.asarray(found.max(axis=(1, 2, 3))),
+        friction_torque=reducer.friction.pins * np.einsum("sadp,adp->sa", found, ways).max(axis=1),
+        status=np.asarray(solved.status.max(axis=1)),
+    )
+
+
+FACTOR = 1.5
+"""Model over catalogue, or catalogue over model, from which on a difference is a warning [-]."""
+
+USUAL_TWIST = 3.6
+"""Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
+
+_PER_MICROMETRE = 1e-6  # N/µm per N/m
+_INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
+
+
+def rated_pin_force(reducer: Reducer) -> float:
+    """Return the largest force of a pin of the perfect reducer under its rated torque [N]."""
+    return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
+
+
+def twist_shares(reducer: Reducer) -> pd.DataFrame:
+    """Return which part yields how much of the twist of the perfect reducer at rated torque.
+
+    By virtual work T·θ is the sum of force times way over all springs, each interface divided among its parts by their
+    compliances; what is left is that of pins and teeth, their clearance included. Mean over a pin pitch.
+    """
+    import pandas as pd
+
+    perfect = perfect_reducer(reducer, -reducer.load.rated_torque)
+    solved, found = perfect.equilibria, perfect.forces
+    own, torque = solved.reducer, solved.torque
+    work = torque * float(solved.transmission_error.mean())
+    rows, left, parts = [], 1.0, compliances(own, torque)
+    for interface in _INTERFACES:
+        stiffness = getattr(own.stiffness, interface)
+        share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / work)
+        left -= share
+        plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}
+        for name, compliance in parts.get(interface, plain).items():
+            part = 100.0 * share * compliance * stiffness
+            rows.append((name, round(part, 2), round(_PER_MICROMETRE / compliance, 1)))
+    rows.append(("pins and teeth, with their clearance", round(100.0 * left, 2), np.nan))
+    frame = pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/µm]"])
+    return frame.sort_values("share of the twist [%]", ascending=False, ignore_index=True)
+
+
+def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
+    """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
+
+    The sample of the loop is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
+    what all sizes of catalogues have in common.
+    """
+    stated = reducer.catalogue
+    rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
+    if stated is None:
+        twist = reducer.load.rated_torque / rigidity
+        if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
+            return "", ()
+        return "", (
+            f"The perfect reducer twists by {twist:.2g}′ under its rated torque; sizes in catalogues twist by 3 to 4′. "
+            "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
+            "with.",
+        )
+    wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
+    sentence = (
+        f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
+        f"{wanted:.3g} ({100 * (rigidity / wanted - 1):+.0f} %), the lost motion {lost:.2g}′ where it allows "
+        f"{largest:.2g}′."
+    )
+    warnings = []
+    if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
+        off = rigidity / wanted
+        times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
+        warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
+    if lost > largest:
+        warnings.append(f"The perfect reducer's lost motion of {lost:.2g}′ is above the catalogue's {largest:.2g}′.")
+    return sentence, tuple(warnings)

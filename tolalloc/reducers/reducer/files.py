@@ -1,21 +1,33 @@
-"""Reducers and identified stiffnesses as TOML files: presets by name and the user's own."""
+"""Reducers and identified stiffnesses as TOML files: presets by name and the user's own.
+
+The stiffness in a reducer file and in a file of identified stiffnesses: what may be written there.
+"""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import replace
-from math import pi
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import inf, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import read_text
 from tolalloc.reading.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE, MILLIMETRE
+from tolalloc.reducers.reducer.bearings import (
+    BallBearing,
+    Friction,
+    FrictionDimensions,
+    Part,
+    RollerBearing,
+    RollingBearing,
+)
 from tolalloc.reducers.reducer.design import (
     Catalogue,
     Clearances,
@@ -24,12 +36,260 @@ from tolalloc.reducers.reducer.design import (
     Load,
     Modification,
     Reducer,
+    at_torque,
 )
-from tolalloc.reducers.reducer.friction import Friction
-from tolalloc.reducers.reducer.rolling_bearing import RollingBearing
-from tolalloc.reducers.reducer.series import at_torque
-from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness, Material, checked_correlation
-from tolalloc.reducers.reducer.stiffness_records import IDENTIFIABLE, IdentifiedStiffnessRecord, StiffnessRecord
+from tolalloc.reducers.reducer.stiffness import (
+    TAPER_ANGLE,
+    Crankshaft,
+    IdentifiedStiffness,
+    Material,
+    Pillars,
+    Stiffness,
+    ball_bearing,
+    bore_flexibility,
+    checked_correlation,
+    contact_modulus,
+    gear_mesh,
+    largest_preload,
+    line_contact,
+    pin_bending,
+    roller_bearing,
+    shaft_support,
+)
+
+NewtonPerMetre = Annotated[float, Field(ge=1e4, le=1e13)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaft:
+    """Dimensions from which Table 2 of liu2020 gives the support of the sun."""
+
+    diameter: Annotated[float, Field(alias="diameter_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
+    length: Annotated[float, Field(alias="length_mm", gt=0, le=2000), times(MILLIMETRE)]  # [m]
+
+    def __post_init__(self) -> None:
+        if self.length < self.diameter:
+            raise ValueError(
+                f"length_mm is {self.length / MILLIMETRE:g}; allowed is diameter_mm = {self.diameter / MILLIMETRE:g} "
+                "or more, because the formula bends the shaft and knows no shear"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rollers:
+    """Roller length times number of rollers, from which Table 2 of liu2020 gives a bearing's stiffness."""
+
+    loaded_length: Annotated[float, Field(alias="loaded_length_mm", gt=0, le=10000), times(MILLIMETRE)]  # [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearPair:
+    """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness.
+
+    Virtual teeth that are not given are those of the first stage, as spur gears have them; helical gears have more.
+    """
+
+    contact_ratio: Annotated[float, Field(ge=1, le=2.5)]
+    face_width: Annotated[float, Field(alias="face_width_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
+    sun_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
+    planet_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
+
+    def of(self, stage: FirstStage) -> GearPair:
+        """Return the data with the virtual teeth of every gear.
+
+        Raises
+        ------
+        ValueError
+            Fewer virtual teeth than the gear has.
+        """
+        found = {}
+        for gear, teeth in (("sun", stage.sun_teeth), ("planet", stage.planet_teeth)):
+            name = f"{gear}_virtual_teeth"
+            found[name] = float(teeth) if getattr(self, name) is None else getattr(self, name)
+            if found[name] < teeth:
+                raise ValueError(
+                    f"stiffness.gear_mesh.{name} is {found[name]:g}; allowed is {gear}_teeth = {teeth} or more, and "
+                    "nothing for spur gears"
+                )
+        return replace(self, **found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balls:
+    """Data of the carrier's angular-contact bearing from which Hertz's contact gives its stiffness."""
+
+    ball_radius: Annotated[float, Field(alias="ball_radius_mm", ge=0.1, le=50), times(MILLIMETRE)]  # [m]
+    balls: Annotated[int, Field(ge=1, le=1000)]
+    preload: Annotated[float, Field(alias="preload_n", gt=0, le=1e7)]  # [N]
+
+
+def _preloaded(ball_radius: float, balls: int, preload: float, **elastic: float) -> float:
+    """Return the stiffness of a ball bearing unless the preload is beyond what the balls carry as Hertz says."""
+    largest = largest_preload(ball_radius, balls, **elastic)
+    if preload > largest:
+        raise ValueError(
+            f"stiffness.carrier_bearing.preload_n is {preload:g}; allowed is up to {largest:.4g}, where the contacts "
+            "are a tenth as wide as the balls"
+        )
+    return ball_bearing(ball_radius, balls, preload, **elastic)
+
+
+FORMULAS: Mapping[str, Callable[..., float]] = {
+    "sun_support": lambda elastic_modulus, poisson_ratio, **own: shaft_support(**own, elastic_modulus=elastic_modulus),  # noqa: ARG005
+    "gear_mesh": lambda elastic_modulus, poisson_ratio, **own: gear_mesh(**own, elastic_modulus=elastic_modulus),  # noqa: ARG005
+    "crank_disc_bearing": roller_bearing,
+    "crank_carrier_bearing": lambda **own: roller_bearing(**own, contact_angle=TAPER_ANGLE),
+    "carrier_bearing": _preloaded,
+}
+"""Stiffness → its formula, of the dimensions in the file and the elastic constants of the discs."""
+
+
+def _stated_as(given: object) -> str:
+    """Return how a bearing's stiffness is stated, so that messages are about what was meant."""
+    if not isinstance(given, Mapping):
+        return "number"
+    return "table 2" if {"loaded_length_mm", "ball_radius_mm"} & given.keys() else "bearing"
+
+
+RollerStiffness = Annotated[
+    Annotated[NewtonPerMetre, Tag("number")]
+    | Annotated[Rollers, Tag("table 2")]
+    | Annotated[RollerBearing, Tag("bearing")],
+    Discriminator(_stated_as),
+]
+BallStiffness = Annotated[
+    Annotated[NewtonPerMetre, Tag("number")]
+    | Annotated[Balls, Tag("table 2")]
+    | Annotated[BallBearing, Tag("bearing")],
+    Discriminator(_stated_as),
+]
+
+
+class StiffnessRecord(Record):
+    """Table ``[stiffness]``: N/m, or the dimensions for the formula; without ``pin_contact`` it is πbE*/2.
+
+    ``pin_span_mm`` is the distance of two supports between which the pins bend; without it they rest in half grooves.
+    """
+
+    sun_support: NewtonPerMetre | Shaft
+    gear_mesh: NewtonPerMetre | GearPair
+    crank_disc_bearing: RollerStiffness
+    crank_carrier_bearing: RollerStiffness
+    carrier_bearing: BallStiffness
+    crankshaft: Crankshaft | None = None
+    pillars: Pillars | None = None
+    pin_contact: NewtonPerMetre | None = None
+    pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
+    pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
+
+    def stiffness(self, disc: Material, pin: Material, gears: FirstStage, stage: CycloidStage) -> Stiffness:
+        """Return all stiffnesses, given or by formula [N/m].
+
+        Raises
+        ------
+        ValueError
+            Gears of fewer virtual teeth than they have.
+        """
+        bearings: dict[str, Any] = {}
+        for name, formula in FORMULAS.items():
+            own = getattr(self, name)
+            if isinstance(own, GearPair):
+                own = own.of(gears)
+            if isinstance(own, RollingBearing):
+                bearings[name] = inf  # its parts say it, at the load that they carry
+            else:
+                bearings[name] = own if isinstance(own, float) else formula(**vars(own), **vars(disc))
+        return Stiffness(
+            **bearings,
+            pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
+            pin_contact_law=self.pin_contact_law,
+            pin_bending=inf
+            if self.pin_span_mm is None
+            else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
+        )
+
+    @property
+    def friction_dimensions(self) -> FrictionDimensions:
+        """Bearings and gears that are given by their dimensions, both bearings of a crankshaft as one."""
+        inner, outer, main = self.crank_disc_bearing, self.crank_carrier_bearing, self.carrier_bearing
+        return FrictionDimensions(
+            crank_disc_bearing=inner if isinstance(inner, RollerBearing) else None,
+            crank_carrier_bearing=replace(outer, rows=2 * outer.rows) if isinstance(outer, RollerBearing) else None,
+            carrier_bearing=main if isinstance(main, BallBearing) else None,
+            contact_ratio=self.gear_mesh.contact_ratio if isinstance(self.gear_mesh, GearPair) else None,
+        )
+
+    def parts(self, reducer: Reducer) -> tuple[Part, ...]:
+        """Return the parts of the interfaces that yield in series, a given stiffness as one of them.
+
+        Raises
+        ------
+        ValueError
+            A crankshaft whose journals stand outside its bearings.
+        """
+        disc, stage, found = reducer.disc_material, reducer.cycloid_stage, list[Part]()
+        if isinstance(self.crank_disc_bearing, RollerBearing):
+            bearing = self.crank_disc_bearing
+            edge = (bearing.pitch_diameter + bearing.diameter) / 2.0
+            ring = bore_flexibility(edge, stage.pin_circle_radius, stage.face_width, disc)
+            found += [
+                Part("crank_disc_bearing", "crank–disc bearing", bearing),
+                Part("crank_disc_bearing", "disc", ring),
+            ]
+        if (both := self.friction_dimensions.crank_carrier_bearing) is not None:
+            found.append(Part("crank_carrier_bearing", "crank–carrier bearings", both))
+        if isinstance(self.carrier_bearing, BallBearing):
+            found.append(Part("carrier_bearing", "carrier bearing", self.carrier_bearing))
+        if self.crankshaft:
+            own, shared = self.crankshaft.flexibilities(reducer.disc_count, stage.disc_spacing, disc)
+            found += [
+                Part("crank_disc_bearing", "crank bending, a journal alone", own),
+                Part("crank_carrier_bearing", "crank bending, all journals", shared),
+                Part("gear_mesh", "crank torsion", reducer.planet_base_radius**2 * self.crankshaft.twist(disc)),
+            ]
+        if self.pillars:
+            # Half the torque goes through the pillars, and a crank lies half on either flange.
+            each = reducer.crank_count * reducer.crank_circle_radius**2 / 4.0
+            found.append(Part("crank_carrier_bearing", "carrier twist", each * self.pillars.twist(disc)))
+        named = {part.interface for part in found}
+        given = [name for name in named if not isinstance(getattr(self, name), RollingBearing)]
+        found += [Part(name, name.replace("_", " "), 1.0 / getattr(reducer.stiffness, name)) for name in sorted(given)]
+        return tuple(found)
+
+
+class IdentifiedValue(Record):
+    """One stiffness and its standard uncertainty."""
+
+    value: NewtonPerMetre
+    standard_uncertainty: Annotated[float, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _is_known(self) -> IdentifiedValue:
+        # It is read as that of ln K; bounds with a factor of a hundred between them leave 1.3 of the value.
+        if self.standard_uncertainty > 2 * self.value:
+            raise ValueError(
+                f"standard_uncertainty is {self.standard_uncertainty:g} N/m; allowed is twice the value, "
+                f"{2 * self.value:g} N/m, or less"
+            )
+        return self
+
+
+class IdentifiedStiffnessRecord(Record):
+    """A file of identified stiffnesses; ``correlation`` is in the order in which they are listed."""
+
+    source: str
+    stiffness: dict[str, IdentifiedValue]
+    correlation: tuple[tuple[float, ...], ...] | None = None
+    notes: tuple[str, ...] = ()
+
+
+IDENTIFIABLE = tuple(
+    field
+    for field in StiffnessRecord.model_fields
+    if field not in ("pin_contact_law", "pin_span_mm", "crankshaft", "pillars")
+)
+"""Fields of `tolalloc.reducers.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""
+
 
 _SMALLEST_TWIST, _LARGEST_TWIST = 0.3, 30.0
 """Twist under rated torque that a catalogue's rigidity may mean; RV reducers have 2.9 to 4 [arcmin]."""

@@ -1,11 +1,16 @@
-"""Unit files: the actual errors of one built reducer."""
+"""Unit files: the actual errors of one built reducer.
+
+Unit tables: the measured errors of many built reducers, one row per unit, read from CSV and written back.
+"""
 
 from __future__ import annotations
 
+import csv
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, radians, sin
+from io import StringIO
+from math import cos, isfinite, radians, sin
 from pathlib import Path
 from typing import Annotated
 
@@ -13,9 +18,10 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field
 
-from tolalloc.drawings.sources import neglected_columns
-from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.drawings.sources import ANGULAR, neglected_columns
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
+from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
 from tolalloc.reducers.reducer.files import PRESETS
 
@@ -122,3 +128,154 @@ def load_unit(name: str | Path) -> BuiltUnit:
         neglected=record.neglected,
         assumptions=record.assumptions,
     )
+
+
+LENGTH_UNITS, ANGLE_UNITS = ("µm", "um"), ("µrad", "urad")
+LARGEST_LENGTH, LARGEST_ANGLE = 200.0, 20000.0
+"""Largest deviation that is believed, as in a unit file [µm, µrad]."""
+
+
+def unit_names(table: TextTable) -> tuple[str, ...]:
+    """Return the column ``unit`` of a table, whose names are unique.
+
+    Raises
+    ------
+    InputError
+        The column is missing, or a row names no unit or one that stands further up.
+    """
+    if "unit" not in table.headers:
+        raise InputError(f"{table.path}: the column 'unit' is missing; it names the unit of each row.")
+    position = table.headers.index("unit")
+    first_row: dict[str, int] = {}
+    for row, cells in zip(table.rows, table.cells, strict=True):
+        name = cells[position]
+        if not name:
+            raise InputError.at(f"{table.path}, row {row}", "unit", name, "a name")
+        if name in first_row:
+            raise InputError.at(
+                f"{table.path}, row {row}",
+                "unit",
+                name,
+                f"each name once, and this one stands in row {first_row[name]}",
+            )
+        first_row[name] = row
+    return tuple(first_row)
+
+
+def _is_angle(column: str) -> bool:
+    return column.removesuffix(".x").removesuffix(".y").rsplit(".", 1)[-1] in ANGULAR
+
+
+def _column(path: Path, header: str) -> tuple[str, float, float]:
+    """Return the model's column, the factor to SI and the largest value that is believed."""
+    column, unit = split_header(header)
+    angle = _is_angle(column)
+    allowed = ANGLE_UNITS if angle else LENGTH_UNITS
+    if unit not in allowed:
+        raise InputError.at(
+            path,
+            f"the unit of column {column!r}",
+            unit,
+            f"{' or '.join(allowed)} in square brackets, as {column!r} is {'an angle' if angle else 'a length'}",
+        )
+    return (column, MICRORADIAN, LARGEST_ANGLE) if angle else (column, MICROMETRE, LARGEST_LENGTH)
+
+
+def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[BuiltUnit, ...]:
+    """Return the units of a CSV file: a column ``unit``, the others are model columns such as ``disc1.tilt.x [µrad]``.
+
+    Sources under neglected are stated by no unit and taken as zero; ``*`` stands for anything. A model's column that is
+    neither in the table nor there is refused when the units meet the model.
+
+    Raises
+    ------
+    InputError
+        The file, row, column and value that are not allowed.
+    """
+    table = read_text_table(Path(path))
+    names = unit_names(table)
+    columns = {place: _column(table.path, header) for place, header in enumerate(table.headers) if header != "unit"}
+    if len({column for column, *_ in columns.values()}) < len(columns) or table.headers.count("unit") > 1:
+        raise InputError(f"{table.path}: a column stands there twice; each column of the model has one.")
+    units, faults = [], Faults()
+    for row, name, cells in zip(table.rows, names, table.cells, strict=True):
+        deviations = {}
+        for place, (column, factor, largest) in columns.items():
+            with faults.kept():
+                where = f"{table.path}, row {row} (unit {name})"
+                deviations[column] = factor * _deviation(cells[place], where, table.headers[place], largest)
+        units.append(BuiltUnit(name=name, source=table.path.name, deviations=deviations, neglected=neglected))
+    faults.require_none()
+    return tuple(units)
+
+
+def _deviation(cell: str, place: str, header: str, largest: float) -> float:
+    """Return the number in a cell."""
+    try:
+        value = plain_number(cell)
+    except ValueError:
+        value = float("nan")
+    if not (isfinite(value) and abs(value) <= largest):
+        raise InputError.at(place, header, cell, f"a number from {-largest:g} to {largest:g}")
+    return value
+
+
+def table_text(headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()) -> str:
+    """Return a CSV file with all digits of its numbers; comments are lines above the headers, names with units."""
+    text = StringIO(newline="")
+    text.writelines(f"# {comment}\n" for comment in comments)
+    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+    writer.writerows(map(no_formula, row) for row in (headers, *rows))
+    return text.getvalue()
+
+
+def write_table(
+    path: Path, headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()
+) -> None:
+    """Write what `table_text` returns.
+
+    Raises
+    ------
+    InputError
+        The file exists or cannot be written.
+    """
+    write_new(path, table_text(headers, rows, comments))
+
+
+def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
+    """Write what `units_text` returns.
+
+    Raises
+    ------
+    InputError
+        There is no unit, units state different columns, or the file exists or cannot be written.
+    """
+    write_new(Path(path), units_text(units, path))
+
+
+def units_text(units: Sequence[BuiltUnit], path: str | Path, comments: Sequence[str] = ()) -> str:
+    """Return units in the layout that `load_units` reads; what they neglect is not part of it.
+
+    Raises
+    ------
+    InputError
+        There is no unit, or units state different columns.
+    """
+    if not units:
+        raise InputError(f"{path}: there are no units to write.")
+    columns = tuple(units[0].deviations)
+    for unit in units:
+        if set(unit.deviations) != set(columns):
+            column = sorted(set(unit.deviations) ^ set(columns))[0]
+            raise InputError(
+                f"{path}: units {units[0].name} and {unit.name} do not both state {column}; units of one table state "
+                "the same columns."
+            )
+    angle = [_is_angle(column) for column in columns]
+    headers = [f"{column} [{'µrad' if turns else 'µm'}]" for column, turns in zip(columns, angle, strict=True)]
+    factors = [MICRORADIAN if turns else MICROMETRE for turns in angle]
+    rows = (
+        [unit.name, *(float(unit.deviations[column]) / factor for column, factor in zip(columns, factors, strict=True))]
+        for unit in units
+    )
+    return table_text(["unit", *headers], rows, comments)

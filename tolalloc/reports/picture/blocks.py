@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.reducers.scene.scene import Scene
+from tolalloc.reducers.scene import Scene
 
 VERSION = 1
 """Of the JSON; a picture refuses another one [-]."""

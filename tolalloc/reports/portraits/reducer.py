@@ -15,18 +15,15 @@ from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
 from tolalloc.reducers import PRELOAD
-from tolalloc.reducers.cycloid.assessment import assess
 from tolalloc.reducers.cycloid.clearance import linear_model_warnings
-from tolalloc.reducers.equivalent.answers import OUTCOMES, Equilibria
+from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
-from tolalloc.reducers.equivalent.line_load import peak_line_load, unit_pressure
-from tolalloc.reducers.equivalent.outputs import order_spectrum
-from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
+from tolalloc.reducers.equivalent.outputs import order_spectrum, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.perfect import against_catalogue, perfect_reducer
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.rigidity import against_catalogue
-from tolalloc.reducers.scene.places import is_placed
-from tolalloc.reducers.scene.scene import PER_CRANK_TURN, Scene, scene_of
+from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
 from tolalloc.reducers.settings import FLANK, RADIAL
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series

@@ -9,11 +9,9 @@ import numpy as np
 
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, YieldingContact
-from tolalloc.reducers.cycloid.assessment import Assessment
 from tolalloc.reducers.cycloid.clearance import FLANK, linear_clearance
-from tolalloc.reducers.cycloid.loaded_contact import LoadedContact
-from tolalloc.reducers.cycloid.mesh import normals
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.loaded_contact import Assessment, LoadedContact
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, normals
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller

@@ -11,15 +11,12 @@ from jaxtyping import Float
 
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
 from tolalloc.reducers.cycloid.clearance import linear_model_warnings
-from tolalloc.reducers.equivalent.answers import Equilibria
-from tolalloc.reducers.equivalent.attribution import Attribution
-from tolalloc.reducers.equivalent.friction_loop import FrictionLoop
-from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, HysteresisLoop
-from tolalloc.reducers.equivalent.outputs import OUTPUTS, forces
-from tolalloc.reducers.equivalent.preload import PRELOAD_ASSUMPTION
+from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, FrictionLoop, HysteresisLoop
+from tolalloc.reducers.equivalent.model import Equilibria
+from tolalloc.reducers.equivalent.outputs import OUTPUTS, Attribution, forces
+from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION, against_catalogue, twist_shares
+from tolalloc.reducers.reducer.bearings import CONTACTS, friction_assumptions
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.friction import CONTACTS, friction_assumptions
-from tolalloc.reducers.rigidity import against_catalogue, twist_shares
 from tolalloc.reducers.transmission_error import TransmissionErrorResult
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.running.compiled import jit
 
 

@@ -13,10 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.solvers.contact_solver import equilibrium
-from tolalloc.reducers.equivalent.solvers.energy import along, compress, make_work, play_force
-from tolalloc.reducers.equivalent.solvers.problem import fill_loads, make_problem, values_of, with_tables
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
+from tolalloc.reducers.equivalent.solvers.contact_solver import (
+    along,
+    compress,
+    equilibrium,
+    fill_loads,
+    make_problem,
+    make_work,
+    play_force,
+    values_of,
+    with_tables,
+)
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE
 from tolalloc.running.compiled import in_threads, jit
 

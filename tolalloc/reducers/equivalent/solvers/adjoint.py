@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.solvers.contact_solver import solve_tangent
-from tolalloc.reducers.equivalent.solvers.energy import assemble, compress, play_force
-from tolalloc.reducers.equivalent.solvers.interpolation import interpolation, make_memory, solve_between
-from tolalloc.reducers.equivalent.solvers.problem import values_of
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
+from tolalloc.reducers.equivalent.solvers.contact_solver import assemble, compress, play_force, solve_tangent, values_of
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE
+from tolalloc.reducers.equivalent.solvers.workspace import interpolation, make_memory, solve_between
 from tolalloc.running.compiled import in_threads, jit, jit_in_place
 
 _AT_ONCE = 32  # samples that a thread takes together

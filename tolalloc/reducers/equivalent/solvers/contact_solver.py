@@ -7,17 +7,153 @@ direction, and the line search stops where contacts take over.
 
 Each sample is solved alone and in a fixed order of operations, so its bits do not depend on the number of threads, on
 its place in a batch or on its neighbours.
+
+Energy of one sample at one angle: its problem, and the forces and stiffness of all contacts at given coordinates.
+
+The problem of one sample at one tabulated angle, from the condensed tables.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.solvers.energy import Problem, along, assemble, compress, play_force
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_RESISTED
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
+
+
+class Problem(NamedTuple):
+    """One sample at one angle, in the retained coordinates; the discs' come first."""
+
+    law: int  # One of `tolalloc.reducers.cycloid.solvers.LAWS` [-]
+    # S [N/m] and f [N]
+    stiffness: Float[np.ndarray, "retained retained"]
+    force: Float[np.ndarray, " retained"]
+    # D [m/m] and compression h at undisplaced discs [m]
+    by_disc: Float[np.ndarray, "disc 3 pin"]
+    undisturbed: Float[np.ndarray, " contact"]
+    # Stiffness [N/m], L of the logarithmic law [m], and half the difference in depth along a tilted tooth [m]
+    contact: Float[np.ndarray, " contact"]
+    log_length: Float[np.ndarray, " contact"]
+    half_tilt: Float[np.ndarray, " contact"]
+    # Compression vector of every element with play: per coordinate [m/m], and at undisplaced coordinates [m]
+    play_by_retained: Float[np.ndarray, "element 2 retained"]
+    play_offset: Float[np.ndarray, "element 2"]
+    # Stiffness [N/m] and clearance [m] of every element with play
+    play_stiffness: Float[np.ndarray, " element"]
+    clearance: Float[np.ndarray, " element"]
+
+
+class Work(NamedTuple):
+    """Work space of one thread: what changes from one Newton step to the next."""
+
+    compression: Float[np.ndarray, " contact"]
+    rate: Float[np.ndarray, " contact"]
+    play: Float[np.ndarray, "element 2"]
+    play_rate: Float[np.ndarray, "element 2"]
+    gradient: Float[np.ndarray, " retained"]
+    step: Float[np.ndarray, " retained"]
+    tangent: Float[np.ndarray, "retained retained"]
+    best: Float[np.ndarray, " retained"]
+
+
+@jit
+def make_work(retained, contacts, elements):
+    """Return a new work space."""
+    return Work(
+        np.empty(contacts),
+        np.empty(contacts),
+        np.empty((elements, 2)),
+        np.empty((elements, 2)),
+        np.empty(retained),
+        np.empty(retained),
+        np.empty((retained, retained)),
+        np.empty(retained),
+    )
+
+
+@jit_within
+def along(by_disc, play_by_retained, vector, compression, play):
+    """Set the compressions of pins and elements that a displacement gives."""
+    discs, _, pins = by_disc.shape
+    for d in range(discs):
+        x, y, turn = vector[3 * d], vector[3 * d + 1], vector[3 * d + 2]
+        for k in range(pins):
+            compression[d * pins + k] = by_disc[d, 0, k] * x + by_disc[d, 1, k] * y + by_disc[d, 2, k] * turn
+    for e in range(play_by_retained.shape[0]):
+        for i in range(2):
+            play[e, i] = 0.0
+            for j in range(vector.size):
+                play[e, i] += play_by_retained[e, i, j] * vector[j]
+
+
+@jit_within
+def compress(problem, q, compression, play):
+    """Set the compressions of pins and elements with play at the coordinates q."""
+    along(problem.by_disc, problem.play_by_retained, q, compression, play)
+    for k in range(compression.size):
+        compression[k] += problem.undisturbed[k]
+    for e in range(play.shape[0]):
+        play[e, 0] += problem.play_offset[e, 0]
+        play[e, 1] += problem.play_offset[e, 1]
+
+
+@jit_in_place
+def play_force(stiffness, clearance, x, y):
+    """Return force (x, y) of an element with play and its derivative (xx, xy, yy), theory page equation (28)."""
+    reach = np.sqrt(x * x + y * y)
+    if not reach > clearance:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    free = clearance / reach
+    taut = stiffness * (1.0 - free)
+    across = stiffness * free / (reach * reach)
+    return taut * x, taut * y, taut + across * x * x, across * x * y, taut + across * y * y
+
+
+@jit_within
+def assemble(problem, compression, play, q, gradient, tangent):
+    """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact."""
+    size, pins = problem.force.size, problem.by_disc.shape[2]
+    largest, cancelling, touching = 0.0, 0.0, 0
+    for i in range(size):
+        value, terms = -problem.force[i], 0.0
+        largest = max(largest, abs(problem.force[i]))
+        for j in range(size):
+            value += problem.stiffness[i, j] * q[j]
+            terms += abs(problem.stiffness[i, j] * q[j])
+            tangent[i, j] = problem.stiffness[i, j]
+        gradient[i] = value
+        cancelling = max(cancelling, terms)
+    for d in range(problem.by_disc.shape[0]):
+        for k in range(pins):
+            c = d * pins + k
+            if not compression[c] + problem.half_tilt[c] > 0.0:
+                continue
+            force, slope = pin_force(
+                problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression[c]
+            )
+            touching += 1
+            largest = max(largest, force)
+            for i in range(3):
+                gradient[3 * d + i] += force * problem.by_disc[d, i, k]
+                weighted = slope * problem.by_disc[d, i, k]
+                for j in range(i + 1):
+                    tangent[3 * d + i, 3 * d + j] += weighted * problem.by_disc[d, j, k]
+    for e in range(play.shape[0]):
+        fx, fy, xx, xy, yy = play_force(problem.play_stiffness[e], problem.clearance[e], play[e, 0], play[e, 1])
+        largest = max(largest, np.sqrt(fx * fx + fy * fy))
+        for i in range(size):
+            ax, ay = problem.play_by_retained[e, 0, i], problem.play_by_retained[e, 1, i]
+            gradient[i] += fx * ax + fy * ay
+            for j in range(i + 1):
+                bx, by = problem.play_by_retained[e, 0, j], problem.play_by_retained[e, 1, j]
+                tangent[i, j] += ax * (xx * bx + xy * by) + ay * (xy * bx + yy * by)
+    return largest, cancelling, touching
+
 
 TOLERANCE = 1e-11  # of the largest force
 _PROMISED = 1e-9  # the same where a bearing that just touches keeps the steps from settling
@@ -125,17 +261,17 @@ def _exact_step(problem, work, q):
             low = length
         else:
             high = length
-        guess = length - first / second if second > least else np.inf
+        tried = length - first / second if second > least else np.inf
         if high == np.inf:
-            if not guess < 10.0 * length:
-                guess = 10.0 * length
-            if guess > _FARTHEST:
+            if not tried < 10.0 * length:
+                tried = 10.0 * length
+            if tried > _FARTHEST:
                 return -1.0
-        elif not low < guess < high:
-            guess = 0.5 * (low + high)
-        if guess == length or not low < guess < high:
+        elif not low < tried < high:
+            tried = 0.5 * (low + high)
+        if tried == length or not low < tried < high:
             return length
-        length = guess
+        length = tried
     return length
 
 
@@ -213,3 +349,143 @@ def equilibrium(problem, q, work):
         _decade_by_decade(problem, q, work)
         status, ratio, touching = _newton(problem, q, work)
     return status, ratio, touching
+
+
+@jit
+def values_of(errors, torque, layout, mapped, values):
+    """Fill the values [sample, value] of all samples; return which samples are finite."""
+    finite = np.empty(errors.shape[0], np.bool_)
+    for s in range(errors.shape[0]):
+        for m in range(layout.end):
+            values[s, m] = mapped.nominal[m]
+        values[s, layout.torque] = torque
+        for entry in range(mapped.value.size):
+            values[s, mapped.value[entry]] += mapped.factor[entry] * errors[s, mapped.column[entry]]
+        finite[s] = np.isfinite(values[s]).all()
+    return finite
+
+
+@jit
+def make_problem(law, tables):
+    """Return a problem with memory of its own, to be filled by `fill_loads` and `blend`."""
+    retained, discs, pins = tables.stiffness.shape[1], tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]
+    elements = tables.play_stiffness.shape[1]
+    return Problem(
+        law,
+        np.empty((retained, retained)),
+        np.empty(retained),
+        np.empty((discs, 3, pins)),
+        np.empty(discs * pins),
+        np.empty(discs * pins),
+        np.empty(discs * pins),
+        np.zeros(discs * pins),
+        np.empty((elements, 2, retained)),
+        np.empty((elements, 2)),
+        np.empty(elements),
+        np.empty(elements),
+    )
+
+
+@jit_in_place
+def _any_nonzero(values, first, last):
+    found = False
+    for m in range(first, last):
+        found |= values[m] != 0.0
+    return found
+
+
+@jit_in_place
+def _undisturbed(at, tables, layout, values, out):
+    """Set out to the pins' compression at undisplaced discs."""
+    discs, pins = tables.contact_by_disc.shape[1], layout.pins
+    for d in range(discs):
+        coefficient = tables.contact_by_error[at, d]
+        row = out[d * pins : (d + 1) * pins]
+        for k in range(pins):
+            row[k] = values[layout.pin + 2 * pins + k] + (
+                coefficient[0, k] * values[layout.pin + k] + coefficient[1, k] * values[layout.pin + pins + k]
+            )
+        for m in range(layout.waves):
+            value = values[layout.wave + d * layout.waves + m]
+            if value != 0.0:
+                for k in range(pins):
+                    row[k] += coefficient[2 + m, k] * value
+        first = layout.tooth + d * 2 * layout.teeth
+        for kind in range(2):
+            start = first + kind * layout.teeth
+            if _any_nonzero(values, start, start + layout.teeth):
+                for k in range(pins):
+                    row[k] += coefficient[2 + layout.waves + kind, k] * values[start + tables.tooth[at, d, k]]
+
+
+@jit_in_place
+def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
+    """Set force, undisturbed compressions and play offsets at a node; return the carrier rotation at fixed discs."""
+    rotation = 0.0
+    force[:] = 0.0
+    play_offset[:] = 0.0
+    for m in range(layout.torque + 1):
+        if values[m] != 0.0:
+            rotation += tables.carrier_by_load[at, m] * values[m]
+            for i in range(force.size):
+                force[i] += tables.load[at, m, i] * values[m]
+            for e in range(play_offset.shape[0]):
+                play_offset[e, 0] += tables.play_by_load[at, e, 0, m] * values[m]
+                play_offset[e, 1] += tables.play_by_load[at, e, 1, m] * values[m]
+    _undisturbed(at, tables, layout, values, undisturbed)
+    return rotation
+
+
+@jit_in_place
+def sample_constants(problem, turn, face_width, layout, values):
+    """Set what does not depend on the angle: clearances; and the tilted depths, which need the turned tilt only."""
+    for e in range(problem.clearance.size):
+        problem.clearance[e] = max(values[layout.clearance + e], 0.0)
+    pins = layout.pins
+    for d in range(problem.by_disc.shape[0]):
+        x, y = values[layout.tilt + 2 * d], values[layout.tilt + 2 * d + 1]
+        if x == 0.0 and y == 0.0:
+            problem.half_tilt[d * pins : (d + 1) * pins] = 0.0
+            continue
+        tilt_x, tilt_y = turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y
+        for k in range(pins):
+            along = tilt_y * problem.by_disc[d, 0, k] - tilt_x * problem.by_disc[d, 1, k]
+            problem.half_tilt[d * pins + k] = 0.5 * face_width * abs(along)
+
+
+@jit
+def with_tables(at, tables, layout, face_width, values, own):
+    """Return the problem whose loads ``own`` has, with the tables of a node."""
+    problem = Problem(
+        own.law,
+        tables.stiffness[at],
+        own.force,
+        tables.contact_by_disc[at],
+        own.undisturbed,
+        tables.contact_stiffness[at],
+        tables.contact_log_length[at],
+        own.half_tilt,
+        tables.play_by_retained[at],
+        own.play_offset,
+        tables.play_stiffness[at],
+        own.clearance,
+    )
+    sample_constants(problem, tables.turn[at], face_width, layout, values)
+    return problem
+
+
+@jit
+def problem_at_node(at, tables, layout, face_width, values, own):
+    """Return carrier rotation at fixed discs and the problem at a node; ``own`` lends the memory of the loads."""
+    rotation = fill_loads(at, tables, layout, values, own.force, own.undisturbed, own.play_offset)
+    return rotation, with_tables(at, tables, layout, face_width, values, own)
+
+
+@jit
+def solve_at_node(at, tables, layout, face_width, values, q, own, work):
+    """Solve one sample at one node from the start q; return rotation, status, residual, pins in contact."""
+    rotation, problem = problem_at_node(at, tables, layout, face_width, values, own)
+    status, ratio, touching = equilibrium(problem, q, work)
+    for i in range(q.size):
+        rotation += tables.carrier_by_retained[at, i] * q[i]
+    return rotation, status, ratio, touching

@@ -2,22 +2,243 @@
 
 First the highest peak of either side is followed to its end; then every other one that may still reach what was found.
 Every peak's search depends on its own sample alone, whatever stands in the lanes beside it.
+
+Searches around peaks of the curve, one in each lane.
+
+An extreme is a kink, where one pin takes over from another, so a peak is searched by halving the step around it and
+not by a parabola. What a search finds depends on its own sample alone.
+
+Where the searches look, solved side by side, a search to a lane.
+
+Searches go through the turn side by side, so that what the lanes read of the tables is still in the cache.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float, Int
 
-from tolalloc.reducers.equivalent.solvers.interpolation import make_memory
-from tolalloc.reducers.equivalent.solvers.lending import make_lent
-from tolalloc.reducers.equivalent.solvers.problem import values_of
-from tolalloc.reducers.equivalent.solvers.records import MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
-from tolalloc.reducers.equivalent.solvers.refinement import search_peaks
-from tolalloc.reducers.equivalent.solvers.searches import Peaks, gain, make_peaks, make_searches
-from tolalloc.reducers.equivalent.solvers.turn import make_turn, solve_tile, tile_size
-from tolalloc.running.compiled import in_threads, jit
+from tolalloc.reducers.equivalent.solvers.batch import ALL, most_steps, settle
+from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
+from tolalloc.reducers.equivalent.solvers.simd import WIDTH
+from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, solve_batch
+from tolalloc.reducers.equivalent.solvers.workspace import (
+    fill_lane,
+    look_at_all_taken,
+    make_memory,
+    make_workspace,
+    moved_too_far,
+    solve_anywhere,
+)
+from tolalloc.running.compiled import in_threads, jit, jit_in_place
+
+
+class Peaks(NamedTuple):
+    """Peaks of the coarse curves that are searched, in the order of their angles, and what was found there."""
+
+    sample: Int[np.ndarray, " peak"]  # Whose curve it is on [-]
+    side: Int[np.ndarray, " peak"]  # 0 for its largest, 1 for its smallest value [-]
+    coarse: Int[np.ndarray, " peak"]  # Coarse angle of the turn [-]
+    # The highest ±rotation found [rad], where [nodes], and what its flanks may still add [rad]
+    height: Float[np.ndarray, " peak"]
+    position: Float[np.ndarray, " peak"]
+    left_over: Float[np.ndarray, " peak"]
+
+
+class Searches(NamedTuple):
+    """What the searches know."""
+
+    peak: Int[np.ndarray, " lane"]  # Which peak is searched; −1 for none [-]
+    level: Int[np.ndarray, " lane"]  # Halvings done [-]
+    half: Int[np.ndarray, " lane"]  # Whether the left or the right side is looked at [-]
+    # Where the centre is, and how far its sides [nodes]
+    at: Float[np.ndarray, " lane"]
+    step: Float[np.ndarray, " lane"]
+    looks_at: Float[np.ndarray, " lane"]  # Which side that is [nodes]
+    # Left neighbour, centre, right neighbour; and the two that stand half as far: ±rotation [rad], coordinates [m]
+    height: Float[np.ndarray, "lane 3"]
+    q: Float[np.ndarray, "lane 3 retained"]
+    new_height: Float[np.ndarray, "lane 2"]
+    new_q: Float[np.ndarray, "lane 2 retained"]
+
+
+def make_searches(retained: int) -> Searches:
+    """Return lanes without a search."""
+    return Searches(
+        np.full(WIDTH, -1),
+        np.zeros(WIDTH, np.int64),
+        np.zeros(WIDTH, np.int64),
+        np.zeros(WIDTH),
+        np.zeros(WIDTH),
+        np.zeros(WIDTH),
+        np.zeros((WIDTH, 3)),
+        np.zeros((WIDTH, 3, retained)),
+        np.zeros((WIDTH, 2)),
+        np.zeros((WIDTH, 2, retained)),
+    )
+
+
+def make_peaks(found: Int[np.ndarray, "3 peak"]) -> Peaks:
+    """Return peaks in the order of their angles, so that searches side by side read the same tables."""
+    sample, side, coarse = found
+    order = np.argsort(coarse, kind="stable")
+    return Peaks(
+        sample[order],
+        side[order],
+        coarse[order],
+        np.empty(order.size),
+        np.empty(order.size),
+        np.empty(order.size),
+    )
+
+
+@jit_in_place
+def begin(lane, peak, search, turn, peaks, own):
+    """Let a lane search around a peak.
+
+    The solved turn begins and ends one coarse angle outside, so that every angle has two neighbours of its own, also
+    where the ratio leaves the curve not periodic.
+    """
+    sample, coarse, sign = peaks.sample[peak], peaks.coarse[peak], 1.0 - 2.0 * peaks.side[peak]
+    own.peak[lane], own.level[lane], own.step[lane] = peak, 0, float(search.nodes_per_coarse)
+    own.at[lane] = search.nodes_per_coarse + MARGIN + coarse * own.step[lane]
+    for i in range(3):
+        own.height[lane, i] = sign * turn.rotation[sample, coarse + i]
+        for j in range(own.q.shape[2]):
+            own.q[lane, i, j] = turn.retained[sample, coarse + i, j]
+
+
+@jit_in_place
+def gain(left, centre, right):
+    """Return how much a peak near ``centre`` may rise above it: the steeper flank carried on for one step."""
+    return max(centre - left, centre - right)
+
+
+@jit_in_place
+def look_closer(lane, search, best, peaks, own):
+    """Halve the step, or end the search where it is fine enough or cannot reach the sample's best any more."""
+    peak, centre = own.peak[lane], own.height[lane, 1]
+    more = gain(own.height[lane, 0], centre, own.height[lane, 2])
+    hopeful = centre + search.safety * more > best[peaks.sample[peak], peaks.side[peak]]
+    if own.level[lane] < search.levels and hopeful:
+        own.level[lane] += 1
+        own.step[lane] *= 0.5
+        own.half[lane] = 0
+        return
+    peaks.height[peak], peaks.position[peak], peaks.left_over[peak] = centre, own.at[lane], more
+    own.peak[lane] = -1
+
+
+@jit_in_place
+def _put(lane, place, height, q, own):
+    """Put a height and its coordinates at the left, in the centre or at the right."""
+    own.height[lane, place] = height
+    for i in range(q.size):
+        own.q[lane, place, i] = q[i]
+
+
+@jit_in_place
+def _move(lane, own):
+    """Make the highest of centre and new sides the centre."""
+    left, centre, right = own.new_height[lane, 0], own.height[lane, 1], own.new_height[lane, 1]
+    q, at_left, at_right = own.q[lane, 1], own.new_q[lane, 0], own.new_q[lane, 1]
+    if left > centre and left >= right:
+        _put(lane, 2, centre, q, own)
+        _put(lane, 1, left, at_left, own)
+        own.at[lane] -= own.step[lane]
+    elif right > centre:
+        _put(lane, 0, centre, q, own)
+        _put(lane, 1, right, at_right, own)
+        own.at[lane] += own.step[lane]
+    else:
+        _put(lane, 0, left, at_left, own)
+        _put(lane, 2, right, at_right, own)
+
+
+@jit_in_place
+def take(lane, rotation, status, ratio, search, best, peaks, own, found):
+    """Take in what was found where the lane looked."""
+    peak, half = own.peak[lane], own.half[lane]
+    sample = peaks.sample[peak]
+    found.solves[sample] += 1
+    found.status[sample] = max(found.status[sample], status)
+    found.residual[sample] = max(found.residual[sample], ratio)
+    own.new_height[lane, half] = (1.0 - 2.0 * peaks.side[peak]) * rotation
+    if status != CONVERGED:
+        own.new_height[lane, half] = -np.inf
+        for i in range(own.q.shape[2]):
+            own.new_q[lane, half, i] = own.q[lane, 1, i]
+    own.half[lane] += 1
+    if half == 1:
+        _move(lane, own)
+        look_closer(lane, search, best, peaks, own)
+
+
+@jit_in_place
+def _fill_all(alone, law, tables, layout, values, peaks, own, workspace):
+    """Put the problems where the lanes look into them; return one bit per lane that is solved so, or alone."""
+    together, apart = 0, 0
+    for lane in range(WIDTH):
+        if own.peak[lane] < 0:
+            continue
+        sample, half = peaks.sample[own.peak[lane]], own.half[lane]
+        start, side = own.new_q[lane, half], own.q[lane, 2 * half]
+        own.looks_at[lane] = own.at[lane] + (2 * half - 1) * own.step[lane]
+        for i in range(start.size):
+            start[i] = 0.5 * (own.q[lane, 1, i] + side[i])
+        if alone[sample]:
+            apart |= 1 << lane
+            continue
+        together |= 1 << lane
+        for i in range(workspace.batch.q.shape[0]):
+            workspace.batch.q[i, lane] = start[i]
+        fill_lane(lane, own.looks_at[lane], start, side, law, tables, layout, values[sample], workspace)
+    look_at_all_taken(workspace)
+    return together, apart
+
+
+@jit_in_place
+def search_peaks(
+    discs, alone, tables, layout, design, values, search, turn, best, peaks, own, memory, workspace, found
+):
+    """Search around all peaks, the lanes taking one after another.
+
+    Samples that are to be ``alone``, and lanes that do not settle, go to the solver for one sample.
+    """
+    waiting, batch, face_width = 0, workspace.batch, design.face_width
+    while True:
+        for lane in range(WIDTH):
+            while own.peak[lane] < 0 and waiting < peaks.coarse.size:
+                begin(lane, waiting, search, turn, peaks, own)
+                workspace.node[lane, :] = -1
+                look_closer(lane, search, best, peaks, own)
+                waiting += 1
+        together, careful = _fill_all(alone, design.law, tables, layout, values, peaks, own, workspace)
+        if not together | careful:
+            return
+        if together:
+            left, _ = settle(design.law, discs, workspace.tables, 0, batch, ALL ^ together, most_steps(design.law))
+            careful |= left
+        for lane in range(WIDTH):
+            q = own.new_q[lane, own.half[lane]]
+            if (together >> lane) & 1 and moved_too_far(lane, q, workspace):
+                careful |= 1 << lane
+            if (careful >> lane) & 1:
+                sample, position = peaks.sample[own.peak[lane]], own.looks_at[lane]
+                memory[2].first[0], memory[2].first[1] = -1, -1
+                rotation, status, ratio, _ = solve_anywhere(
+                    position, tables, layout, face_width, values[sample], q, memory
+                )
+                take(lane, rotation, status, ratio, search, best, peaks, own, found)
+            elif (together >> lane) & 1:
+                rotation = workspace.base[lane]
+                for i in range(batch.q.shape[0]):
+                    q[i] = batch.q[i, lane]
+                    rotation += workspace.by_coordinate[i, lane] * q[i]
+                take(lane, rotation, CONVERGED, batch.ratio[lane], search, best, peaks, own, found)
 
 
 def _highest(turn: SolvedTurn, found: SolvedExtremes) -> Peaks:
@@ -95,14 +316,14 @@ def refine(
     contacts, values = tables.contact_stiffness.shape[1], np.empty((errors.shape[0], layout.end))
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
     alone = _prepare(layout, mapped, errors, torque, tables.play_stiffness.shape[1], turn, values, found)
-    own, lent = make_searches(turn.retained.shape[2]), make_lent(layout, 3 * len(discs), contacts)
+    own, workspace = make_searches(turn.retained.shape[2]), make_workspace(layout, 3 * len(discs), contacts)
     memory = make_memory(design.law, tables)
     given = (discs, alone, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)
-    search_peaks(*given, highest, own, memory, lent, found)
+    search_peaks(*given, highest, own, memory, workspace, found)
     _keep_best(highest, best, left_over, found)
     others = make_peaks(_others(turn, search, best, highest, found))
-    search_peaks(*given, others, own, memory, lent, found)
+    search_peaks(*given, others, own, memory, workspace, found)
     _keep_best(others, best, left_over, found)
     found.left_over[:] = left_over.sum(axis=1)
 
@@ -115,9 +336,9 @@ def solve_extremes(
     def solve(part: slice) -> None:
         given = (tables, layout, mapped, design, errors[part], torque)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
-        solve_tile(discs, MARGIN, search.nodes_per_coarse, search.turn_of_crank(layout.teeth), *given, turn)
+        solve_batch(discs, MARGIN, search.nodes_per_coarse, search.turn_of_crank(layout.teeth), *given, turn)
         own = SolvedExtremes(*(values[part] for values in found))
         own.curve[:] = turn.rotation[:, 1 : 1 + own.curve.shape[1]]
         refine(discs, *given, search, turn, own)
 
-    in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))
+    in_threads(solve, errors.shape[0], batch_size(errors.shape[0]))

@@ -1,4 +1,9 @@
-"""Contacts of one register of samples at given coordinates: what presses them, and what that adds up to."""
+"""Contacts of one register of samples at given coordinates: what presses them, and what that adds up to.
+
+Force and stiffness of line contacts, eight side by side.
+
+No table and no iteration that ends by itself, so that a lane has the same bits alone and among others.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.equivalent.solvers.lanes import (
+from tolalloc.reducers.equivalent.solvers.simd import (
     WIDTH,
     Apart,
     Common,
@@ -18,19 +23,90 @@ from tolalloc.reducers.equivalent.solvers.lanes import (
     choose,
     compress,
     count_bits,
+    divide,
     entry,
     expand,
     fma,
+    larger,
     load,
+    logarithm,
     multiply,
     spread,
     store,
+    subtract,
 )
-from tolalloc.reducers.equivalent.solvers.line_contact import line_contact
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
 
+DEEPEST = 2.5
+"""ln(λ/depth) of the deepest line contact that is solved here; no pin is pressed nearly so far [-]."""
+_FITTED = (5.0, 40.0)
+"""The same, between which w is a quotient of two polynomials; contacts elsewhere hardly touch, or bend [-]."""
+# Polynomials in ln(λ/depth) whose quotient is w within 3e-15 of it; the highest power first
+_ABOVE = (
+    5.672391747372849e-07,
+    0.0001299594283366941,
+    0.007869168757409338,
+    0.16762474883751757,
+    1.3152282419323045,
+    3.208371600720944,
+    -0.0405589794698379,
+    -2.926977775381174,
+    0.22754703860728592,
+)
+_BELOW = (
+    1e-12,
+    5.660080962424214e-07,
+    0.00012637603146998638,
+    0.007277723649627696,
+    0.1416246660138495,
+    0.9440256812267587,
+    1.6378491713093841,
+    -0.5558535883401736,
+    -0.62195314420652,
+)
 
-class LaneTables(NamedTuple):
+
+@jit_within
+def _polynomial(coefficients, x):
+    """Return a polynomial by its coefficients, the highest power first."""
+    total = spread(coefficients[0])
+    for i in range(1, len(coefficients)):
+        total = fma(total, x, spread(coefficients[i]))
+    return total
+
+
+@jit_within
+def _halley(w, goal):
+    """Return w after one of Halley's steps to w − ln w = goal."""
+    one = spread(1.0)
+    inverse = divide(one, multiply(w, subtract(w, one)))
+    newton = multiply(multiply(subtract(subtract(w, logarithm(w)), goal), multiply(w, w)), inverse)
+    return subtract(w, multiply(newton, fma(multiply(spread(0.5), newton), inverse, one)))
+
+
+@jit_within
+def line_contact(stiffness, log_length, depth):
+    """Return force, stiffness and one bit per lane that is pressed too far, of Hertzian line contact at depths above 0.
+
+    The law of `tolalloc.reducers.cycloid.solvers.pins`: w − ln w = ln(λ/depth), F = c·depth/w with c twice the
+    stiffness k, and dF/d(depth) = c/(w − 1). Quotients share their denominators: a division takes as long as ten
+    products.
+    """
+    one = spread(1.0)
+    goal = subtract(log_length, logarithm(depth))
+    far = above(spread(DEEPEST), goal)
+    goal = larger(goal, spread(DEEPEST))
+    p, q = _polynomial(_ABOVE, goal), _polynomial(_BELOW, goal)  # w = p/q
+    elsewhere = above(goal, spread(_FITTED[1])) | above(spread(_FITTED[0]), goal)
+    if elsewhere:
+        w = _halley(_halley(_halley(add(goal, logarithm(add(goal, one))), goal), goal), goal)
+        p, q = choose(elsewhere, w, p), choose(elsewhere, one, q)
+    below = subtract(p, q)
+    scale = divide(multiply(add(stiffness, stiffness), q), multiply(p, below))
+    return multiply(multiply(scale, below), depth), multiply(scale, p), far
+
+
+class VectorTables(NamedTuple):
     """What is tabulated at an angle: one angle for all lanes, or an own one for each."""
 
     stiffness: Common | Apart  # S, by rows [N/m]
@@ -105,14 +181,14 @@ def _keep_sums(disc, tables, force, stiffness, out):
 
 
 @jit_within
-def _press(discs, tables, v, tile):
+def _press(discs, tables, v, batch):
     """Add up the contacts of one register by the linear law; return how many are pressed."""
-    out, contacts, undisturbed = tile.pressing, tile.undisturbed.shape[1], tile.undisturbed
-    pins, width = contacts // len(discs), tile.q.shape[1]
+    out, contacts, undisturbed = batch.pressing, batch.undisturbed.shape[1], batch.undisturbed
+    pins, width = contacts // len(discs), batch.q.shape[1]
     zero, one = spread(0.0), spread(1.0)
     touching = zero
     for d in range(len(discs)):
-        x, y = pole_moves(d, tables, tile.q, width, v)
+        x, y = pole_moves(d, tables, batch.q, width, v)
         gx, gy, xx, xy, yy = zero, zero, zero, zero, zero
         for c in range(d * pins, d * pins + out.looked_at[d]):
             a, b = normal(tables, d, pins, c)
@@ -128,13 +204,13 @@ def _press(discs, tables, v, tile):
 
 
 @jit_within
-def _list_pairs(discs, tables, v, tile):
+def _list_pairs(discs, tables, v, batch):
     """List the pressed contacts of one register, and all pairs of them with a lane that presses; return how many."""
-    out, contacts, undisturbed, zero = tile.pressing, tile.undisturbed.shape[1], tile.undisturbed, spread(0.0)
-    pins, room, width = contacts // len(discs), out.pairs.shape[1], tile.q.shape[1]
+    out, contacts, undisturbed, zero = batch.pressing, batch.undisturbed.shape[1], batch.undisturbed, spread(0.0)
+    pins, room, width = contacts // len(discs), out.pairs.shape[1], batch.q.shape[1]
     listed, pairs = 0, 0
     for d in range(len(discs)):
-        x, y = pole_moves(d, tables, tile.q, width, v)
+        x, y = pole_moves(d, tables, batch.q, width, v)
         for c in range(d * pins, d * pins + out.looked_at[d]):
             a, b = normal(tables, d, pins, c)
             depth = fma(b, y, fma(a, x, load(undisturbed, v * contacts + c * WIDTH)))
@@ -172,15 +248,15 @@ def _press_pairs(pairs, out):
 
 
 @jit_in_place
-def _press_line_contacts(discs, tables, v, tile):
+def _press_line_contacts(discs, tables, v, batch):
     """Add up the contacts of one register by line contact; return how many are pressed, and which lanes too far.
 
     Of eight lanes, a contact that is pressed in one is pressed in three. So the law, which is most of the work, is
     solved for pairs of a contact and a lane, eight pairs side by side.
     """
-    out, zero, one = tile.pressing, spread(0.0), spread(1.0)
-    pins, room = tile.undisturbed.shape[1] // len(discs), out.pairs.shape[1]
-    far = _press_pairs(_list_pairs(discs, tables, v, tile), out)
+    out, zero, one = batch.pressing, spread(0.0), spread(1.0)
+    pins, room = batch.undisturbed.shape[1] // len(discs), out.pairs.shape[1]
+    far = _press_pairs(_list_pairs(discs, tables, v, batch), out)
     touching, careful, first, pair = zero, 0, 0, 0
     for d in range(len(discs)):
         gx, gy, xx, xy, yy = zero, zero, zero, zero, zero
@@ -201,8 +277,8 @@ def _press_line_contacts(discs, tables, v, tile):
 
 
 @jit_within
-def press(law, discs, tables, v, tile):
+def press(law, discs, tables, v, batch):
     """Add up the contacts of one register; return how many are pressed, and one bit per lane pressed too far."""
     if law == LINEAR:
-        return _press(discs, tables, v, tile), 0
-    return _press_line_contacts(discs, tables, v, tile)
+        return _press(discs, tables, v, batch), 0
+    return _press_line_contacts(discs, tables, v, batch)

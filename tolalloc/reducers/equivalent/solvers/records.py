@@ -12,7 +12,7 @@ from tolalloc.reducers.cycloid.solvers import LAWS
 from tolalloc.reducers.reducer.design import Reducer
 
 CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE, OUT_OF_RANGE = range(5)
-"""How an equilibrium ended; `tolalloc.reducers.equivalent.answers.Status` has the words."""
+"""How an equilibrium ended; `tolalloc.reducers.equivalent.model.Status` has the words."""
 
 
 class SolverDesign(NamedTuple):

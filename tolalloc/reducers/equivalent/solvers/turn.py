@@ -1,7 +1,7 @@
-"""All samples over a turn: tiles of samples in parallel, each from its own last angle's equilibrium; their forces.
+"""All samples over a turn: batches of samples in parallel, each from its own last angle's equilibrium; their forces.
 
 Samples without play go side by side in registers; whatever needs more care goes one by one. Which way
-a sample goes depends on itself alone, so its bits do not depend on the tile that it is in.
+a sample goes depends on itself alone, so its bits do not depend on the batch that it is in.
 """
 
 from __future__ import annotations
@@ -10,14 +10,27 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.solvers.contact_law import pin_force
-from tolalloc.reducers.equivalent.solvers.energy import compress, play_force
-from tolalloc.reducers.equivalent.solvers.guesses import guess_next, make_history
-from tolalloc.reducers.equivalent.solvers.interpolation import make_memory
-from tolalloc.reducers.equivalent.solvers.lane_solver import solve_tile_at
-from tolalloc.reducers.equivalent.solvers.problem import problem_at_node, solve_at_node, values_of
+from tolalloc.reducers.cycloid.solvers.pins import pin_force
+from tolalloc.reducers.equivalent.solvers.batch import (
+    BATCH,
+    FOUR,
+    ROW,
+    make_batch,
+    make_history,
+    nonzero_rows,
+    nonzero_waves,
+    solve_batch_at,
+    start_next,
+)
+from tolalloc.reducers.equivalent.solvers.contact_solver import (
+    compress,
+    play_force,
+    problem_at_node,
+    solve_at_node,
+    values_of,
+)
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
-from tolalloc.reducers.equivalent.solvers.tile import FOUR, ROW, TILE, make_tile, nonzero_rows, nonzero_waves
+from tolalloc.reducers.equivalent.solvers.workspace import make_memory
 from tolalloc.running.compiled import in_threads, jit, jit_in_place, thread_count
 
 
@@ -47,78 +60,82 @@ def _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, t
         if not finite[s]:
             _give_up(turn, s)
             continue
-        guess = np.zeros(turn.retained.shape[2])
+        start = np.zeros(turn.retained.shape[2])
         for angle in range(turn.rotation.shape[1]):
-            _alone(s, angle, first + angle * stride, tables, layout, design, values, guess, memory, turn)
+            _alone(s, angle, first + angle * stride, tables, layout, design, values, start, memory, turn)
 
 
 @jit
-def _alone(s, angle, at, tables, layout, design, values, guess, memory, turn):
-    """Solve one sample at one node from the guess, which becomes the next one: the equilibrium, or zero without one."""
+def _alone(s, angle, at, tables, layout, design, values, start, memory, turn):
+    """Solve one sample at one node from the start, which becomes the next one: the equilibrium, or zero without one."""
     rotation, status, ratio, touching = solve_at_node(
-        at, tables, layout, design.face_width, values[s], guess, memory[0], memory[1]
+        at, tables, layout, design.face_width, values[s], start, memory[0], memory[1]
     )
     turn.rotation[s, angle], turn.status[s, angle] = rotation, status
     turn.residual[s, angle], turn.touching[s, angle] = ratio, touching
-    turn.retained[s, angle] = guess
+    turn.retained[s, angle] = start
     if status != CONVERGED:
-        guess[:] = 0.0
+        start[:] = 0.0
 
 
-def tile_size(samples: int) -> int:
-    """Return how many samples go into a tile so that every thread has one: whole fours of registers, `TILE` at most."""
+def batch_size(samples: int) -> int:
+    """Return how many samples go into a batch: whole fours of registers up to `BATCH`."""
     share = FOUR * thread_count()
-    return int(min(FOUR * max((samples + share - 1) // share, 1), TILE))
+    return int(min(FOUR * max((samples + share - 1) // share, 1), BATCH))
 
 
 @jit
-def _fill_tile(layout, values, finite, used, tile, tilted):
-    """Set the values of a tile, its last sample filling the room that is left; set which samples have tilted discs."""
+def _fill_batch(layout, values, finite, used, batch, tilted):
+    """Set the values of a batch, its last sample filling the room that is left; set which samples have tilted discs."""
     for s in range(used):
         own = min(s, values.shape[0] - 1)
         for m in range(layout.end):
-            tile.values[m, s] = values[own, m] if finite[own] else 0.0
-        tilted[s] = np.any(tile.values[layout.tilt :, s] != 0.0)
+            batch.values[m, s] = values[own, m] if finite[own] else 0.0
+        tilted[s] = np.any(batch.values[layout.tilt :, s] != 0.0)
 
 
 @jit_in_place
-def _take_over(samples, angle, tile, turn):
-    """Put a tile's equilibria at an angle into the turn."""
+def _take_over(samples, angle, batch, turn):
+    """Put a batch's equilibria at an angle into the turn."""
     for s in range(samples):
-        turn.rotation[s, angle], turn.status[s, angle] = tile.rotation[s], CONVERGED
-        turn.residual[s, angle], turn.touching[s, angle] = tile.ratio[s], tile.touching[s]
-        for i in range(tile.q.shape[0]):
-            turn.retained[s, angle, i] = tile.q[i, s]
+        turn.rotation[s, angle], turn.status[s, angle] = batch.rotation[s], CONVERGED
+        turn.residual[s, angle], turn.touching[s, angle] = batch.ratio[s], batch.touching[s]
+        for i in range(batch.q.shape[0]):
+            turn.retained[s, angle, i] = batch.q[i, s]
 
 
 @jit
 def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn):
-    """Solve up to a tile of samples at every ``stride``-th node, side by side."""
+    """Solve up to a batch of samples at every ``stride``-th node, side by side."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
     used = (samples + FOUR - 1) // FOUR * FOUR
-    tile, careful, tilted = make_tile(layout, size, contacts, ROW), np.empty(TILE, np.bool_), np.zeros(TILE, np.bool_)
-    _fill_tile(layout, values, finite, used, tile, tilted)
-    rows, waves = nonzero_rows(tile.values, 0, layout.torque + 1), nonzero_waves(layout, tile.values)
-    teeth_deviate = np.any(tile.values[layout.tooth : layout.tilt] != 0.0)
-    guess, history = np.empty(size), make_history(turn_of_crank, size)
+    batch, careful, tilted = (
+        make_batch(layout, size, contacts, ROW),
+        np.empty(BATCH, np.bool_),
+        np.zeros(BATCH, np.bool_),
+    )
+    _fill_batch(layout, values, finite, used, batch, tilted)
+    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
+    start, history = np.empty(size), make_history(turn_of_crank, size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
-        solve_tile_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, tile, careful)
-        _take_over(samples, angle, tile, turn)
+        solve_batch_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, batch, careful)
+        _take_over(samples, angle, batch, turn)
         for s in range(samples):
             if finite[s] and (careful[s] or tilted[s]):
-                guess[:] = history[(angle - 1) % history.shape[0], :, s]
-                _alone(s, angle, at, tables, layout, design, values, guess, memory, turn)
-                tile.q[:, s] = guess
-        guess_next(angle, turn_of_crank, used, tile.q, history)
+                start[:] = history[(angle - 1) % history.shape[0], :, s]
+                _alone(s, angle, at, tables, layout, design, values, start, memory, turn)
+                batch.q[:, s] = start
+        start_next(angle, turn_of_crank, used, batch.q, history)
     for s in range(samples):
         if not finite[s]:
             _give_up(turn, s)
 
 
-def solve_tile(
+def solve_batch(
     discs: Any,
     first: Any,
     stride: Any,
@@ -131,7 +148,7 @@ def solve_tile(
     torque: Any,
     turn: Any,
 ) -> None:
-    """Solve up to a tile of samples at every ``stride``-th node of the tables, from node ``first`` on.
+    """Solve up to a batch of samples at every ``stride``-th node of the tables, from node ``first`` on.
 
     A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
     apart.
@@ -160,9 +177,9 @@ def solve_curves(
 
     def solve(part: slice) -> None:
         own = SolvedTurn(*(values[part] for values in turn))
-        solve_tile(discs, 0, 1, turn_of_crank, tables, layout, mapped, design, errors[part], torque, own)
+        solve_batch(discs, 0, 1, turn_of_crank, tables, layout, mapped, design, errors[part], torque, own)
 
-    in_threads(solve, errors.shape[0], tile_size(errors.shape[0]))
+    in_threads(solve, errors.shape[0], batch_size(errors.shape[0]))
 
 
 @jit

@@ -1,10 +1,15 @@
-"""Rolling bearings: radial force of a displaced ring as a sum over its rolling elements, ISO/TS 16281."""
+"""Rolling bearings: radial force of a displaced ring as a sum over its rolling elements, ISO/TS 16281.
+
+A part that yields in an interface.
+
+What the friction of a reducer follows from: a coefficient per kind of contact, and the dimensions of bearings.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 from math import asin, cos, log, pi, sin, sqrt, tan
 from typing import Annotated
 
@@ -259,3 +264,103 @@ class BallBearing(RollingBearing):
         second, first = 1.0003 + 0.5968 / ratio, 1.5277 + 0.6023 * log(ratio)
         modulus = _STEEL.elastic_modulus / (1.0 - _STEEL.poisson_ratio**2)
         return float(pi * slenderness * modulus) * sqrt(2.0 * second / (9.0 * total * first**3))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part that yields in an interface: a rolling bearing, or a body with a constant compliance."""
+
+    interface: str  # Field of `tolalloc.reducers.reducer.stiffness.Stiffness` that it belongs to
+    name: str  # What it is, such as ``carrier twist``
+    yields: RollingBearing | float  # The bearing, or what the body yields [m/N]
+    stiffer: float = 1.0  # Stiffness over what the dimensions give, where it was identified [-]
+
+    def compliance(self, force: float) -> float:
+        """Return the way over the force [m/N]."""
+        own = _bearing(self.yields, force) if isinstance(self.yields, RollingBearing) else self.yields
+        return own / self.stiffer
+
+    def ways(self, force: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+        """Return the way beyond the play under every force [m]."""
+        own = self.yields.ways(force) if isinstance(self.yields, RollingBearing) else self.yields * force
+        return np.asarray(own / self.stiffer)
+
+
+@lru_cache(maxsize=256)
+def _bearing(bearing: RollingBearing, force: float) -> float:
+    """Return what a bearing yields; loops of torque ask the same few forces again and again."""
+    return bearing.compliance(force)
+
+
+Coefficient = Annotated[float, Field(ge=0, le=0.5)]
+
+SLIDING_FRICTION = 0.05
+"""Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
+
+LARGEST_CONTACT_RATIO = 2.0
+"""Contact ratio up to which the friction of a gear mesh is known here [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """Coefficients of friction; table ``[friction]`` of a reducer file, all assumed unless a file states them.
+
+    Those of bearings are SKF's for M = µ·P·d/2, ordinary lubrication included, of needle rollers, tapered rollers and
+    angular-contact balls; d is taken as the pitch diameter, because files state no bore: a fifth more friction.
+    """
+
+    # A disc on a pin, or the pin in its groove: whichever slides [-]
+    pins: Coefficient = SLIDING_FRICTION
+    crank_disc_bearing: Coefficient = 0.0025
+    crank_carrier_bearing: Coefficient = 0.0018
+    carrier_bearing: Coefficient = 0.0020
+    gear_mesh: Coefficient = 0.06  # µ_z, mean over the path of contact [-]
+
+
+CONTACTS = {field.name: field.name.replace("_", " ").replace("crank ", "crank–") for field in fields(Friction)}
+"""Kind of contact → its name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionDimensions:
+    """Dimensions from which friction follows; none where a file states a stiffness instead."""
+
+    crank_disc_bearing: RollingBearing | None = None  # One journal's
+    crank_carrier_bearing: RollingBearing | None = None  # Both of one crankshaft as rows of one
+    carrier_bearing: RollingBearing | None = None
+    contact_ratio: float | None = None  # Of a sun–planet mesh [-]
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Kinds of contact whose friction does not follow from what the file states."""
+        bearings = tuple(name for name, value in vars(self).items() if value is None and name != "contact_ratio")
+        known = self.contact_ratio is not None and self.contact_ratio <= LARGEST_CONTACT_RATIO
+        return bearings if known else (*bearings, "gear_mesh")
+
+
+def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> float:
+    """Return H_v, friction work over transmitted work and coefficient of a spur gear pair, theory page (71) [-].
+
+    Ohlendorf's π(1/z1 + 1/z2)(1 − ε + ε1² + ε2²) with the path of contact alike before and behind the pitch point,
+    ε1 = ε2 = ε/2: that of gears whose profile shift balances the sliding.
+
+    Examples
+    --------
+    >>> f"{loss_factor(10, 26, 1.5):.3f}"
+    '0.272'
+    """
+    return pi * (1 / first_teeth + 1 / second_teeth) * (1 - contact_ratio + contact_ratio**2 / 2)
+
+
+def friction_assumptions(friction: Friction, dimensions: FrictionDimensions) -> tuple[str, ...]:
+    """Return what the numbers on friction take for granted, and what they leave out."""
+    coefficients = ", ".join(f"{CONTACTS[name]} {value:g}" for name, value in vars(friction).items())
+    unknown = ", ".join(CONTACTS[name] for name in dimensions.unknown)
+    return (
+        f"coefficients of friction: {coefficients}; the same at every speed and temperature",
+        "friction: Coulomb's, at the forces without friction; no seals, no churning of grease, no flanges of rollers",
+        *(
+            (f"friction of {unknown}: not known, because the file states a stiffness and no dimensions",)
+            * bool(unknown)
+        ),
+    )

@@ -41,10 +41,10 @@ class Corrected:
         evaluation = self.response(x)
         return replace(evaluation, values=self.offset + self.factor * evaluation.values)
 
-    def put_away(self) -> None:
+    def release(self) -> None:
         """Let go of the tables of what answers."""
         if isinstance(self.response, KeepsTables):
-            self.response.put_away()
+            self.response.release()
 
 
 def corrected(response: Response, evaluation: Evaluation, y: Float[np.ndarray, " sample"]) -> Corrected:

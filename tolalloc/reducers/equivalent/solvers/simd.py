@@ -1,6 +1,6 @@
 """Eight samples side by side in one vector register, for compiled code.
 
-A value of type ``Lanes`` is eight doubles that go through the same operations. Every operation is written out as it is
+A value of type ``Vector`` is eight doubles that go through the same operations. Every operation is written out as it is
 rounded (a fused multiply-add only where `fma` stands), so the bits of a lane depend neither on its neighbours nor on
 what the compiler finds profitable. Machines with shorter registers take the same steps in two or four parts.
 """
@@ -52,19 +52,19 @@ def aligned(rows, width):
     return room[first : first + rows * width].reshape(rows, width)
 
 
-class _Lanes(types.Type):  # type: ignore[misc]
+class _Vector(types.Type):  # type: ignore[misc]
     """Type of the doubles side by side."""
 
     def __init__(self) -> None:
-        super().__init__(name="Lanes")
+        super().__init__(name="Vector")
 
 
-lanes = _Lanes()
+vector = _Vector()
 
 
-@register_model(_Lanes)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
-    """A Lanes value is one vector to the compiler."""
+@register_model(_Vector)
+class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+    """A Vector value is one vector to the compiler."""
 
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _DOUBLES)
@@ -92,7 +92,7 @@ def load(typing, array, at):
     def emit(context, builder, signature, arguments):
         return builder.load(_address(context, builder, signature.args[0], *arguments), align=8)
 
-    return lanes(array, types.intp), emit
+    return vector(array, types.intp), emit
 
 
 def _entry(context, builder, kind, table, at):
@@ -111,7 +111,7 @@ def entry(typing, table, at):
     def emit(context, builder, signature, arguments):
         return _entry(context, builder, signature.args[0], *arguments)
 
-    return lanes(table, types.intp), emit
+    return vector(table, types.intp), emit
 
 
 @intrinsic
@@ -121,7 +121,7 @@ def store(typing, array, at, value):
     def emit(context, builder, signature, arguments):
         builder.store(arguments[2], _address(context, builder, signature.args[0], *arguments[:2]), align=8)
 
-    return types.void(array, types.intp, lanes), emit
+    return types.void(array, types.intp, vector), emit
 
 
 @intrinsic
@@ -131,7 +131,7 @@ def spread(typing, number):
     def emit(context, builder, signature, arguments):
         return _splat(builder, arguments[0])
 
-    return lanes(types.float64), emit
+    return vector(types.float64), emit
 
 
 def _binary(instruction: str) -> Any:
@@ -140,7 +140,7 @@ def _binary(instruction: str) -> Any:
         def emit(context, builder, signature, arguments):
             return getattr(builder, instruction)(*arguments)
 
-        return lanes(lanes, lanes), emit
+        return vector(vector, vector), emit
 
     return operation
 
@@ -155,7 +155,7 @@ def fma(typing, a, b, c):
     def emit(context, builder, signature, arguments):
         return _call(builder, "fma", arguments)
 
-    return lanes(lanes, lanes, lanes), emit
+    return vector(vector, vector, vector), emit
 
 
 _ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of √½
@@ -194,7 +194,7 @@ def logarithm(typing, a):
         high, low = real(LOGARITHM_OF_TWO), real(_LOGARITHM_LEFT)
         return builder.fadd(builder.fmul(k, high), builder.fsub(f, builder.fsub(rest, builder.fmul(k, low))))
 
-    return lanes(lanes), emit
+    return vector(vector), emit
 
 
 @intrinsic
@@ -204,7 +204,7 @@ def magnitude(typing, a):
     def emit(context, builder, signature, arguments):
         return _call(builder, "fabs", arguments)
 
-    return lanes(lanes), emit
+    return vector(vector), emit
 
 
 @intrinsic
@@ -214,7 +214,7 @@ def larger(typing, a, b):
     def emit(context, builder, signature, arguments):
         return builder.select(builder.fcmp_ordered(">", *arguments), *arguments)
 
-    return lanes(lanes, lanes), emit
+    return vector(vector, vector), emit
 
 
 @intrinsic
@@ -225,7 +225,7 @@ def above(typing, a, b):
         bits = builder.fcmp_ordered(">", *arguments)
         return builder.zext(builder.bitcast(bits, ir.IntType(WIDTH)), ir.IntType(64))
 
-    return types.int64(lanes, lanes), emit
+    return types.int64(vector, vector), emit
 
 
 @intrinsic
@@ -235,7 +235,7 @@ def choose(typing, bits, a, b):
     def emit(context, builder, signature, arguments):
         return builder.select(_mask(builder, arguments[0]), arguments[1], arguments[2])
 
-    return lanes(types.int64, lanes, lanes), emit
+    return vector(types.int64, vector, vector), emit
 
 
 def _mask(builder: Any, bits: Any) -> Any:
@@ -271,7 +271,7 @@ def compress(typing, array, at, bits, value):
         for lane, place in _places(builder, context.make_array(kind)(context, builder, array).data, at, bits):
             builder.store(builder.extract_element(value, lane), place)
 
-    return types.void(array, types.intp, types.int64, lanes), emit
+    return types.void(array, types.intp, types.int64, vector), emit
 
 
 @intrinsic
@@ -288,7 +288,7 @@ def expand(typing, array, at, bits):
             apart = builder.insert_element(apart, builder.load(place), lane)
         return builder.select(_mask(builder, bits), apart, ir.Constant(_DOUBLES, [0.0] * WIDTH))
 
-    return lanes(array, types.intp, types.int64), emit
+    return vector(array, types.intp, types.int64), emit
 
 
 @intrinsic

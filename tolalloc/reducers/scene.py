@@ -1,0 +1,501 @@
+"""A reducer and one of its units as a picture needs them: frozen, in millimetres and true proportion, ready for JSON.
+
+Where each source of a drawing sits; how large every part is drawn, by what the reducer states and by one rule for what
+it leaves open; what the model's equilibria say of pins and displaced parts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from math import gcd, pi, sin
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from tolalloc.exceptions import SolveError, UnknownNameError
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, profile_points
+from tolalloc.reducers.equivalent.condensation import (
+    CondensedAngles,
+    bilateral_groups,
+    retained_coordinates,
+    rotation_scale,
+)
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
+from tolalloc.reducers.equivalent.outputs import Forces, forces
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
+from tolalloc.reducers.reducer.bearings import RollingBearing
+from tolalloc.reducers.reducer.design import Reducer
+
+_RULES = (
+    (r"each_pin\.diameter|pin\..+", "pins"),
+    (r"each_pin\.groove|housing\.groove\..+", "housing.grooves"),
+    (r"each_pin\.position|housing\.(?:pitch|runout)", "housing.pins"),
+    (r"(sun|planet\d+|disc\d+)\.(?:each_tooth\..+|pitch|runout)", r"\1.teeth"),
+    (r"(sun|planet\d+|carrier|crank\d+|disc\d+)\.(?:assembly|eccentricity|tilt|clearance)", r"\1"),
+    (r"(mesh\d+)\..+", r"\1"),
+    (r"(disc\d+\.bore\d+|crank\d+\.journal\d+|carrier\.bore\d+|disc\d+\.bores)\..+", r"\1"),
+)
+"""Name of a source → the place that it sits at."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A feature of a part that the picture shows and that sources of the drawing limit."""
+
+    id: str  # Name of the feature, the beginning of its sources' names where they share one
+    label: str  # What a reader calls it
+    part: str  # Part that carries it
+    sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
+
+
+def place_of(source: str) -> str:
+    """Return the id of the place that a source sits at.
+
+    Raises
+    ------
+    UnknownNameError
+        A name that no reducer has.
+
+    Examples
+    --------
+    >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
+    ('disc2.teeth', 'crank1.journal2', 'carrier')
+    """
+    for pattern, place in _RULES:
+        match = re.fullmatch(pattern, source)
+        if match:
+            return match.expand(place)
+    raise UnknownNameError.among("places of a reducer", "source", source, [pattern for pattern, _ in _RULES])
+
+
+def is_placed(source: str) -> bool:
+    """Return whether the picture has a place for a source, as it has for all of this package."""
+    return any(re.fullmatch(pattern, source) for pattern, _ in _RULES)
+
+
+def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...]:
+    """Return all places of a reducer with the sources of a drawing, from the inside of the housing to the input.
+
+    Raises
+    ------
+    UnknownNameError
+        A source that sits at no part of the reducer.
+    """
+    found = {place.id: place for place in _all_places(reducer)}
+    for source in sources:
+        own = place_of(source)
+        if own not in found:
+            raise UnknownNameError.among(f"places of {reducer.name}", "source", source, found)
+        found[own] = replace(found[own], sources=(*found[own].sources, source))
+    return tuple(found.values())
+
+
+def _all_places(reducer: Reducer) -> Iterable[Place]:
+    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
+    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
+    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
+    yield Place(id="pins", label="pins", part="pins")
+    for disc in discs:
+        yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.bores", label=f"pattern of the bores of disc {disc}", part=f"disc{disc}")
+        for crank in cranks:
+            yield Place(id=f"disc{disc}.bore{crank}", label=f"bore {crank} of disc {disc}", part=f"disc{disc}")
+    for crank in cranks:
+        yield Place(id=f"crank{crank}", label=f"crankshaft {crank}", part=f"crank{crank}")
+        for disc in discs:
+            label = f"journal {disc} of crankshaft {crank}"
+            yield Place(id=f"crank{crank}.journal{disc}", label=label, part=f"crank{crank}")
+    yield Place(id="carrier", label="carrier", part="carrier")
+    for crank in cranks:
+        yield Place(id=f"carrier.bore{crank}", label=f"bore {crank} of the carrier", part="carrier")
+    yield Place(id="sun", label="sun gear", part="sun")
+    yield Place(id="sun.teeth", label="teeth of the sun gear", part="sun")
+    for crank in cranks:
+        yield Place(id=f"planet{crank}", label=f"planet gear {crank}", part=f"planet{crank}")
+        yield Place(id=f"planet{crank}.teeth", label=f"teeth of planet gear {crank}", part=f"planet{crank}")
+        yield Place(id=f"mesh{crank}", label=f"mesh of sun and planet {crank}", part=f"planet{crank}")
+
+
+_BORE, _JOURNAL = 0.155, 0.103
+"""Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
+_HOUSING, _LAND = 1.17, 0.05
+"""Outer radius of the ring of pins, and least material between drawn features, both over that of the pin circle."""
+_POINTS = 22
+"""Points of a tooth [-]."""
+
+
+def outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
+    stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
+    circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
+    root = stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
+    land = _LAND * circle
+    room = min(crank_circle * sin(pi / reducer.crank_count), root - crank_circle, crank_circle) - land
+    journal, bore = _rings(dimensions.crank_disc_bearing, room, circle)
+    shaft, carrier_bore = _rings(dimensions.crank_carrier_bearing, room, circle)
+    lengths = {
+        "pin_circle_radius": circle,
+        "pin_radius": stage.pin_radius,
+        "eccentricity": stage.eccentricity,
+        "crank_circle_radius": crank_circle,
+        "module": first.module,
+        "bore_radius": bore,
+        "journal_radius": journal,
+        "carrier_bore_radius": carrier_bore,
+        "shaft_radius": min(shaft, max(journal - stage.eccentricity, 0.4 * journal)),
+        "disc_hole_radius": max(min(crank_circle - bore - land, 0.3 * circle), 0.2 * land),
+        "carrier_radius": min(crank_circle + carrier_bore + land, root - stage.eccentricity),
+        "housing_radius": _HOUSING * circle + stage.pin_radius,
+    }
+    counts = {
+        "crank_count": reducer.crank_count,
+        "disc_count": reducer.disc_count,
+        "pin_count": stage.pin_count,
+        "disc_teeth": stage.disc_teeth,
+        "sun_teeth": first.sun_teeth,
+        "planet_teeth": first.planet_teeth,
+        "pressure_angle": float(first.pressure_angle),
+    }
+    stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
+    open_names = [name for name, known in stated.items() if not known]
+    assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
+    return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
+
+
+def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[float, float]:
+    """Return the radii of the inner and the outer raceway, at most as large as there is room [m]."""
+    inner, outer = _JOURNAL * circle, _BORE * circle
+    if bearing is not None:
+        inner, outer = ((bearing.pitch_diameter + sign * bearing.diameter) / 2 for sign in (-1.0, 1.0))
+    shrunk = min(1.0, room / outer)
+    return inner * shrunk, outer * shrunk
+
+
+def tooth(reducer: Reducer) -> dict[str, list[Any]]:
+    """Return one tooth space of a disc, counter-clockwise from tip to tip about its root at angle 0.
+
+    ``exact`` and ``modified`` are points of the profile without and with the tooth modification [mm], ``normal`` the
+    unit vector into the disc [-]; the last point is left out, as it is the next space's first.
+    """
+    stage = reducer.cycloid_stage
+    exact, modified = ToothProfile(stage=stage), ToothProfile(stage=stage, modification=reducer.modification)
+    # Points stand dense where the tooth bends most; those of a space begin at the tip before it.
+    flank = -profile_points(exact, _POINTS).angle[: _POINTS // 2 + 1][::-1]
+
+    def around(flank_values: Float[np.ndarray, "point 2"]) -> list[Any]:
+        # The flank turns clockwise from the root; the other one is its mirror image.
+        return list(np.concatenate([flank_values[::-1], flank_values[1:] * (1.0, -1.0)])[:-1].tolist())
+
+    return {
+        "exact": around(exact.points(flank) / MILLIMETRE),
+        "modified": around(modified.points(flank) / MILLIMETRE),
+        "normal": around(exact.normals(flank)),
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class States:
+    """Equilibria of one unit at the angles of a picture, for one direction of rotation."""
+
+    torque: float  # Torque on the carrier, which resists this direction [N·m]
+    force: Float[np.ndarray, "angle disc pin"]  # Normal force between every pin and every disc [N]
+    gap: Float[np.ndarray, "angle disc pin"]  # Between them, negative where they are compressed [m]
+    displacement: Float[np.ndarray, "angle coordinate"]  # All coordinates of the model [m, rad]
+    transmission_error: Float[np.ndarray, " angle"]  # Carrier rotation beyond its nominal angle [rad]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """What all units of a reducer share at the angles of a picture."""
+
+    model: EquivalentModel  # The reducer, its parts as stiff as they are under the torque
+    carrier_angle: Float[np.ndarray, " angle"]  # θc, equally spaced over one output turn [rad]
+    tables: CondensedAngles  # Its condensed tables
+    # Coordinates that pins and play touch, the others, and the lever that makes each a length [-, -, m]
+    retained: Int[np.ndarray, " retained"]
+    rest: Int[np.ndarray, " rest"]
+    scale: Float[np.ndarray, " coordinate"]
+    groups: tuple[SpringGroup, ...]  # All spring rows but those of pins
+    way_by_coordinate: Float[np.ndarray, "angle row coordinate"]  # Of the bilateral rows [m/m or m/rad]
+    rest_by_way: Float[np.ndarray, "angle rest row"]  # The other coordinates that belong to the rows' ways [m/m, rad/m]
+
+
+@lru_cache(maxsize=4)
+def turn_of(model: EquivalentModel, count: int) -> Turn:
+    """Return what all units of a model share at equally spaced angles [-]; remembered for the next unit."""
+    angle = 2 * pi * np.arange(count) / count
+    at = Positions(model.reducer, angle, model.orders)
+    groups = bilateral_groups(at)
+    retained = retained_coordinates(model.reducer, at.coordinates, groups)
+    rest = np.setdiff1d(np.arange(at.coordinates.count), retained)
+    rows = np.concatenate([group.displacement for group in groups if group.contact == "bilateral"], axis=1)
+    return Turn(
+        model=model,
+        carrier_angle=angle,
+        tables=model.tables_at(angle),
+        retained=retained,
+        rest=rest,
+        scale=rotation_scale(model.reducer, at.coordinates),
+        groups=tuple(groups),
+        way_by_coordinate=rows,
+        rest_by_way=np.linalg.pinv(rows[:, :, rest]),
+    )
+
+
+def solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: float) -> States:
+    """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m].
+
+    Raises
+    ------
+    SolveError
+        An angle without equilibrium.
+    """
+    equilibria = turn.model.equilibria_of(turn.tables, errors[np.newaxis], torque, turn.carrier_angle)
+    worst = Status(int(equilibria.status.max()))
+    if worst is not Status.CONVERGED:
+        raise SolveError(f"picture of {turn.model.reducer.name}: at some angle {worst.sentence}.")
+    carried = forces(equilibria)
+    return States(
+        torque=torque,
+        force=carried.pins[0],
+        gap=-compressions(equilibria),
+        displacement=displacements(turn, equilibria, carried),
+        transmission_error=equilibria.transmission_error[0],
+    )
+
+
+def compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
+    """Return the compression at mid-width of every pin and disc of one unit, negative where a gap is left [m].
+
+    Summed in the order of the solver, so that no digit differs from what it balances.
+    """
+    tables, layout = equilibria.tables, equilibria.columns.layout
+    values = _values(equilibria)
+    radial, tangential, radius = values[layout.pin : layout.wave].reshape(3, layout.pins)
+    found = np.empty((equilibria.carrier_angle.size, *tables.contact_by_disc.shape[1::2]))
+    for disc in range(found.shape[1]):
+        by_error, by_disc = tables.contact_by_error[:, disc], tables.contact_by_disc[:, disc]
+        undisturbed = radius + (by_error[:, 0] * radial + by_error[:, 1] * tangential)
+        first = layout.wave + disc * layout.waves
+        for wave in np.flatnonzero(values[first : first + layout.waves]):
+            undisturbed = undisturbed + by_error[:, 2 + wave] * values[first + wave]
+        first = layout.tooth + disc * 2 * layout.teeth
+        for kind, own in enumerate(values[first : first + 2 * layout.teeth].reshape(2, layout.teeth)):
+            if own.any():
+                undisturbed = undisturbed + by_error[:, 2 + layout.waves + kind] * own[tables.tooth[:, disc]]
+        x, y, turn = (equilibria.retained[0, :, 3 * disc + axis, np.newaxis] for axis in range(3))
+        found[:, disc] = by_disc[:, 0] * x + by_disc[:, 1] * y + by_disc[:, 2] * turn + undisturbed
+    return found
+
+
+def _values(equilibria: Equilibria) -> Float[np.ndarray, " value"]:
+    """Return the values that the tables take of one unit, entry by entry as the solver adds them [m, rad]."""
+    mapped = equilibria.columns.map
+    values = mapped.nominal.copy()
+    np.add.at(values, mapped.value, mapped.factor * equilibria.errors[0, mapped.column])
+    return values
+
+
+def displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float[np.ndarray, "angle coordinate"]:
+    """Return all coordinates of one unit, of which the equilibria hold those alone that pins and play touch [m, rad].
+
+    The others follow from the ways of the springs, force over stiffness, theory page equation (5).
+    """
+    found = np.zeros((equilibria.carrier_angle.size, turn.scale.size))
+    found[:, turn.retained] = equilibria.retained[0] * turn.scale[turn.retained]
+    values = _values(equilibria)
+    way = carried.rows[0] / equilibria.tables.row_stiffness
+    first, row = 0, 0
+    for group in turn.groups:
+        last = first + len(group.columns)
+        if group.contact == "bilateral":
+            count = group.stiffness.shape[1]
+            way[:, row : row + count] -= group.error @ values[first:last]
+            row += count
+        first = last
+    way -= np.einsum("arc,ac->ar", turn.way_by_coordinate, found)
+    found[:, turn.rest] = np.einsum("acr,ar->ac", turn.rest_by_way, way)
+    return found
+
+
+PER_CRANK_TURN = 12
+"""Angles of a picture per turn of the cranks; between them it goes straight from one to the next [-]."""
+_NICE = (1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A reducer and one of its units as a picture needs them.
+
+    Angles of parts grow evenly with the carrier's: angle = start + turns·θc, in the housing's frame, counter-clockwise
+    positive. The picture closes after `output_turns` of the carrier; the equilibria are those of the first output turn.
+    """
+
+    reducer: str  # Name of the reducer
+    unit: str  # Name of the unit
+    outline: Mapping[str, float]  # Radii and counts of parts [mm, -], angles [rad]
+    tooth: Mapping[str, list[Any]]  # One tooth space of a disc, `tolalloc.reducers.scene.tooth` [mm, -, rad]
+    turns: Mapping[str, float]  # Turns of carrier, cranks, discs, planets and sun per output turn, with their sign [-]
+    # Angles at θc = 0, one entry per crank, disc, pin or planet, and of the sun's first tooth [rad]
+    start: Mapping[str, list[float]]
+    coordinates: Mapping[str, list[int]]  # First coordinate of sun, planets, discs and carrier [-]
+    output_turns: int  # Turns of the carrier after which every part is where it was [-]
+    carrier_angle: Float[np.ndarray, " angle"]  # θc of the equilibria, over one output turn [rad]
+    forward: States  # Equilibria while the carrier turns counter-clockwise against the torque
+    backward: States  # The same clockwise
+    offsets: Mapping[str, list[float]]  # Place → deviation of its axis x, y in its own part's frame [mm]
+    places: tuple[Place, ...]  # Where the sources sit
+    magnification: float  # By which errors and gaps are drawn larger, unless the reader chooses another [-]
+    assumptions: tuple[str, ...] = ()  # What the picture shows and no file states
+
+    @cached_property
+    def place_by_source(self) -> dict[str, str]:
+        """Source of the drawing → id of its place."""
+        return {source: place.id for place in self.places for source in place.sources}
+
+    def angle(self, part: str, carrier_angle: float, number: int = 0) -> float:
+        """Return where a part stands at a carrier angle: an entry of `start`, its number from 0 [rad]."""
+        return float(self.start[part][number] + self.turns[part] * carrier_angle)
+
+
+def scene_of(
+    model: EquivalentModel,
+    errors: Float[np.ndarray, " column"],
+    torque: float,
+    *,
+    unit: str = "",
+    sources: Iterable[str] = (),
+    per_crank_turn: int = PER_CRANK_TURN,
+) -> Scene:
+    """Return the scene of one unit.
+
+    Parameters
+    ----------
+    model
+        The reducer; the stiffness of its parts is taken under the torque.
+    errors
+        Deviations of the unit in the order of the model's columns, the tooth modification among them [m, angles rad].
+    torque
+        Torque on the carrier; its magnitude resists both directions [N·m].
+    unit
+        Name of the unit.
+    sources
+        Names of the drawing's sources.
+    per_crank_turn
+        Angles per turn of the cranks [-].
+
+    Raises
+    ------
+    SolveError
+        An angle without equilibrium.
+    UnknownNameError
+        A source that sits at no part of the reducer.
+    """
+    own = dict(zip(model.columns, (float(value) for value in errors), strict=True))
+    reducer = _as_modified(model.reducer, own)
+    turn = turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
+    forward, backward = (solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
+    outline, assumptions = outlines(reducer)
+    turns, start = _motion(reducer)
+    return Scene(
+        reducer=reducer.name,
+        unit=unit,
+        outline=outline,
+        tooth=tooth(reducer),
+        turns=turns,
+        start=start,
+        coordinates=_coordinates(reducer),
+        output_turns=reducer.first_stage.sun_teeth
+        // gcd(reducer.first_stage.sun_teeth, reducer.first_stage.planet_teeth * reducer.cycloid_stage.pin_count),
+        carrier_angle=turn.carrier_angle,
+        forward=forward,
+        backward=backward,
+        offsets=_offsets(reducer, own),
+        places=places_of(reducer, sources),
+        magnification=magnification(reducer, forward, backward),
+        assumptions=assumptions,
+    )
+
+
+def _as_modified(reducer: Reducer, own: Mapping[str, float]) -> Reducer:
+    """Return the reducer with the tooth modification that the unit's columns state."""
+    amounts = {name: own[f"modification.{name}"] for name in ("equidistant", "shift")}
+    return replace(reducer, modification=replace(reducer.modification, **amounts))
+
+
+def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Return turns per output turn and starting angles of all parts, both read off the model's own kinematics [-; rad].
+
+    A planet's first tooth starts where its teeth and the sun's mesh: nothing of the model depends on it.
+    """
+    still, turned = (Positions(reducer, np.array([angle])) for angle in (0.0, 2 * pi))
+    cranks, discs = range(reducer.crank_count), range(reducer.disc_count)
+    stage, first = reducer.cycloid_stage, reducer.first_stage
+
+    def turns(at: Any) -> float:
+        return float((at(turned)[0] - at(still)[0]) / (2 * pi))
+
+    position = [float(still.crank_position(crank)[0]) for crank in cranks]
+    in_mesh = [direction * first.sun_teeth / (2 * pi) % 1.0 for direction in position]
+    start = {
+        "carrier": position,
+        "crank": [float(still.disc_direction(disc)[0]) for disc in discs],
+        "disc": [float(-still.disc_direction(disc)[0] / stage.disc_teeth) for disc in discs],
+        "pin": [float(direction) for direction in still.pin_direction],
+        "planet": [
+            direction + pi + (ahead - 0.5) * 2 * pi / first.planet_teeth
+            for direction, ahead in zip(position, in_mesh, strict=True)
+        ],
+        "sun": [float(still.sun_angle[0])],
+    }
+    rates = {
+        "carrier": turns(lambda at: at.crank_position(0)),
+        "crank": turns(lambda at: at.disc_direction(0)),
+        "disc": turns(lambda at: -at.disc_direction(0) / stage.disc_teeth),
+        "pin": 0.0,
+        "planet": turns(lambda at: at.crank_angle),
+        "sun": turns(lambda at: at.sun_angle),
+    }
+    return rates, start
+
+
+def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
+    """Return the first coordinate of every part [-]."""
+    own = Positions(reducer, np.zeros(1)).coordinates
+    return {
+        "sun": [own.sun],
+        "planet": [own.planet(crank) for crank in range(reducer.crank_count)],
+        "disc": [own.disc(disc) for disc in range(reducer.disc_count)],
+        "carrier": [own.carrier],
+    }
+
+
+def _offsets(reducer: Reducer, own: Mapping[str, float]) -> dict[str, list[float]]:
+    """Return how far the axes of features are off their places, in the frames of their parts [mm]."""
+    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
+    columns = {"sun": "sun.eccentricity"}
+    columns |= {f"planet{crank}": f"planet{crank}.eccentricity" for crank in cranks}
+    columns |= {f"carrier.bore{crank}": f"carrier.bore{crank}.position" for crank in cranks}
+    for disc in discs:
+        columns |= {f"disc{disc}.bore{crank}": f"disc{disc}.bore{crank}.position" for crank in cranks}
+        columns |= {f"crank{crank}.journal{disc}": f"crank{crank}.journal{disc}.eccentricity" for crank in cranks}
+    return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in columns.items()}
+
+
+def magnification(reducer: Reducer, *states: States) -> float:
+    """Return the largest of 1, 2, 5, 10, … at which no gap is drawn wider than half a pin's radius [-].
+
+    Examples
+    --------
+    A gap of 20 µm beside pins of 2 mm radius is drawn 50 times larger, 1 mm wide.
+    """
+    widest = max(float(np.abs(state.gap).max()) for state in states)
+    most = 0.5 * reducer.cycloid_stage.pin_radius / max(widest, 1e-9)
+    tens = 10.0 ** np.floor(np.log10(max(most, 1.0)))
+    return float(max(nice * tens for nice in _NICE if nice * tens <= max(most, 1.0)))
