@@ -1,16 +1,27 @@
-"""What tests build alike: studies of the baseline, sources, sums of sources, tables of three cranks."""
+"""What tests build alike: studies of the baseline, verifiers, sources, sums, refusals, tables of three cranks."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import tolalloc as ta
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.verify.verification import Verifier
+from tolalloc.capability.indices import Limits
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import TolallocError
+from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.study.prepared import Prepared
 
@@ -46,6 +57,46 @@ def prepared(
         **{"name": "test", **changes},
     )
     return Prepared(study=study)
+
+
+def verifier_of(
+    prepared: Prepared, *others: Requirement, limit: float = 60.0, space: DesignSpace | None = None, **changes: Any
+) -> Verifier:
+    """Return what verifies designs of a prepared study on 1152 units, its first requirement at another limit."""
+    first = replace(prepared.requirements[0], limits=Limits(upper=limit))
+    fields = {"seeds": SeedTree(4), "units": 1152, **changes}
+    return Verifier(space=space or prepared.space, model=prepared.model, requirements=(first, *others), **fields)
+
+
+def baseline_errors() -> ErrorModel:
+    """Return the sources of the shipped baseline table as the columns that they move."""
+    return ErrorModel(load_tolerance_table("rv20e_baseline"))
+
+
+def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **changes: Any) -> Source:
+    """Return a source with a zone of six standard deviations of 1, which may become a tenth or ten times as wide."""
+    own = {"part": "part", "minimum": zone / 10, "maximum": 10 * zone, "cost": 1.0, **changes}
+    return Source(name=name, feature=feature, zone=zone, **own)
+
+
+@dataclass(frozen=True)
+class Sum:
+    """A model whose only output is the sum of its columns."""
+
+    columns: tuple[str, ...]
+    outputs: tuple[str, ...] = ("y [-]",)
+
+    def __call__(self, x: np.ndarray) -> Evaluation:
+        return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
+
+
+def refusal(read: Callable[[Path], object], path: Path) -> str:
+    """Return the one sentence in which a file is refused."""
+    with pytest.raises(TolallocError) as caught:
+        read(path)
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    return sentence
 
 
 FIRST_STAGE = ("sun.", "planet", "mesh")

@@ -5,11 +5,13 @@ import os
 import numpy as np
 import pytest
 
+from tests import builders
 from tests.compiled_first import compile_in_two_processes
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.running.compiled import use_threads
+from tolalloc.study.prepared import Prepared
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     use_threads(1)  # every core has a worker already
@@ -37,3 +39,9 @@ def table4(rv20e: EquivalentModel) -> np.ndarray:
 @pytest.fixture
 def generator() -> np.random.Generator:
     return np.random.default_rng(20201121)
+
+
+@pytest.fixture(scope="session")
+def prepared() -> Prepared:
+    """The study of the baseline; its model and sources are made once for all tests."""
+    return builders.prepared()

@@ -36,7 +36,7 @@ _UNSTEADY = (
     (r"(│ computing time \[s\]).*$", r"\1"),
 )
 """What no two runs or machines have in common, and what stands for it."""
-_TIMED = re.compile(r"seconds \[s\]|per second|speed over|computing time")
+_TIMED = re.compile(r"seconds \[s\]|per second|speed over|computing time|time a set")
 """Headers of columns that hold how long something took."""
 _BLOCKS = {"p", "h1", "h2", "h3", "li", "div", "section", "summary", "dt", "dd", "figcaption", "br"}
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from studies.published.measurement_folder import write_measurements
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
+from tests.builders import baseline_errors
 from tests.studies.command import tolalloc
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.files import load_reducer
 
@@ -47,7 +46,7 @@ def simulated(bench: Bench, count: int, folder: Path) -> Path:
     """Write what a bench reads of a few units whose crank–disc bearings are stiffer than the preset says."""
     given, seeds = load_reducer("rv20e_liu2020"), SeedTree(7)
     true = replace(given, stiffness=replace(given.stiffness, **{NAME: TRUTH}))
-    units = random_units(ErrorModel(load_tolerance_table("rv20e_baseline")), count, seeds.child("units"))
+    units = random_units(baseline_errors(), count, seeds.child("units"))
     write_measurements(simulated_bench(true, units, bench).measured(seeds.child("noise")), folder)
     return folder
 

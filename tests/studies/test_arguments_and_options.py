@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.builders import baseline_errors
 from tests.studies.command import refused, tolalloc
 from tolalloc.bench.diagnosis import DiagnosisRequest
-from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.reducer.files import load_reducer
 
@@ -50,7 +49,7 @@ def test_the_package_says_its_argument():
         DiagnosisRequest(
             curve=Path("x.csv"),
             reducer=load_reducer("rv20e"),
-            errors=ErrorModel(load_tolerance_table("rv20e_baseline")),
+            errors=baseline_errors(),
             noise_arcsec=70,
         )
     assert error.value.argument == "noise_arcsec"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from tolalloc.cli import progress as lines
+from tolalloc.cli import console as lines
 from tolalloc.cli.console import print_table
 
 

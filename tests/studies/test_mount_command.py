@@ -6,18 +6,17 @@ import json
 
 import pytest
 
+from tests.builders import baseline_errors
 from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.stock import drawn_parts
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.reducer.files import load_reducer
 
 
 def parts_file(folder, units, seed=5):
     """Write random parts of an RV-20E."""
-    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    errors = baseline_errors()
     lines = ["part,kind,error,value,unit"]
     for part in drawn_parts(errors, load_reducer("rv20e_liu2020"), units, SeedTree(seed)):
         lines += [f"{part.name},{part.kind},{name},{value / MICROMETRE},µm" for name, value in part.errors.items()]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.stats import kurtosis, norm, skew
 
-from tests.builders import prepared as baseline
+from tests import builders
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal
@@ -18,30 +19,11 @@ from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.output_sample import OutputSample
 from tolalloc.allocation.space.problem import root_sum_square_stack, worst_case_stack
 from tolalloc.allocation.space.requirement import AtCpk, AtYield, Requirement, WorstCase
-from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import proportion
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
-UNITS = 1152
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline()
-
-
-def verifier_of(prepared, *others: Requirement, limit: float = 60.0, seed: int = 4) -> Verifier:
-    first = replace(prepared.requirements[0], limits=Limits(upper=limit))
-    return Verifier(
-        space=prepared.space,
-        model=prepared.model,
-        requirements=(first, *others),
-        seeds=SeedTree(seed),
-        units=UNITS,
-        slope_units=64,
-    )
+verifier_of = partial(builders.verifier_of, slope_units=64)
 
 
 class KnownSample(OutputSample):

@@ -9,6 +9,7 @@ import pytest
 
 import tolalloc.allocation.front.what_if as module
 from tests.builders import prepared as baseline
+from tests.builders import verifier_of
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.model import Reciprocal, SumOfCosts, Weighted
 from tolalloc.allocation.front.what_if import (
@@ -25,22 +26,9 @@ from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.zone_allocation import allocate
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.verify.verification import Verifier
-from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.files import load_identified_stiffness
 from tolalloc.reducers.settings import FLANK, RADIAL
-
-UNITS = 1152
-
-
-def verifier_of(prepared, limit: float = 60.0) -> Verifier:
-    return Verifier(
-        space=prepared.space,
-        model=prepared.model,
-        requirements=(replace(prepared.requirements[0], limits=Limits(upper=limit)),),
-        seeds=SeedTree(4),
-        units=UNITS,
-    )
 
 
 def allocated(verifier, steps=6):
@@ -48,11 +36,6 @@ def allocated(verifier, steps=6):
         np.append(np.full(len(verifier.space.groups), 0.7), [1.2, 6.4]), verifier.space.lower, verifier.space.upper
     )
     return allocate(verifier, (verifier.verify(design, "start"),), SearchEffort(steps=steps))
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline()
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import kstest
 
+from tests.builders import source
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair, load_correlations
 from tolalloc.drawings.distributions import Batch, Distribution
 from tolalloc.drawings.error_model import ErrorModel
@@ -19,11 +20,6 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 
 SAMPLES = 40_000
-
-
-def source(name: str, **changes) -> Source:
-    own = Source(name=name, part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0)
-    return replace(own, **changes)
 
 
 SIZES = tuple(source(name) for name in ("a", "b", "c", "d"))

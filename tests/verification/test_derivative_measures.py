@@ -9,21 +9,16 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tests.builders import baseline_errors, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
-
-
-def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **more) -> Source:
-    return Source(name=name, part="part", feature=feature, zone=zone, minimum=0.1, maximum=10.0, cost=1.0, **more)
 
 
 @dataclass(frozen=True)
@@ -160,7 +155,7 @@ def test_failed_units_are_counted_and_too_many_stop():
 
 
 def test_the_kernel_knows_its_derivatives(rv20e):
-    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    errors = baseline_errors()
     fixed = dict.fromkeys((name for name in rv20e.columns if name not in errors.columns), 0.0)
     kernel = KernelResponse(
         model=rv20e,

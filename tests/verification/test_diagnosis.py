@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import prepared as baseline
 from tolalloc.bench.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.measurements import MeasuredCurve
 from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Neighbourhood, Noise, bridge, climb, thinned
@@ -34,11 +33,6 @@ ANGLES = 2 * np.pi * np.arange(480) / 480
 ROOT = np.linalg.cholesky(NOISE.left_out(ANGLES) + NOISE.reading**2 * np.eye(ANGLES.size))
 EFFORT = DiagnosisEffort(angles=160, scouts=256, climbers=12, particles=256, judged=48)
 LITTLE = DiagnosisEffort(angles=48, scouts=64, climbers=4, attempts=1, nearby=1, particles=72, judged=8)
-
-
-@pytest.fixture(scope="module")
-def prepared() -> Prepared:
-    return baseline(name="diagnosis")
 
 
 def curve_of(prepared: Prepared, deviations: np.ndarray, generator: np.random.Generator) -> MeasuredCurve:

@@ -3,38 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
 import pytest
 
+from tests import builders
 from tests.builders import prepared as baseline
 from tolalloc.allocation.search.discrete import allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import kept_stacks
 from tolalloc.allocation.space.ladder import SERIES, ZONES, grade_zones
-from tolalloc.allocation.verify.verification import Verifier
-from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 
-UNITS, UM = 1152, 1e-6
+UM = 1e-6
+verifier_of = partial(builders.verifier_of, seeds=SeedTree(6))
 AMOUNT_STEP = 0.5
 """Step of an amount of the modification on the drawing [µm]."""
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline()
-
-
-def verifier_of(prepared, space=None, limit: float = 60.0) -> Verifier:
-    return Verifier(
-        space=space or prepared.space,
-        model=prepared.model,
-        requirements=(replace(prepared.requirements[0], limits=Limits(upper=limit)),),
-        seeds=SeedTree(6),
-        units=UNITS,
-    )
 
 
 def start_of(verifier, scale: float = 0.7, clearances=(1.2, 6.4)):
@@ -139,7 +125,9 @@ def test_the_start_on_shared_zones_is_as_near_as_shared_zones_can_be(prepared, f
 
 @pytest.mark.slow
 def test_the_choice_is_the_best_of_all_there_are(prepared):
-    verifier = verifier_of(prepared, keeping(prepared.space, "disc pitch", "disc run-out", "disc bores"), limit=70.0)
+    verifier = verifier_of(
+        prepared, space=keeping(prepared.space, "disc pitch", "disc run-out", "disc bores"), limit=70.0
+    )
     start = start_of(verifier)
     found = allocate_grades(verifier, start, 3)
     ladders = [ladder.zones for ladder in group_ladders(found.space)]
@@ -168,7 +156,7 @@ def test_the_choice_is_the_best_of_all_there_are(prepared):
 @pytest.mark.slow
 def test_a_locked_modification_stays_however_odd_it_is(prepared):
     now = prepared.model.reducer.modification
-    verifier = verifier_of(prepared, prepared.space.fixed, limit=70.0)
+    verifier = verifier_of(prepared, space=prepared.space.fixed, limit=70.0)
     found = allocate_grades(verifier, start_of(verifier), 2)
     assert found.chosen.met
     np.testing.assert_allclose(
@@ -179,7 +167,7 @@ def test_a_locked_modification_stays_however_odd_it_is(prepared):
 @pytest.mark.slow
 def test_a_clearance_that_leaves_no_round_amounts_is_kept_all_the_same(prepared):
     narrow = between(prepared.space, (1.23, 1.23), (5.0, 20.0))
-    verifier = verifier_of(prepared, narrow, limit=70.0)
+    verifier = verifier_of(prepared, space=narrow, limit=70.0)
     found = allocate_grades(verifier, start_of(verifier), 1)
     np.testing.assert_allclose(found.chosen.design[-2:], [1.23, 6.4], rtol=1e-9)
 

@@ -12,6 +12,7 @@ import pytest
 from openpyxl import Workbook, load_workbook
 from openpyxl.chart import BarChart
 
+from tests.builders import refusal
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.bench.readings import load_readings
@@ -26,14 +27,6 @@ from tolalloc.reducers.reducer.unit_file import load_unit, load_units
 HEADERS, ROW = ("id", "plus", "minus", "unit", "min", "max", "cost"), ("a", 0.1, -0.1, "mm", 0.02, 0.5, 3)
 HEADER, LINE = ",".join(HEADERS), ",".join(map(str, ROW))
 UNIT = 'name = "u"\nsource = "s"\n'
-
-
-def refusal(read, path):
-    with pytest.raises(TolallocError) as caught:
-        read(path)
-    sentence = str(caught.value)
-    assert "\n" not in sentence
-    return sentence
 
 
 def written(folder, name, content):

@@ -15,6 +15,7 @@ from studies.published.liu2020_swarm import best_neighbours, velocity, weights
 from studies.published.liu2020_tables import BiasOnly, improvement
 from studies.published.recovery import recovery
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
+from tests.builders import baseline_errors
 from tolalloc.bench.information import information
 from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton, require_enough, starts
 from tolalloc.bench.parameters import LIU2020, Parameter, parameter
@@ -28,9 +29,7 @@ from tolalloc.bench.prediction import (
     fit_stand_in,
 )
 from tolalloc.bench.profile import as_stiffness, bootstrap, estimates, judged, profile, simplest
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
@@ -42,7 +41,7 @@ from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_
 
 NONE = np.empty(0)
 RV20E = load_reducer("rv20e_liu2020")
-ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
+ERRORS = baseline_errors()
 
 
 def bench(**changes) -> Bench:

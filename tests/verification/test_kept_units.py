@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import baseline_errors
 from tests.studies.command import ROOT
-from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers import LOST_MOTION, RADIAL_CLEARANCE
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -23,7 +22,7 @@ from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running import result_cache as kept_units
 from tolalloc.running.result_cache import ResultCache
 
-ERRORS = ErrorModel(load_tolerance_table("rv20e_baseline"))
+ERRORS = baseline_errors()
 UNITS = 24
 
 

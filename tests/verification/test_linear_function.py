@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 
+from tests.builders import source
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
@@ -13,7 +14,6 @@ from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 
 UNIFORM, TRIANGULAR = {"distribution": Distribution.UNIFORM}, {"distribution": Distribution.TRIANGULAR}
@@ -28,13 +28,8 @@ MIXES = {
 }
 
 
-def source(name: str, zone: float, **changed) -> Source:
-    own = {"part": "part", "feature": Feature.SIZE, "group": name, **changed}
-    return Source(name=name, zone=zone, minimum=zone / 10, maximum=10 * zone, cost=1.0, **own)
-
-
 def errors_of(kinds: list[dict]) -> ErrorModel:
-    return ErrorModel(tuple(source(f"s{at}", (1 + at) * 1e-4, **kind) for at, kind in enumerate(kinds)))
+    return ErrorModel(tuple(source(f"s{at}", zone=(1 + at) * 1e-4, **kind) for at, kind in enumerate(kinds)))
 
 
 def law_of(errors: ErrorModel, slopes: np.ndarray, zones: np.ndarray | None = None) -> LinearLaw:
@@ -67,7 +62,7 @@ def test_two_uniform_sizes_add_up_to_a_trapezoid():
 
 
 def test_correlated_normal_sizes_add_as_their_covariance_says():
-    sources = (source("s0", 1e-4), source("s1", 2e-4))
+    sources = (source("s0", zone=1e-4), source("s1", zone=2e-4))
     errors = ErrorModel(sources, correlation=Correlation(pairs=(Pair(one="s0", other="s1", correlation=0.6),)))
     law = law_of(errors, np.array([1000.0, 1000.0]))
     deviation = np.sqrt(0.1**2 + 0.2**2 + 2 * 0.6 * 0.1 * 0.2) / 6

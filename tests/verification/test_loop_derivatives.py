@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import table_of_three_cranks
+from tests.builders import baseline_errors, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Reducer
@@ -31,7 +30,7 @@ def bound(reducer: Reducer, errors: ErrorModel) -> tuple[ReducerModel, np.ndarra
 
 
 def two_cranks() -> tuple[ReducerModel, np.ndarray]:
-    return bound(load_reducer("rv20e"), ErrorModel(load_tolerance_table("rv20e_baseline")))
+    return bound(load_reducer("rv20e"), baseline_errors())
 
 
 def three_cranks() -> tuple[ReducerModel, np.ndarray]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.builders import baseline_errors
 from tolalloc.assembly.mounting import best_mounting, random_mounting, units_from
 from tolalloc.assembly.places import (
     PartTurn,
@@ -27,7 +28,6 @@ from tolalloc.assembly.stock import MeasuredPart, PartStock, drawn_parts, load_p
 from tolalloc.bench.sources import half_turn
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
@@ -44,7 +44,7 @@ ROUNDING = 1e-9  # arcsec
 
 @pytest.fixture(scope="module")
 def errors() -> ErrorModel:
-    return ErrorModel(load_tolerance_table("rv20e_baseline"))
+    return baseline_errors()
 
 
 @pytest.fixture(scope="module")

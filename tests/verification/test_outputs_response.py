@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import prepared as baseline
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
@@ -16,11 +15,6 @@ from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
 
 ORDERS = (1, 39, 40)
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline(name="outputs")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import prepared as baseline
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.genetic import nondominated
@@ -27,11 +26,6 @@ POPULATION = 80
 
 def digest(found) -> str:
     return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline()
 
 
 @pytest.fixture(scope="module")

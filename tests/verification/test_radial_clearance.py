@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import prepared as baseline
 from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
@@ -19,11 +18,6 @@ from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse
 
 CLEARANCE = "radial clearance at tip and root [µm]"
-
-
-@pytest.fixture(scope="module")
-def prepared():
-    return baseline(name="clearance")
 
 
 def unit(model, **columns: float) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
-from tests.builders import prepared
+from tests.builders import prepared, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
@@ -18,23 +18,9 @@ from tolalloc.capability.yield_at_limit import METHOD, log_normal_interval, yiel
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation
-
-
-def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:
-    return Source(
-        name=name,
-        part="part",
-        feature=feature,
-        zone=6.0,
-        minimum=1.0,
-        maximum=10.0,
-        cost=1.0,
-        distribution=distribution,
-    )
 
 
 def normals(count: int) -> ErrorModel:
@@ -75,9 +61,9 @@ MIXED = ErrorModel(
     (
         source("one"),
         source("other", distribution=Distribution.UNIFORM),
-        source("bore", Feature.POSITION, Distribution.UNIFORM),
+        source("bore", Feature.POSITION, distribution=Distribution.UNIFORM),
         source("journal", Feature.POSITION),
-        replace(source("ring", Feature.RUNOUT, Distribution.UNIFORM), spectrum=((1, 1.0), (2, 0.5))),
+        replace(source("ring", Feature.RUNOUT, distribution=Distribution.UNIFORM), spectrum=((1, 1.0), (2, 0.5))),
     ),
     correlation=Correlation(pairs=(Pair(one="one", other="other", correlation=0.7),)),
 )

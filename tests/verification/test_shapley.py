@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
+from tests.builders import source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation, Pair
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
@@ -28,22 +28,9 @@ WEIGHTS = (1.0, 2.0, -1.5, 0.5)
 PAIRS = {(0, 1): 0.6, (1, 2): 0.4, (0, 2): -0.2}
 
 
-def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.NORMAL) -> Source:
-    return Source(
-        name=name,
-        part="part",
-        feature=feature,
-        zone=SIGMA_ZONE,
-        minimum=1.0,
-        maximum=10.0,
-        cost=1.0,
-        distribution=distribution,
-    )
-
-
 def model(pairs: dict[tuple[int, int], float], count: int = 4, feature: Feature = Feature.SIZE) -> ErrorModel:
     named = tuple(Pair(one=f"x{one}", other=f"x{other}", correlation=value) for (one, other), value in pairs.items())
-    sources = tuple(source(f"x{at}", feature) for at in range(count))
+    sources = tuple(source(f"x{at}", feature, SIGMA_ZONE) for at in range(count))
     return ErrorModel(sources, correlation=Correlation(pairs=named))
 
 
@@ -140,7 +127,10 @@ def test_all_columns_of_a_source_go_together():
 
 
 def test_additive_function_of_independent_sources_has_its_first_order_indices():
-    sources = (*(source(f"x{at}") for at in range(3)), source("x3", distribution=Distribution.UNIFORM))
+    sources = (
+        *(source(f"x{at}", zone=SIGMA_ZONE) for at in range(3)),
+        source("x3", zone=SIGMA_ZONE, distribution=Distribution.UNIFORM),
+    )
     joint = CorrelatedSource(name="k", columns=("k1", "k2"), covariance=np.array([[1.0, 0.5], [0.5, 1.0]]))
     errors = ErrorModel(sources, (joint,))
 

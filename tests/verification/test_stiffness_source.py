@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import exp
 
 import numpy as np
 import pytest
 
-from tests.builders import prepared
+from tests.builders import Sum, prepared
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -122,17 +121,6 @@ def test_share_of_the_variance_against_direct_monte_carlo(response):
     answers = response.kernel.with_derivatives(x[:200])
     effect = response.gradient(answers)[answers.evaluation.good] @ stiffness.factor
     assert (effect**2).sum(axis=1).mean() / total == pytest.approx(direct, abs=4 * error)
-
-
-@dataclass(frozen=True)
-class Sum:
-    """The sum of all columns."""
-
-    columns: tuple[str, ...]
-    outputs: tuple[str, ...] = ("y [-]",)
-
-    def __call__(self, x: np.ndarray) -> Evaluation:
-        return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
 
 
 @pytest.mark.parametrize(("correlation", "variance"), [(1.0, 4.0), (0.0, 2.0), (-0.5, 1.0), (-1.0, 0.0)])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from sklearn.linear_model import Ridge
 
+from tests.builders import baseline_errors
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Response
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -112,7 +112,7 @@ def regression(estimator=quadratic_regression) -> RegressionCandidate:
 
 @pytest.fixture(scope="module")
 def errors() -> ErrorModel:
-    return ErrorModel(load_tolerance_table("rv20e_baseline"))
+    return baseline_errors()
 
 
 @pytest.fixture(scope="module")

@@ -8,21 +8,18 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tests import builders
+from tests.builders import source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source, limited_measure
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.drawings.zones import Feature, parsed_spectrum
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.target import limited_measures, target_sensitivity
-
-
-def source(name: str, feature: Feature = Feature.SIZE, **more) -> Source:
-    return Source(name=name, part="part", feature=feature, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0, **more)
-
 
 SHARES = np.array([0.6, 0.4, 0.0])
 SIZES = ErrorModel(tuple(source(name) for name in "abc"))
@@ -70,17 +67,6 @@ def test_index_and_lift_are_those_of_the_closed_form(limit):
     assert found.p_value[:2].max() < 0.001 < found.p_value[2]
 
 
-@dataclass(frozen=True)
-class SumOfAll:
-    """Sum of all columns."""
-
-    columns: tuple[str, ...]
-    outputs: tuple[str, ...] = ("y [-]",)
-
-    def __call__(self, x: np.ndarray) -> Evaluation:
-        return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
-
-
 MANY = ErrorModel((source("one"), source("few", each=4), source("pins", each=9)))
 """Sources whose columns are standard normal, so that their shares of the variance of a sum are as 1 to 4 to 9."""
 
@@ -88,7 +74,7 @@ MANY = ErrorModel((source("one"), source("few", each=4), source("pins", each=9))
 def test_the_excess_orders_sources_of_many_columns_as_their_shares_of_the_variance():
     """Within 4 standard errors of the closed form; the lifts, diluted by the columns, are all the same."""
     limit, deviation = 1.5 * np.sqrt(14.0), np.sqrt(14.0)
-    sample = monte_carlo(Experiment.of(SumOfAll(MANY.columns), MANY, SeedTree(0)), 20_000)
+    sample = monte_carlo(Experiment.of(builders.Sum(MANY.columns), MANY, SeedTree(0)), 20_000)
     found = target_sensitivity(sample, MANY, limit, SeedTree(0).child("t"), permutations=9)
     np.testing.assert_array_equal(found.columns, [1, 4, 9])
     truth = found.columns / 14.0 * (limit / deviation) * norm.pdf(1.5) / norm.sf(1.5)
@@ -107,7 +93,7 @@ def test_a_source_of_many_columns_is_not_behind_one_of_few_whose_lift_is_higher(
     weights = np.array([np.sqrt(5.0)] + [1.0] * 9)
 
     @dataclass(frozen=True)
-    class Weighted(SumOfAll):
+    class Weighted(builders.Sum):
         def __call__(self, x: np.ndarray) -> Evaluation:
             return super().__call__(x * weights)
 
@@ -234,7 +220,7 @@ def test_a_joint_source_is_measured_in_its_own_deviations(generator):
     errors = ErrorModel((source("a"),), joint=(joint,))
     x = errors.deviations(errors.standard_values(generator.random((4000, 3))), errors.zones)
     assert limited_measures(errors, x).shape == (4000, 2)
-    sample = monte_carlo(Experiment.of(SumOfAll(errors.columns), errors, SeedTree(4)), 4000)
+    sample = monte_carlo(Experiment.of(builders.Sum(errors.columns), errors, SeedTree(4)), 4000)
     found = target_sensitivity(sample, errors, 1.0, SeedTree(4), permutations=9, resamples=9)
     np.testing.assert_array_equal(found.columns, [1, 1])
     np.testing.assert_allclose((limited_measures(errors, x)[:, 1] ** 2).mean(), 0.5, rtol=1e-6)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import baseline_errors
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SeedTree
@@ -110,7 +111,7 @@ def test_like_features_deviate_alone_and_angles_are_taken_over_a_length(generato
 
 
 def test_columns_are_linear_in_the_zones(generator):
-    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    errors = baseline_errors()
     standard = errors.standard_values(generator.random((10, len(errors.columns))))
     one, two = errors.deviations(standard, errors.zones), errors.deviations(standard, 2 * errors.zones)
     np.testing.assert_allclose(two, 2 * one, rtol=1e-12)

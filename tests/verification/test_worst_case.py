@@ -8,13 +8,13 @@ from itertools import product
 import numpy as np
 import pytest
 
+from tests.builders import baseline_errors, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source, limited_measure
-from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.drawings.sources import limited_measure
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.differences import DifferencedResponse
@@ -44,10 +44,6 @@ class Quadratic:
         return WithDerivatives(
             evaluation=self(x), by_column=by_column, by_modification=np.zeros((len(x), 2)), by_stiffness={}
         )
-
-
-def source(name: str, feature: Feature, zone: float, **others) -> Source:
-    return Source(name=name, part="part", feature=feature, zone=zone, minimum=0.0, maximum=zone, cost=1.0, **others)
 
 
 MIXED = ErrorModel(
@@ -136,7 +132,7 @@ def test_units_that_fail_stop_the_search_and_bad_questions_are_refused():
 
 @pytest.fixture(scope="module")
 def errors() -> ErrorModel:
-    return ErrorModel(load_tolerance_table("rv20e_baseline"))
+    return baseline_errors()
 
 
 @pytest.fixture(scope="module")
