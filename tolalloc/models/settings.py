@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number, number
 
+_FINITE = number("a finite number")
 _ROUNDING = 1e-9
 """How far a value may stand outside its bounds, as it was computed [unit of the setting]."""
 
@@ -35,20 +36,15 @@ class Setting(NamedFields):
     called: ClassVar[str] = "setting"
 
     name: str
-    value: float
-    lower: float
-    upper: float
-    step: float
+    value: Annotated[float, _FINITE]
+    lower: Annotated[float, _FINITE]
+    upper: Annotated[float, _FINITE]
+    step: Annotated[float, _FINITE, number("above 0", above=0)]
 
     def __post_init__(self) -> None:
-        place = f"setting {self.name}"
-        for own in ("value", "lower", "upper", "step"):
-            if not (is_number(getattr(self, own)) and abs(getattr(self, own)) < float("inf")):
-                raise InputError.at(place, own, getattr(self, own), "a finite number")
+        super().__post_init__()
         if self.lower > self.upper:
-            raise InputError.at(place, "lower", self.lower, f"at most upper = {self.upper:g}")
-        if self.step <= 0:
-            raise InputError.at(place, "step", self.step, "above 0")
+            raise InputError.at(f"setting {self.name}", "lower", self.lower, f"at most upper = {self.upper:g}")
 
     def allows(self, value: float) -> bool:
         """Return whether a value may be chosen."""

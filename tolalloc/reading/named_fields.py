@@ -74,7 +74,9 @@ def number(
     return Rule(allowed, keeps, name)
 
 
-def whole(allowed: str, least: int, most: float = inf, *, multiple: int = 1, power_of_two: bool = False) -> Rule:
+def whole(
+    allowed: str, least: int, most: float = inf, *, multiple: int = 1, power_of_two: bool = False, name: str = ""
+) -> Rule:
     """Return the rule of a whole number in a range, which may have to be a multiple or a power of two.
 
     >>> whole("a power of two, 2 or more", 2, power_of_two=True).keeps(12)
@@ -85,7 +87,7 @@ def whole(allowed: str, least: int, most: float = inf, *, multiple: int = 1, pow
         good = type(value) is int and least <= value <= most and value % multiple == 0
         return good and not (power_of_two and value & (value - 1))
 
-    return Rule(allowed, keeps)
+    return Rule(allowed, keeps, name)
 
 
 def flag() -> Rule:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import ceil
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields
+from tolalloc.reading.named_fields import NamedFields, Rule, a, number, whole
 from tolalloc.sensitivity.surrogate import validation
 
 WORST_SHARE = 0.05
@@ -29,22 +28,16 @@ def fewest_units() -> int:
     return ceil(FEWEST_OUTSIDE / WORST_SHARE)
 
 
-_FEWEST = {
-    "units": fewest_units(),
-    "trajectories": FEWEST_TRAJECTORIES,
-    "moment_units": FEWEST_UNITS_OF_CLASS * CLASSES,
-    # A bootstrap resample of fewer could be one unit again and again, and would not vary.
-    "derivative_units": 10,
-    "inverse_units": 1,
-    "surrogate_units": validation.FEWEST_OF_FOLD * validation.FOLDS,
-    "level_units": 100,
-    "level_runs": FEWEST_RUNS,
-    "widened_units": 100,
-    "permutations": 2,
-}
-"""Smallest numbers that the estimators take [-]."""
 _CHAIN = 10
 """Units of a level or width come in chains of so many [-]."""
+
+
+def _least(fewest: int) -> Rule:
+    """Return the rule of a number with which an estimator has an answer."""
+    return whole(f"{fewest} or more, a whole number", fewest)
+
+
+_IN_CHAINS = whole(f"a multiple of {_CHAIN}", 0, multiple=_CHAIN)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,19 +61,14 @@ class SobolEffort(NamedFields):
     """
 
     called: ClassVar[str] = "effort of Sobol indices"
+    written_in: ClassVar[tuple[str, str]] = ("Sobol indices", "")
 
-    start: int = 512
+    start: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True, name="first number of blocks")] = 512
     limit: int = 65_536
-    places: int = 3
+    places: Annotated[int, whole("1 or more", 1, name="number of stable places")] = 3
     probability: float = 0.9
     resamples: int = 400
     second_order: bool = False
-
-    def __post_init__(self) -> None:
-        if self.start < 2 or self.start & (self.start - 1):
-            raise InputError.at("Sobol indices", "first number of blocks", self.start, "a power of two, 2 or more")
-        if self.places < 1:
-            raise InputError.at("Sobol indices", "number of stable places", self.places, "1 or more")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,39 +109,30 @@ class RankingEffort(NamedFields):
     """
 
     called: ClassVar[str] = "effort of a ranking"
+    written_in: ClassVar[tuple[str, str]] = ("study", "effort.ranking.")
 
-    units: int = 16_384
-    design: SamplingDesign = SamplingDesign.MONTE_CARLO
-    sobol: SobolEffort = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
-    trajectories: int = 32
-    moment_units: int = 4096
-    derivative_units: int = 1024
-    inverse_units: int = 2048
-    surrogate_units: int = 2048
-    level_units: int = 4000
-    level_runs: int = 5
-    widened_units: int = 2000
-    permutations: int = 1000
+    units: Annotated[int, _least(fewest_units())] = 16_384
+    design: Annotated[SamplingDesign, a(SamplingDesign)] = SamplingDesign.MONTE_CARLO
+    sobol: Annotated[SobolEffort, a(SobolEffort)] = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
+    trajectories: Annotated[int, _least(FEWEST_TRAJECTORIES)] = 32
+    moment_units: Annotated[int, _least(FEWEST_UNITS_OF_CLASS * CLASSES)] = 4096
+    derivative_units: Annotated[int, _least(10)] = 1024
+    inverse_units: Annotated[int, _least(1)] = 2048
+    surrogate_units: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 2048
+    level_units: Annotated[int, _least(100), _IN_CHAINS] = 4000
+    level_runs: Annotated[int, _least(FEWEST_RUNS)] = 5
+    widened_units: Annotated[int, _least(100), _IN_CHAINS] = 2000
+    permutations: Annotated[int, _least(2)] = 1000
 
     def __post_init__(self) -> None:
-        for field_name, fewest in _FEWEST.items():
-            value = getattr(self, field_name)
-            if type(value) is not int or value < fewest:
-                raise self._refusal(field_name, value, f"{fewest} or more, a whole number")
-        for field_name in ("level_units", "widened_units"):
-            if getattr(self, field_name) % _CHAIN:
-                raise self._refusal(field_name, getattr(self, field_name), f"a multiple of {_CHAIN}")
-        sobol = self.sobol
-        if sobol.limit < sobol.start:
-            raise self._refusal("sobol.limit", sobol.limit, f"the first number of blocks, {sobol.start}, or more")
-        if not 0.0 < sobol.probability < 1.0:
-            raise self._refusal("sobol.probability", sobol.probability, "a number between 0 and 1")
-        if sobol.resamples < 2:
-            raise self._refusal("sobol.resamples", sobol.resamples, "2 or more")
-
-    @staticmethod
-    def _refusal(field_name: str, value: object, allowed: str) -> InputError:
-        return InputError.at("study", f"effort.ranking.{field_name}", value, allowed)
+        super().__post_init__()
+        first = self.sobol.start
+        for rule, name in (
+            (whole(f"the first number of blocks, {first}, or more", first), "limit"),
+            (number("a number between 0 and 1", above=0, below=1), "probability"),
+            (whole("2 or more", 2), "resamples"),
+        ):
+            rule.check("study", f"effort.ranking.sobol.{name}", getattr(self.sobol, name))
 
 
 QUICK_RANKING = RankingEffort(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, number
+
+_COST = number("a finite number, 0 or above", least=0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,14 +39,8 @@ class QualityLoss(NamedFields):
     called: ClassVar[str] = "quality loss"
     by_position: ClassVar[int] = 2
 
-    limit: float
-    at_limit: float
-
-    def __post_init__(self) -> None:
-        if not (is_number(self.limit) and isfinite(self.limit) and self.limit > 0):
-            raise InputError.at("quality loss", "limit", self.limit, "a finite number above 0")
-        if not (is_number(self.at_limit) and isfinite(self.at_limit) and self.at_limit >= 0):
-            raise InputError.at("quality loss", "at_limit", self.at_limit, "a finite number, 0 or above")
+    limit: Annotated[float, number("a finite number above 0", above=0)]
+    at_limit: Annotated[float, _COST]
 
     def nominal_is_best(self, offset: float, deviation: float) -> float:
         """Return the mean loss per unit where the nominal value is best [cost units].
@@ -83,17 +78,10 @@ class UnitPrice(NamedFields):
     called: ClassVar[str] = "price of a unit"
     by_position: ClassVar[int] = 4
 
-    inspection: float = 0.0
-    rework_share: float = 0.0
-    rework: float = 0.0
-    scrap: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            largest = 1.0 if name == "rework_share" else np.inf
-            if not (is_number(value) and isfinite(value) and 0 <= value <= largest):
-                allowed = "a number from 0 to 1" if name == "rework_share" else "a finite number, 0 or above"
-                raise InputError.at("price of a unit", name, value, allowed)
+    inspection: Annotated[float, _COST] = 0.0
+    rework_share: Annotated[float, number("a number from 0 to 1", least=0, most=1)] = 0.0
+    rework: Annotated[float, _COST] = 0.0
+    scrap: Annotated[float, _COST] = 0.0
 
     def good_share(self, target: float) -> float:
         """Return the share of good units after rework, for a yield before it [-].

@@ -3,54 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields
+from tolalloc.reading.named_fields import NamedFields, Rule, a, each, number, whole
 from tolalloc.sensitivity.surrogate import validation
 
-_FEWEST_ALLOCATING = {
-    "": {
-        "verification_units": 1,
-        "confirmation_units": 1,
-        "shared_units": 2,
-        "graded_steps": 1,
-        "exact_points": 2,
-        "changed_costs": 1,
-        "changed_stiffnesses": 1,
-        "stiffness_units": 100,
-    },
-    "search.": {"steps": 1},
-    "search.front.": {
-        # Three objectives need four designs, and both fronts have the same effort.
-        "population": 4,
-        "generations": 1,
-        "population_on_kernel": 4,
-        "generations_on_kernel": 1,
-        "designs": validation.FEWEST_OF_FOLD * validation.FOLDS,
-        "rounds": 1,
-        "points": 2,
-    },
-}
-"""Smallest numbers with which an allocation has an answer in every stage [-]."""
 
-
-def _require_enough(effort: object, prefix: str) -> None:
-    """Raise unless the numbers of an effort are whole and no stage of an allocation would stop with them.
-
-    Raises
-    ------
-    InputError
-        A number that is too small or not whole.
-    """
-    for name, fewest in _FEWEST_ALLOCATING[prefix].items():
-        value = getattr(effort, name)
-        if not isinstance(value, int) or value < fewest:
-            raise InputError.at(
-                "study", f"effort.allocation.{prefix}{name}", value, f"a whole number, {fewest} or more"
-            )
+def _least(fewest: int) -> Rule:
+    """Return the rule of a number with which an allocation has an answer in every stage."""
+    return whole(f"a whole number, {fewest} or more", fewest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +33,15 @@ class FrontEffort(NamedFields):
     """
 
     called: ClassVar[str] = "effort of a front"
+    written_in: ClassVar[tuple[str, str]] = ("study", "effort.allocation.search.front.")
 
-    population: int = 80
-    generations: int = 100
-    population_on_kernel: int = 20
-    generations_on_kernel: int = 3
-    designs: int = 36
-    rounds: int = 2
-    points: int = 12
+    population: Annotated[int, _least(4)] = 80
+    generations: Annotated[int, _least(1)] = 100
+    population_on_kernel: Annotated[int, _least(4)] = 20
+    generations_on_kernel: Annotated[int, _least(1)] = 3
+    designs: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 36
+    rounds: Annotated[int, _least(1)] = 2
+    points: Annotated[int, _least(2)] = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,10 +59,11 @@ class SearchEffort(NamedFields):
     """
 
     called: ClassVar[str] = "effort of a search"
+    written_in: ClassVar[tuple[str, str]] = ("study", "effort.allocation.search.")
 
-    steps: int = 8
-    reach: float = 2.5
-    front: FrontEffort = field(default_factory=FrontEffort)
+    steps: Annotated[int, _least(1)] = 8
+    reach: Annotated[float, number("a number above 1", above=1)] = 2.5
+    front: Annotated[FrontEffort, a(FrontEffort)] = field(default_factory=FrontEffort)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,21 +108,24 @@ class AllocationEffort(NamedFields):
     """
 
     called: ClassVar[str] = "effort of an allocation"
+    written_in: ClassVar[tuple[str, str]] = ("study", "effort.allocation.")
 
-    verification_units: int = 6144
-    confirmation_units: int = 32_768
-    shared_units: int = 256
-    search: SearchEffort = field(default_factory=SearchEffort)
-    graded_steps: int = 8
-    exact_points: int = 50
-    setting_steps: tuple[int, ...] = (5, 6)
-    changed_costs: int = 40
-    changed_stiffnesses: int = 6
-    stiffness_units: int = 2048
-    share_blocks: int = 256
-    yields: tuple[float, ...] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
-    gain: float = 0.005
-    error: float = 0.05
+    verification_units: Annotated[int, _least(1)] = 6144
+    confirmation_units: Annotated[int, _least(1)] = 32_768
+    shared_units: Annotated[int, _least(2)] = 256
+    search: Annotated[SearchEffort, a(SearchEffort)] = field(default_factory=SearchEffort)
+    graded_steps: Annotated[int, _least(1)] = 8
+    exact_points: Annotated[int, _least(2)] = 50
+    setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
+    changed_costs: Annotated[int, _least(1)] = 40
+    changed_stiffnesses: Annotated[int, _least(1)] = 6
+    stiffness_units: Annotated[int, _least(100)] = 2048
+    share_blocks: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True)] = 256
+    yields: Annotated[
+        tuple[float, ...], each("one share or more between 0 and 1", number("", above=0, below=1), fewest=1)
+    ] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
+    gain: Annotated[float, number("a share above 0 up to below 1", above=0, below=1)] = 0.005
+    error: Annotated[float, number("a share above 0 up to 0.5", above=0, most=0.5)] = 0.05
 
     @property
     def of_fast_model(self) -> AllocationEffort:
@@ -177,26 +143,6 @@ class AllocationEffort(NamedFields):
             gain=0.002,
             error=AllocationEffort().error,
         )
-
-    def __post_init__(self) -> None:
-        _require_enough(self, "")
-        _require_enough(self.search, "search.")
-        _require_enough(self.search.front, "search.front.")
-        if not 1.0 < self.search.reach < np.inf:
-            raise InputError.at("study", "effort.allocation.search.reach", self.search.reach, "a number above 1")
-        if not all(isinstance(steps, int) and steps >= 1 for steps in self.setting_steps):
-            raise InputError.at(
-                "study", "effort.allocation.setting_steps", self.setting_steps, "whole numbers, 1 or more"
-            )
-        blocks = self.share_blocks
-        if blocks < 2 or blocks & (blocks - 1):
-            raise InputError.at("study", "effort.allocation.share_blocks", blocks, "a power of two, 2 or more")
-        if not 0 < self.gain < 1:
-            raise InputError.at("study", "effort.allocation.gain", self.gain, "a share above 0 up to below 1")
-        if not 0 < self.error <= 0.5:
-            raise InputError.at("study", "effort.allocation.error", self.error, "a share above 0 up to 0.5")
-        if not self.yields or not all(0 < target < 1 for target in self.yields):
-            raise InputError.at("study", "effort.allocation.yields", self.yields, "one share or more between 0 and 1")
 
 
 QUICK_ALLOCATION = AllocationEffort(

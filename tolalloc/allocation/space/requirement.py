@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal, Protocol, runtime_checkable
+from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +17,7 @@ from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.capability.near_limit import largest_first
 from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number, number
 
 USUAL_YIELD = 0.9973
 """Share of units that must keep a limit unless it says otherwise: ±3σ of a normal output [-]."""
@@ -235,11 +235,7 @@ class AtCpk(NamedFields):
     called: ClassVar[str] = "guarantee AtCpk"
     by_position: ClassVar[int] = 1
 
-    target: float
-
-    def __post_init__(self) -> None:
-        if not (is_number(self.target) and 0 < self.target <= 10):
-            raise InputError.at(self.called, "target", self.target, "a Cpk above 0 up to 10")
+    target: Annotated[float, number("a Cpk above 0 up to 10", above=0, most=10)]
 
     @property
     def words(self) -> str:
