@@ -47,16 +47,17 @@ class Rule:
     keeps: Callable[[Any], bool]
     name: str = ""
 
-    def check(self, place: str, name: str, value: object) -> None:
+    def check(self, place: str, name: str, value: object, *, of_argument: bool = False) -> None:
         """Raise unless the value is allowed.
 
         Raises
         ------
         InputError
-            Where, the name, the value and what is allowed.
+            Where, the name, the value and what is allowed; of an argument, a command says its option instead.
         """
         if not self.keeps(value):
-            raise InputError.at(place, self.name or name, value, self.allowed)
+            refusal = InputError.of_argument if of_argument else InputError.at
+            raise refusal(place, self.name or name, value, self.allowed)
 
 
 def number(
@@ -135,9 +136,10 @@ def rules_of(record: Any) -> dict[str, tuple[Rule, ...]]:
     found = {}
     for own in fields(record):
         kind: Any = own.type
-        if isinstance(kind, str) and kind.startswith("Annotated["):
+        if isinstance(kind, str):
             home = next(base for base in record.__mro__ if own.name in get_annotations(base))
-            kind = eval(kind, vars(sys.modules[home.__module__]))
+            names = vars(sys.modules[home.__module__])
+            kind = eval(kind, names) if kind.startswith("Annotated[") else names.get(kind)
         rules = tuple(part for part in get_args(kind)[1:] if isinstance(part, Rule))
         if rules:
             found[own.name] = rules
@@ -156,6 +158,9 @@ class NamedFields:
     """How many of its first fields may be given without their names [-]."""
     written_in: ClassVar[tuple[str, str]] = ("", "")
     """Where a refusal says that a field stands, and what it says before its name; the record itself and nothing."""
+
+    are_arguments: ClassVar[bool] = False
+    """Whether its fields are also arguments of a command, whose refusals say the option."""
 
     def __new__(cls, *given: object, **named: object) -> Self:
         """Refuse a field that the record does not have, by name and with the nearest one."""
@@ -181,7 +186,8 @@ class NamedFields:
         kind: Any = type(self)
         for name, rules in rules_of(kind).items():
             for rule in rules:
-                rule.check(place or self._place(vars(self)), f"{before}{name}", getattr(self, name))
+                where, value = place or self._place(vars(self)), getattr(self, name)
+                rule.check(where, f"{before}{name}", value, of_argument=self.are_arguments)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle a record by its fields, without which none is made."""

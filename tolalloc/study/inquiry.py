@@ -88,6 +88,7 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
     others options; its docstring is the command's help.
     """
 
+    are_arguments: ClassVar[bool] = True
     word: ClassVar[str]
     """Its command and the function of ``ta``."""
     counted: ClassVar[str] = "units"
@@ -106,10 +107,11 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         Raises
         ------
         InputError
-            A field of another kind.
+            A field of another kind, or a value that its rule does not allow.
         """
         for name, kind in _kinds(type(self)).items():
             object.__setattr__(self, name, _taken(self.called, name, kind, getattr(self, name)))
+        super().__post_init__()
 
     @abstractmethod
     def prepare(self) -> Prepared:

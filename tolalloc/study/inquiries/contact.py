@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.reading.named_fields import number, or_none, whole
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
@@ -34,11 +35,19 @@ class Contact(Inquiry["tuple[Reducer, float]"]):
 
     reducer: ReducerName = None
     torque: RatedTorque = None
-    width: Annotated[float | None, Word("Loaded face width [mm].")] = None
-    support: Annotated[float | None, Word("Distance of two supports between which the pins bend [mm].")] = None
+    width: Annotated[
+        float | None, Word("Loaded face width [mm]."), or_none(number("0.5 to 200 mm", least=0.5, most=200))
+    ] = None
+    support: Annotated[
+        float | None,
+        Word("Distance of two supports between which the pins bend [mm]."),
+        or_none(number("1 to 500 mm between two supports", least=1, most=500)),
+    ] = None
     law: Annotated[str, Word("Contact law: logarithmic (Hertz), constant, table2.")] = "logarithmic"
     exact: Annotated[bool, Word("Exact distances even for a small modification.", option="--exact")] = False
-    phases: Annotated[int, Word("Phases of the crank within one pin pitch.")] = 72
+    phases: Annotated[
+        int, Word("Phases of the crank within one pin pitch."), whole(f"1 to {MOST_PHASES}", 1, MOST_PHASES)
+    ] = 72
     profile: ProfileFile = None
     points: ProfilePoints = 200
 
@@ -50,17 +59,11 @@ class Contact(Inquiry["tuple[Reducer, float]"]):
         require_profile(self.profile, self.points)
         design = load_reducer(str(self.reducer))
         if self.width is not None:
-            if not 0.5 <= self.width <= 200:
-                raise InputError.of_argument(self.called, "width", self.width, "0.5 to 200 mm")
             design = design.with_face_width(self.width * MILLIMETRE)
         if self.support is not None:
-            if not 1 <= self.support <= 500:
-                raise InputError.of_argument(self.called, "support", self.support, "1 to 500 mm between two supports")
             design = design.with_pin_span(self.support * MILLIMETRE)
         if self.law not in LAWS:
             raise UnknownNameError.among(self.called, "contact law", self.law, LAWS)
-        if not 1 <= self.phases <= MOST_PHASES:
-            raise InputError.of_argument(self.called, "phases", self.phases, f"1 to {MOST_PHASES}")
         torque = -design.load.rated_torque if self.torque is None else self.torque
         return design, design.torque_on_carrier(torque, self.called)
 
