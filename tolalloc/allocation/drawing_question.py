@@ -90,7 +90,7 @@ class DrawingQuestion:
 
     @property
     def search_confidence(self) -> float:
-        """With which confidence the units of a search are judged: so far inside the limits as confirming takes [-]."""
+        """With which confidence the units of a search are read: so far inside the limits as an acceptance test takes [-]."""
         shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
         good_as = 1 if self.model.is_fast else AS_GOOD_AS
         return confidence_of_fewer(shown, units, good_as * self.effort.confirmation_units)
@@ -128,7 +128,7 @@ class DrawingQuestion:
                     raise InputError(said) from None
 
     def verifier(self, search: str, space: DesignSpace) -> Verifier:
-        """Return what judges the designs of one search on fresh units, other ones than those of any other search."""
+        """Return what verifies the designs of one search on random units, other ones than those of any other search."""
         # The search that frees everything at once keeps the stream that it had before there were others.
         direct = SeedTree(self.seed).child("verification")
         return Verifier(
@@ -196,7 +196,7 @@ class DrawingQuestion:
             largest_failed_share=self.largest_failed_share,
         )
         admitted = found.admitted()
-        # Where no search ended inside all limits, what fresh units say of its best design leads to a safer one.
+        # Where no search ended inside all limits, what an independent sample says of its best design leads to a safer one.
         promising = {name: own for name, own in admitted.items() if own.met} or {
             name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
         }

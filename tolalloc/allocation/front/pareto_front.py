@@ -94,7 +94,7 @@ def pareto_front(
     space
         The design variables.
     kernel
-        Quantile of a design on the real kernel; several searches may share what it remembers.
+        Quantile of a design on the real kernel; several searches may share its cached answers.
     baseline
         Convex model of the quantile, which the surrogate corrects.
     floor
@@ -112,7 +112,7 @@ def pareto_front(
     large
         Settings that shall be large, further objectives.
     others
-        Limited sides of other requirements, kept by their local models.
+        Limits of other requirements, kept by their local models.
     largest_failed_share
         Share of the kernel's designs that may fail; a design fails with the first of its units [-].
 

@@ -142,7 +142,7 @@ class DesignProblem:
     # Group → the scales that it may have, rising; other groups have every scale within their bounds [-]
     ladders: Ladders = field(default_factory=dict)
     large: tuple[str, ...] = ()  # Settings that shall be large, further objectives
-    others: tuple[OneSidedConstraint, ...] = ()  # Limited sides of other requirements, kept by their local models
+    others: tuple[OneSidedConstraint, ...] = ()  # Limits of other requirements, kept by their local models
 
     def __post_init__(self) -> None:
         for group, ladder in self.ladders.items():

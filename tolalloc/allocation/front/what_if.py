@@ -213,7 +213,7 @@ class Variant:
     # What the undisturbed answer costs more than this one under the changed assumption, as a share of its cost; not a
     # number where the chosen design no longer keeps a requirement [-]
     regret: float
-    kept: bool  # Whether the chosen design still keeps every requirement, judged by the change that the same units show
+    kept: bool  # Whether the chosen design still keeps every requirement, told by the change that the same units show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,7 +251,7 @@ def robustness(
     Parameters
     ----------
     verifier
-        Judges the chosen design again with every changed model.
+        Verifies the chosen design again with every changed model.
     allocation
         What was found.
     models
@@ -317,12 +317,12 @@ def _with_models(verifier: Verifier, allocation: ZoneAllocation, models: Sequenc
 def _with_model(verifier: Verifier, allocation: ZoneAllocation, undisturbed: VerifiedDesign, name: str) -> Variant:
     """Return the answer of a changed model."""
     chosen, optimum, stacks = allocation.chosen, allocation.inside, []
-    judged = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units
+    verified = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units
     rises = [
         float(now.predicted(chosen.design) - before.predicted(chosen.design))
-        for now, before in zip(judged.constraints, undisturbed.constraints, strict=True)
+        for now, before in zip(verified.constraints, undisturbed.constraints, strict=True)
     ]
-    for constraint, aimed, rise in zip(judged.constraints, allocation.stacks, rises, strict=True):
+    for constraint, aimed, rise in zip(verified.constraints, allocation.stacks, rises, strict=True):
         loads = [float(stack.load(chosen.scales, chosen.settings)) for stack in (constraint.stack, aimed)]
         stacks.append(replace(constraint.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
     problem = verifier.space.problem(tuple(stacks))
@@ -330,9 +330,8 @@ def _with_model(verifier: Verifier, allocation: ZoneAllocation, undisturbed: Ver
     cost = problem.cost(found.zones, found.processes) + allocation.locked_cost
     before = optimum.cost + allocation.locked_cost
     kept = all(constraint.excess + rise <= 0 for constraint, rise in zip(chosen.constraints, rises, strict=True))
-    kept = kept and all(
-        np.isfinite(constraint.value) for constraint in judged.constraints
-    )  # or so many units fail that none shows it
+    # Infinite values: so many units fail that none shows it.
+    kept = kept and all(np.isfinite(constraint.value) for constraint in verified.constraints)
     return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1 if kept else np.nan, kept=kept)
 
 

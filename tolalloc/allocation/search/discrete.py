@@ -380,7 +380,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     Parameters
     ----------
     verifier
-        Judges designs whose groups keep the ratios of their zones.
+        Verifies designs whose groups keep the ratios of their zones.
     start
         The best of these, around which choices are looked for.
     steps
@@ -395,7 +395,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
 
     Notes
     -----
-    Every choice is the proven best one of the local models; fresh units judge it, and the next one is made on the
+    Every choice is the proven best one of the local models; random units verify it, and the next one is made on the
     models around it. How far inside the limits the models must aim is found by bisection, in standard errors: further
     after a choice that missed a limit, less far after one that kept them all. Where the models let no choice keep the
     limits, the one that violates them least is tried, and where that misses them again, it is the answer. A scale is
@@ -410,13 +410,13 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         stacks = _inside(tried[-1], tried, margin)
         found = grid.problem(stacks).solve()
         choice = grid.design(found) if found else grid.least_violating(stacks)
-        judged = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
-        if judged and not judged.met and found is None:
+        verified = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
+        if verified and not verified.met and found is None:
             break  # no margin makes any other choice
-        if judged is None:
-            judged = own.verify(choice, f"graded {len(tried)}")
-            tried.append(judged)
-        missed, kept = (missed, margin) if judged.met else (margin, kept)
+        if verified is None:
+            verified = own.verify(choice, f"graded {len(tried)}")
+            tried.append(verified)
+        missed, kept = (missed, margin) if verified.met else (margin, kept)
     chosen = cheapest_met(tuple(tried[1:]))
     return GradedAllocation(
         space=space,
@@ -429,26 +429,26 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
 
 
 def choice_beside(
-    drawn: DrawnAmounts, judged: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
+    drawn: DrawnAmounts, verified: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
 ) -> Float[np.ndarray, " variable"] | None:
-    """Return the best other choice by the models of a judged one: as near to the limits as it may be, none if no other.
+    """Return the best other choice by the models of a tested one: as near to the limits as it may be, none if no other.
 
     Parameters
     ----------
     drawn
         What the drawing says of the settings.
-    judged
+    verified
         The choice, in a space whose groups share one zone.
     tried
         Choices beside it that correct its models.
     margin
         How far inside each limit the aim is, or further where that makes no other choice [standard errors].
     """
-    grid = _Grid(judged.space, drawn, judged.design)
+    grid = _Grid(verified.space, drawn, verified.design)
     for factor in _FURTHER:
-        found = grid.problem(_inside(judged, [*tried, judged], factor * margin)).solve()
+        found = grid.problem(_inside(verified, [*tried, verified], factor * margin)).solve()
         choice = None if found is None else grid.design(found)
-        if choice is None or not np.allclose(choice, judged.design, atol=1e-6):
+        if choice is None or not np.allclose(choice, verified.design, atol=1e-6):
             return choice
     return None
 

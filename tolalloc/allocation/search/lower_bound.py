@@ -103,7 +103,7 @@ def _is_exact(check: Check, design: VerifiedDesign) -> bool:
 
 
 def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
-    """Return every limited side with the stack that a design keeps that keeps the limit, the error counted."""
+    """Return every one-sided constraint with the stack that a design keeps that keeps the limit, the error counted."""
     constraints = len(design.constraints)
     found = []
     for check in design.checks:
@@ -121,7 +121,7 @@ def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
 
 
 def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
-    """Return the units that judged a design last."""
+    """Return the units that tested a design last."""
     law = design.laws.get(check.requirement.output)
     if design.independent:
         return design.independent.limited(check.requirement, law)

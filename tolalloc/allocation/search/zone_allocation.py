@@ -29,7 +29,7 @@ class Programs:
     space
         The design variables.
     stacks
-        Number of limited sides of all requirements [-].
+        Number of one-sided constraints of all requirements [-].
     """
 
     def __init__(self, space: DesignSpace, stacks: int) -> None:
@@ -222,12 +222,12 @@ def step_from(
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:
-    """Return the designs of a trust-region sequence; each is verified on fresh units before the next is made.
+    """Return the designs of a trust-region sequence; each is verified on its own random units before the next is made.
 
     Parameters
     ----------
     verifier
-        Judges the designs and gives the convex models around each.
+        Verifies the designs and gives the convex models around each.
     start
         A verified design to start from.
     steps
@@ -237,7 +237,7 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
 
     Notes
     -----
-    Where fresh units are further from the prediction than chance explains, the next step reaches less.
+    Where the units of a step are further from the prediction than chance explains, the next step reaches less.
     """
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)
@@ -264,7 +264,7 @@ def _is_worth_mending(tried: list[VerifiedDesign]) -> bool:
 
 
 def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
-    """Return whether the models of a design predicted what fresh units said of the next one."""
+    """Return whether the models of a design predicted what the units of the next one said."""
     return all(
         abs(now.excess - before.predicted(new.design))
         <= _EXPLAINED * np.hypot(before.standard_error, now.standard_error)
@@ -277,7 +277,7 @@ class ZoneAllocation:
     """What the search found."""
 
     limit: float  # Limit of the leading output, the upper one of two [unit of the output]
-    # The cheapest design that fresh units on the real kernel show to be met, or the least violating one
+    # The cheapest design that random units on the real kernel show to be met, or the least violating one
     chosen: VerifiedDesign
     tried: tuple[VerifiedDesign, ...]  # All designs verified on the way, in order
     # Zones of the tolerance table scaled alike until met, modification as it was; the first is the table itself
@@ -409,7 +409,7 @@ def allocate(
     Parameters
     ----------
     verifier
-        Judges designs on fresh units.
+        Verifies designs on random units.
     proportional_tried
         Designs with all zones scaled alike, `tolalloc.allocation.search.zone_allocation.scale_in_proportion`.
     effort

@@ -269,7 +269,7 @@ class DesignSample:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSample:
-    """What fresh units of a design say of one output, which guarantees judge."""
+    """What random units of a design say of one output, which guarantees compare with its limits."""
 
     units: DesignSample  # The units
     output: str  # Name of the output with its unit

@@ -207,7 +207,7 @@ def _relief(problem: AllocationProblem, zones: Float[np.ndarray, " feature"]) ->
 
 @dataclass(frozen=True, kw_only=True)
 class OneSidedConstraint:
-    """One limited side of a requirement at a verified design."""
+    """One limit of a requirement at a verified design: what is compared with it, and a convex model around the design."""
 
     sign: int  # 1 for an upper limit, −1 for a lower one [-]
     limit: float  # The limit [unit of the output]

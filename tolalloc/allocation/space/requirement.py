@@ -33,7 +33,7 @@ _ACCURACY = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class QuantileBound:
-    """Confidence bound on the quantile that a guarantee limits, of one limited side."""
+    """Confidence bound on the quantile that a guarantee limits, towards one of its limits."""
 
     sign: Literal[1, -1]  # 1 for an upper limit, −1 for a lower one [-]
     limit: float  # The limit [unit of the output]
@@ -66,7 +66,7 @@ def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, b
 
 
 def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple[QuantileBound, ...]:
-    """Return what a law says of every limited side if such a share of it may lie beyond the limits [-]."""
+    """Return what a law says of every limit if such a share of it may lie beyond the limits [-]."""
     excess = law.excess(sample.limits, beyond)
     error = _ACCURACY * law.half_width
     return tuple(
@@ -114,7 +114,7 @@ def scale_of(sample: OutputSample, limit: float) -> float:
 
 
 def name_of(sample: OutputSample, sign: int) -> str:
-    """Return what the limited side of an output is called."""
+    """Return what the limit of an output is called."""
     return f"{sample.output}, {'upper' if sign > 0 else 'lower'} limit"
 
 
@@ -128,7 +128,7 @@ class Guarantee(Protocol):
         ...
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every limited side; the requirement is met if no value lies beyond its limit."""
+        """Return every one-sided constraint; the requirement is met if no value lies beyond its limit."""
         ...
 
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
@@ -141,11 +141,11 @@ class Sampled(Guarantee, Protocol):
     """A guarantee that random units show, with an error."""
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what units show of every limited side with one-sided confidence, the upper one first."""
+        """Return what units show of every limit with one-sided confidence, the upper one first."""
         ...
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what every limited side is at least, with one-sided confidence: the other end of `levels`."""
+        """Return what is compared with every limit at its least, with one-sided confidence: the other end of `bounds`."""
         ...
 
 
@@ -193,18 +193,18 @@ class AtYield(NamedFields):
             raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every limited side."""
+        """Return every one-sided constraint, the upper one first."""
         return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what units show of every limited side, or what its law does where they keep to it."""
+        """Return what units show of every limit, or what its law does where they keep to it."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
         beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
         return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what every limited side is at least."""
+        """Return what is compared with every limit at its least."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
         beyond = sample.units.least_excess(sample.excess, self.target, confidence)
@@ -254,15 +254,15 @@ class AtCpk(NamedFields):
             raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every limited side."""
+        """Return every one-sided constraint, the upper one first."""
         return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what units show of every limited side."""
+        """Return what units show of every limit."""
         return tuple(self._bound(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what every limited side is at least."""
+        """Return what is compared with every limit at its least."""
         return self.bounds(sample, 1 - confidence)
 
     def _bound(
@@ -295,7 +295,7 @@ class AtCpk(NamedFields):
 def _spread_constraints(
     sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits
 ) -> tuple[OneSidedConstraint, ...]:
-    """Return the sides of what spreads, each with its local model."""
+    """Return the constraints of what spreads, each with its local model."""
     return tuple(_spread_constraint(sample, bound, limits) for bound in bounds)
 
 
@@ -357,7 +357,7 @@ class WorstCase:
         """Accept every number of units; none is asked."""
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every limited side."""
+        """Return every one-sided constraint, the upper one first."""
         return tuple(self._side(sample, sign, limit) for sign, limit in limits.turned)
 
     def _side(self, sample: OutputSample, sign: Literal[1, -1], limit: float) -> OneSidedConstraint:
@@ -383,7 +383,7 @@ class RootSumSquare:
     -----
     The classical stack: √Σ(Dᵢtᵢ)² with the derivatives Dᵢ at nominal and tᵢ half the zone. It takes sizes and
     positions, needs no sample and knows neither distributions nor what the model bends, so the report shows the yield
-    of fresh units beside it.
+    of random units beside it.
     """
 
     @property
@@ -395,7 +395,7 @@ class RootSumSquare:
         """Accept every number of units; none is asked."""
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every limited side.
+        """Return every one-sided constraint, the upper one first.
 
         Raises
         ------
@@ -431,7 +431,7 @@ def _left(distance: float, locked: float) -> float:
 
 
 JOINT = "largest excess over all limits [-]"
-"""What a yield of all limits together judges: the excess over a limit, relative to it, below zero in a good unit."""
+"""What a yield of all limits together is a share of: the excess over a limit, relative to it, below zero in a good unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -515,7 +515,7 @@ class JointRequirement(Requirement):
 
 @dataclass(frozen=True, kw_only=True)
 class JointSample(OutputSample):
-    """What fresh units of a design say of all limits at once."""
+    """What random units of a design say of all limits at once."""
 
     requirement: JointRequirement  # The limits
 
@@ -548,7 +548,7 @@ class Check:
     """How a verified design stands against one requirement."""
 
     requirement: Requirement  # The requirement
-    constraints: tuple[OneSidedConstraint, ...]  # Its limited sides, the upper one first
+    constraints: tuple[OneSidedConstraint, ...]  # One for each of its limits, the upper one first
 
     @property
     def met(self) -> bool:

@@ -43,7 +43,7 @@ class Screen:
     Nothing depends on its being right (`tolalloc.capability.near_limit`): where it is wrong more units are solved.
     """
 
-    excess: QuadraticForm  # Predicted excess over every limited side [unit of the output]
+    excess: QuadraticForm  # Predicted excess over every limit [unit of the output]
     # Least predicted excess of a near unit [unit of the output]
     least: Float[np.ndarray, " side"]
     share: float  # Units that are near [-]
@@ -88,7 +88,7 @@ class Screen:
 def _excesses(
     requirement: Requirement, outputs: Mapping[str, Float[np.ndarray, " unit"]]
 ) -> Float[np.ndarray, "unit side"]:
-    """Return how far every unit lies beyond the limited sides, not a number where it has no answer."""
+    """Return how far every unit lies beyond the limits, not a number where it has no answer."""
     values = requirement.read(outputs)
     return np.stack([sign * (values - limit) for sign, limit in requirement.limits.turned], axis=1)
 

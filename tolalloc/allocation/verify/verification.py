@@ -1,4 +1,4 @@
-"""A design counts only after fresh units on the real model have judged it."""
+"""Verified designs: what random units on the real model, a new sample for each design, say of its requirements."""
 
 from __future__ import annotations
 
@@ -27,28 +27,27 @@ DERIVATIVE_UNITS = 6144
 
 @dataclass(frozen=True, kw_only=True)
 class VerifiedDesign:
-    """A design with the fresh Monte Carlo run that judged it."""
+    """A design with the Monte Carlo run that verified it."""
 
     name: str  # Which search made it, and its number there
     space: DesignSpace  # The design variables
     design: Float[np.ndarray, " variable"]  # Scales [-] and settings
     processes: tuple[str, ...]  # Name of the process of every group
     cost: float  # Cost [cost units]
-    sample: (
-        RedrawnUnits  # The fresh units on the real model with the leading output, which the first requirement limits
-    )
+    # The units on the real model with the leading output, which the first requirement limits
+    sample: RedrawnUnits
     achieved: Yield  # Yield within its limits
     checks: tuple[Check, ...]  # How the design stands against every requirement, the leading one first
     joint: Yield  # Share of units that keep the limits of all requirements
-    # Outputs of all requirements of every fresh unit, NaN where a unit has none
+    # Outputs of all requirements of every unit, NaN where a unit has none
     outputs: dict[str, Float[np.ndarray, " unit"]]
     # Change of the leading output's value with the zone of each active source; none where the model does not know its
     # derivatives exactly [unit of the output per m]
     by_zone: Float[np.ndarray, " source"] | None
     # Change of the leading output with a deviation of each active source, `DesignSample.sensitivity`; none as above
     by_deviation: Float[np.ndarray, " source"] | None
-    confidence: float  # With which the units show what the sides compare with their limits, one-sided [-]
-    independent: IndependentSample | None = None  # What judged it last, none if that were the units of its search
+    confidence: float  # With which the units show what is compared with the limits, one-sided [-]
+    independent: IndependentSample | None = None  # What tested it last, none if it was not tested
     accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
 
     @property
@@ -68,7 +67,7 @@ class VerifiedDesign:
 
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
-        """All limited sides of all requirements."""
+        """One-sided constraints of all requirements."""
         return tuple(constraint for check in self.checks for constraint in check.constraints)
 
     @property
@@ -108,7 +107,7 @@ class VerifiedDesign:
 
 @dataclass(frozen=True, kw_only=True)
 class Verifier:
-    """Judges designs on fresh units.
+    """Verifies designs, each on random units of its own.
 
     Raises
     ------
@@ -124,7 +123,7 @@ class Verifier:
     # How many of them derivatives that the model does not know exactly are averaged over [-]
     slope_units: int = SLOPE_UNITS
     largest_failed_share: float = LARGEST_FAILED_SHARE  # Share of the units that may fail [-]
-    confidence: float = CONFIDENCE  # With which guarantees are judged, one-sided [-]
+    confidence: float = CONFIDENCE  # With which guarantees must be shown, one-sided [-]
 
     def __post_init__(self) -> None:
         for requirement in self.requirements:
@@ -137,7 +136,7 @@ class Verifier:
         return float(limits.upper if limits.upper is not None else limits.lower or 0.0)
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
-        """Return the design judged by fresh units of its own.
+        """Return the design with what random units of its own say of it.
 
         Raises
         ------
@@ -146,7 +145,7 @@ class Verifier:
         """
         seeds, errors = self.seeds.child(name), self.space.errors
         outputs = tuple(dict.fromkeys(name for requirement in self.requirements for name in requirement.outputs))
-        fresh = DesignSample(
+        sample = DesignSample(
             space=self.space,
             model=self.model,
             design=design,
@@ -156,12 +155,12 @@ class Verifier:
             derivative_units=min(self.units, DERIVATIVE_UNITS) if self.model.is_fast else self.units,
             seeds=seeds,
         )
-        for sample in fresh.samples:
-            require_few_failures(sample, name, self.largest_failed_share)
+        for own in sample.samples:
+            require_few_failures(own, name, self.largest_failed_share)
         checks = tuple(
-            requirement.check(requirement.sample(fresh, self.confidence)) for requirement in self.requirements
+            requirement.check(requirement.sample(sample, self.confidence)) for requirement in self.requirements
         )
-        values = {output: fresh.values(output) for output in outputs}
+        values = {output: sample.values(output) for output in outputs}
         kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])
         return VerifiedDesign(
             name=name,
@@ -170,28 +169,28 @@ class Verifier:
             processes=self.space.process_names(design),
             cost=float(self.space.cost(design)),
             sample=RedrawnUnits(
-                evaluation=fresh.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
+                evaluation=sample.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
             ),
             achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))),
             checks=checks,
             joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
             outputs=values,
-            by_zone=_by_zone(fresh, checks[0].constraints[0].value),
-            by_deviation=fresh.sensitivity(fresh.outputs[0]) if fresh.outputs[0] in fresh.exact else None,
+            by_zone=_by_zone(sample, checks[0].constraints[0].value),
+            by_deviation=sample.sensitivity(sample.outputs[0]) if sample.outputs[0] in sample.exact else None,
             confidence=self.confidence,
         )
 
 
-def _by_zone(fresh: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:
+def _by_zone(sample: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:
     """Return the change of mean + spread·σ of the leading output with the zones; equation (24)."""
-    leading = fresh.outputs[0]
-    if leading not in fresh.exact:
+    leading = sample.outputs[0]
+    if leading not in sample.exact:
         return None
-    exact, values = fresh.exact[leading].evaluation, fresh.samples[0].values
+    exact, values = sample.exact[leading].evaluation, sample.samples[0].values
     known = exact.values[exact.good, 0]
     standard = (known - known.mean()) / known.std()
     spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
-    return np.asarray((1.0 + spread * standard) @ fresh.by_zone(leading) / known.size)
+    return np.asarray((1.0 + spread * standard) @ sample.by_zone(leading) / known.size)
 
 
 def cheapest_met(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
