@@ -90,7 +90,7 @@ class DrawingQuestion:
 
     @property
     def search_confidence(self) -> float:
-        """With which confidence the units of a search are read: so far inside the limits as an acceptance test takes [-]."""
+        """Confidence with which a search reads its units: as far inside the limits as an acceptance test takes [-]."""
         shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
         good_as = 1 if self.model.is_fast else AS_GOOD_AS
         return confidence_of_fewer(shown, units, good_as * self.effort.confirmation_units)
@@ -196,7 +196,7 @@ class DrawingQuestion:
             largest_failed_share=self.largest_failed_share,
         )
         admitted = found.admitted()
-        # Where no search ended inside all limits, what an independent sample says of its best design leads to a safer one.
+        # Where no search ended inside all limits, a test of its best design leads to a safer one.
         promising = {name: own for name, own in admitted.items() if own.met} or {
             name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
         }

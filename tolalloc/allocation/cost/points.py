@@ -144,6 +144,9 @@ OUTER_ERROR = 1e-6
 class Tabulated:
     """Cost on straight lines between points; the first and the last line go on beyond them.
 
+    >>> float(Tabulated(Points(zones=(10.0, 20.0), costs=(8.0, 5.0))).value(np.array(15.0)))
+    6.5
+
     Raises
     ------
     InputError
@@ -206,6 +209,12 @@ class Spline:
     ----------
     F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants,
     SIAM J. Sci. Stat. Comput. 5 (1984).
+
+    Examples
+    --------
+    >>> curve = Spline(Points(zones=(10.0, 20.0, 40.0), costs=(8.0, 5.0, 4.0)))
+    >>> round(float(curve.value(np.array(15.0))), 3), curve.is_convex
+    (6.188, True)
     """
 
     points: Points  # The points, falling
@@ -281,6 +290,11 @@ def convex_slopes(
     A cubic with end slopes −x and −y over a secant −m is convex where x + 2y ≤ 3m ≤ 2x + y. Given an interval of y,
     those of x that leave a choice are an interval too; so the intervals are found from the last point to the first, and
     the slopes inside them from the first to the last.
+
+    Examples
+    --------
+    >>> convex_slopes(np.array([-3.0, -1.0]), np.array([-3.5, -1.5, -0.2]))
+    array([-3.5, -2. , -0.2])
     """
     falls = -secants
     intervals = [(0.0, np.inf)]
@@ -362,6 +376,13 @@ def fits(points: Points) -> tuple[CostFit, ...]:
     For a given exponent and scale the fixed cost and the factor are a linear problem with both at least 0, solved
     exactly; only exponent and scale are searched, from several starts. A form needs one point more than it has
     parameters. A form that would have to rise is left out.
+
+    Examples
+    --------
+    >>> points = Points(zones=(10.0, 20.0, 40.0), costs=(5.0, 3.5, 2.75))
+    >>> (fit,) = fits(points)
+    >>> round(fit.model.fixed, 6), round(fit.model.factor, 6)
+    (2.0, 30.0)
     """
     count, fewest = len(points.zones), _parameters(Reciprocal) + 1
     if count < fewest:

@@ -45,12 +45,19 @@ class QualityLoss(NamedFields):
     def nominal_is_best(self, offset: float, deviation: float) -> float:
         """Return the mean loss per unit where the nominal value is best [cost units].
 
-        The offset is the mean less the nominal value, the deviation the standard one [unit of the output].
+        A/Δ²·(offset² + σ²), with the loss A at the limit Δ; the offset is the mean less the nominal value, the
+        deviation the standard one [unit of the output].
+
+        >>> QualityLoss(limit=10.0, at_limit=50.0).nominal_is_best(offset=3.0, deviation=4.0)
+        12.5
         """
         return self.at_limit / self.limit**2 * (offset**2 + deviation**2)
 
     def smaller_is_better(self, mean: float, deviation: float) -> float:
-        """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units]."""
+        """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units].
+
+        A/Δ²·(mean² + σ²).
+        """
         return self.nominal_is_best(mean, deviation)
 
 
@@ -105,6 +112,18 @@ class UnitPrice(NamedFields):
             Making one unit, good or bad [cost units].
         target
             Yield before rework [-].
+
+        Notes
+        -----
+        (c + inspection + (1 − y)·(r·rework + (1 − r)·scrap)) / (y + (1 − y)·r), with the yield y and the share r that
+        rework makes good.
+
+        Examples
+        --------
+        A tenth of the units is beyond the limit, half of these are made good for 20, the others cost 10 to scrap:
+
+        >>> UnitPrice(inspection=1.0, rework_share=0.5, rework=20.0, scrap=10.0).of_good_unit(93.0, 0.9)
+        100.52631578947368
         """
         beyond = self.rework_share * self.rework + (1 - self.rework_share) * self.scrap
         return (manufacturing + self.inspection + (1 - target) * beyond) / self.good_share(target)
@@ -146,6 +165,11 @@ def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields
     ------
     InputError
         There is no target, or one is no share.
+
+    Examples
+    --------
+    >>> best_yield(lambda target: 50 / (1 - target) ** 0.1, UnitPrice(scrap=40.0), (0.9, 0.99, 0.999)).best
+    0.9
     """
     if not yields:
         raise InputError.at("price of a unit", "yields", list(yields), "one target or more")

@@ -79,7 +79,13 @@ def _less_violating(
 
 
 def reference_directions(objectives: int, population: int) -> Float[np.ndarray, "direction objective"]:
-    """Return the finest regular lattice of Das & Dennis with no more directions than the population has designs."""
+    """Return the finest regular lattice of Das & Dennis (1998) with no more directions than the population has designs.
+
+    >>> reference_directions(2, 3)
+    array([[0. , 1. ],
+           [0.5, 0.5],
+           [1. , 0. ]])
+    """
     partitions = 1
     while comb(partitions + objectives, objectives - 1) <= population:
         partitions += 1

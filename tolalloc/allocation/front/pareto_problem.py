@@ -231,12 +231,21 @@ def knee(losses: Float[np.ndarray, "design objective"]) -> int:
     References
     ----------
     Das 1999, Struct. Optim. 18:107–115.
+
+    Examples
+    --------
+    >>> knee(np.array([[0.0, 10.0], [1.0, 3.0], [4.0, 2.0], [9.0, 1.0]]))
+    1
     """
     return int(np.argmin(normalised(losses, losses).sum(axis=1)))
 
 
 def spread_over(count: int, number: int) -> list[int]:
-    """Return at most so many positions among ``count``, evenly spread, the first and the last among them."""
+    """Return at most so many positions among ``count``, evenly spread, the first and the last among them.
+
+    >>> spread_over(10, 4)
+    [0, 3, 6, 9]
+    """
     return [int(at) for at in np.unique(np.linspace(0, count - 1, min(number, count)).astype(int))]
 
 

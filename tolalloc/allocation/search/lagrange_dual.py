@@ -75,6 +75,15 @@ class LeastPriced:
         A convex function lies above its tangents at any two zones, so the crossing of the two bounds it from below
         wherever they stand; that they stand on both sides of the minimum and close together only makes the bound tight.
         For b/t + p·t the minimum is known: it is reached at √(b/p), or at the nearer end of the range.
+
+        Examples
+        --------
+        The least of 4/t + t, which is 4 at t = 2:
+
+        >>> made = Process(name="turned", cost=Reciprocal(factor=4.0), minimum=1.0, maximum=9.0)
+        >>> least, zone = LeastPriced.of([0], [made]).found(np.ones(1), np.zeros(1))
+        >>> float(least[0]), float(zone[0])
+        (4.0, 2.0)
         """
         if isinstance(self.cost, Reciprocal) and not square.any():
             best = np.sqrt(np.ravel(self.cost.factor) / np.where(linear > 0, linear, np.nan))
@@ -159,6 +168,10 @@ class LagrangeDual:
 
     The minimum over one zone does not hang on a converged iteration either (`LeastPriced`), so all that may
     lift the bound is the rounding of a sum of as many terms as there are features and stacks.
+
+    References
+    ----------
+    S. Boyd, L. Vandenberghe, Convex Optimization, Cambridge University Press (2004), chapter 5.
     """
 
     def __init__(self, problem: AllocationProblem) -> None:
@@ -333,6 +346,18 @@ def cost_bound(
     Notes
     -----
     See `LagrangeDual` for why the value is a bound.
+
+    Examples
+    --------
+    Two zones that cost 1/t and add up to 2 or less cost 2 at least; a wrong price still gives a bound:
+
+    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
+    >>> made = Process(name="turned", cost=Reciprocal(factor=1.0), minimum=0.5, maximum=9.0)
+    >>> features = tuple(PricedFeature(name=name, processes=(made,)) for name in ("bore", "pin"))
+    >>> stack = Stack(name="play", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=2.0)
+    >>> problem = AllocationProblem(features=features, stacks=(stack,))
+    >>> cost_bound(problem, np.ones(1), np.ones(2)), round(cost_bound(problem, np.array([0.5]), np.ones(2)), 6)
+    (2.0, 2.0)
     """
     dual = LagrangeDual(problem)
     allowed = np.ones(dual.feature.size, dtype=bool)

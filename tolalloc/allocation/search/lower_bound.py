@@ -14,7 +14,6 @@ from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stac
 from tolalloc.allocation.space.requirement import Check, QuantileBound, RootSumSquare, Sampled
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.monte_carlo import CONFIDENCE
-from tolalloc.capability.near_limit import SolvedUnits
 
 _ROUNDING = 1e-9
 """Part of a budget by which a load that is its own budget may lie beyond it [-]."""
@@ -122,16 +121,10 @@ def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
 
 def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
     """Return the units that tested a design last."""
-    law = design.laws.get(check.requirement.output)
+    requirement, law = check.requirement, design.laws.get(check.requirement.output)
     if design.independent:
-        return design.independent.limited(check.requirement, law)
-    values = check.requirement.read(design.outputs)
-    return LimitedSample(
-        values=values,
-        units=SolvedUnits.all_of(values.size),
-        limits=check.requirement.limits,
-        law=law,
-    )
+        return design.independent.limited(requirement, law)
+    return LimitedSample.all_of(requirement.read(design.outputs), requirement.limits, law)
 
 
 def _touching(constraint: OneSidedConstraint, design: VerifiedDesign) -> Stack:

@@ -315,6 +315,21 @@ def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None
     ------
     SolveError
         No allowed choice was found within these nodes, or the solver gave up.
+
+    Examples
+    --------
+    Two groups of a dear and a cheap choice, of which the cheap ones together take more than the budget:
+
+    >>> program = MultipleChoice(
+    ...     group=np.array([0, 0, 1, 1]),
+    ...     cost=np.array([9.0, 4.0, 6.0, 3.0]),
+    ...     worst_case=np.array([[0.2, 0.6, 0.2, 0.6]]),
+    ...     squares=np.zeros((1, 4)),
+    ...     budget=np.ones(1),
+    ... )
+    >>> taken, cost, bound = best_choice(program, most_nodes=100)
+    >>> taken, cost, round(float(bound), 6)
+    (array([1, 2]), 10.0, 10.0)
     """
     kept = program.undominated & program.possible
     if np.unique(program.group[kept]).size < program.starts.size:

@@ -33,6 +33,26 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
         A cost is not convex.
     SolveError
         The search ended before it found a design, or a convex program was not solved.
+
+    References
+    ----------
+    K. W. Chase, W. H. Greenwood, B. G. Loosli, L. F. Hauglund, Least cost tolerance allocation for mechanical
+    assemblies with automated process selection, Manuf. Rev. 3 (1990) 49–59, for the problem; A. H. Land, A. G. Doig,
+    Econometrica 28 (1960) 497–520, for branch and bound.
+
+    Examples
+    --------
+    A bore that is bored down to 5 or ground down to 1, at most 4 wide:
+
+    >>> from tolalloc.allocation.cost.model import Process, Reciprocal
+    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
+    >>> bored = Process(name="bored", cost=Reciprocal(factor=8.0), minimum=5.0, maximum=20.0)
+    >>> ground = Process(name="ground", cost=Reciprocal(fixed=1.0, factor=12.0), minimum=1.0, maximum=9.0)
+    >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=4.0)
+    >>> bore = PricedFeature(name="bore", processes=(bored, ground))
+    >>> found = allocate(AllocationProblem(features=(bore,), stacks=(stack,)))
+    >>> found.processes, round(found.cost, 6), round(found.bound, 6)
+    (array([1]), 4.0, 4.0)
     """
     return _BranchAndBound(problem).answer(most_nodes)
 

@@ -69,7 +69,11 @@ _ROUNDING = 1e-9
 
 
 def size_step(nominal: float) -> int:
-    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError."""
+    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
+
+    >>> SIZE_STEPS[size_step(0.052)]
+    80
+    """
     size = nominal / MILLIMETRE
     if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
         raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
@@ -77,7 +81,11 @@ def size_step(nominal: float) -> int:
 
 
 def grade_zones(nominal: float) -> dict[str, float]:
-    """Return the zone of every grade of a nominal size in metres, finest first [m]."""
+    """Return the zone of every grade of a nominal size in metres, finest first [m]; printed values of ISO 286-1.
+
+    >>> round(grade_zones(0.052)["IT6"] * 1e6), round(grade_zones(0.052)["IT12"] * 1e6)
+    (19, 300)
+    """
     step = size_step(nominal)
     zones = {grade: row[step] * MICROMETRE for grade, row in PRINTED.items()}
     for number in range(12, 19):

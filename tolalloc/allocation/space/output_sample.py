@@ -35,6 +35,11 @@ class LimitedSample:
     law: LinearLaw | None = None  # Law of the output, known before these units were drawn or the same units' own
     leaving: int = 0  # Units solved whatever was predicted whose value the law does not give [-]
 
+    @classmethod
+    def all_of(cls, values: Float[np.ndarray, " unit"], limits: Limits, law: LinearLaw | None = None) -> LimitedSample:
+        """Return plain random units, all of which were solved."""
+        return cls(values=values, units=SolvedUnits.all_of(values.size), limits=limits, law=law)
+
     @property
     def excess(self) -> Float[np.ndarray, " solved"]:
         """How far every unit lies beyond the limits, negative inside, infinite without a value [unit of the output]."""
@@ -49,7 +54,8 @@ class LimitedSample:
     def most_leaving(self, confidence: float) -> float:
         """Return the largest share of units that the law may be wrong of, with one-sided confidence [-].
 
-        Clopper–Pearson's bound; at one half the share of these units itself.
+        Clopper–Pearson's bound (1934), the quantile of a beta distribution with parameters k + 1 and n − k for k of n
+        units that leave the law; at one half the share of these units itself.
         """
         from scipy.stats import beta
 
@@ -298,13 +304,7 @@ class OutputSample:
 
     def limited(self, limits: Limits) -> LimitedSample:
         """Return what the units say of limits; a search solves all of them."""
-        values = np.append(self.values, np.full(self.failed, np.nan))
-        return LimitedSample(
-            values=values,
-            units=SolvedUnits.all_of(values.size),
-            limits=limits,
-            law=self.law,
-        )
+        return LimitedSample.all_of(np.append(self.values, np.full(self.failed, np.nan)), limits, self.law)
 
     @property
     def law(self) -> LinearLaw | None:

@@ -41,12 +41,28 @@ class PricedFeature:
 
 @dataclass(frozen=True, kw_only=True)
 class Stack:
-    """A tolerance stack: worst_case·zones + ‖root_sum_square∘zones‖₂ + slopes·shared ≤ budget.
+    """A tolerance stack: Σ wᵢ·zᵢ + √Σ(qᵢ·zᵢ)² + Σ sⱼ·vⱼ ≤ budget, of zones z and shared variables v.
+
+    Worst-case stacks have q = 0, root-sum-square stacks w = 0.
 
     Raises
     ------
     InputError
         A zone would relieve the stack.
+
+    References
+    ----------
+    K. W. Chase, W. H. Greenwood, Design issues in mechanical tolerance analysis, Manuf. Rev. 1 (1988) 50–59.
+
+    Examples
+    --------
+    Two zones of 3 and 4 µm that add in quadrature, and a third one of 2 µm with all of its size:
+
+    >>> stack = Stack(
+    ...     name="gap", worst_case=np.array([0.0, 0, 1]), root_sum_square=np.array([1.0, 1, 0]), budget=10.0
+    ... )
+    >>> float(stack.load(np.array([3.0, 4.0, 2.0]), np.empty(0)))
+    7.0
     """
 
     name: str  # What the stack keeps
@@ -172,6 +188,17 @@ def least_infeasible(problem: AllocationProblem) -> LeastInfeasible:
     -----
     A larger zone never relieves a stack, so the smallest zones are best for all stacks at once and only the shared
     variables are left: a linear program, or nothing.
+
+    Examples
+    --------
+    >>> from tolalloc.allocation.cost.model import Reciprocal
+    >>> bore = PricedFeature(
+    ...     name="bore", processes=(Process(name="bored", cost=Reciprocal(factor=1.0), minimum=4.0, maximum=9.0),)
+    ... )
+    >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=3.0)
+    >>> found = least_infeasible(AllocationProblem(features=(bore,), stacks=(stack,)))
+    >>> found.blocking, found.feasible, round(found.largest, 3)
+    (('play',), False, 0.333)
     """
     processes = np.array([np.argmin([made.minimum for made in feature.processes]) for feature in problem.features])
     zones = np.array([feature.processes[at].minimum for feature, at in zip(problem.features, processes, strict=True)])
@@ -207,7 +234,7 @@ def _relief(problem: AllocationProblem, zones: Float[np.ndarray, " feature"]) ->
 
 @dataclass(frozen=True, kw_only=True)
 class OneSidedConstraint:
-    """One limit of a requirement at a verified design: what is compared with it, and a convex model around the design."""
+    """One limit at a verified design: what is compared with it, and a convex model of that around the design."""
 
     sign: int  # 1 for an upper limit, −1 for a lower one [-]
     limit: float  # The limit [unit of the output]
@@ -271,8 +298,17 @@ def root_sum_square_stack(
     Notes
     -----
     Theory page, equation (25). The norm is how independent random errors combine, and it is homogeneous, so its value
-    is gradient·scales. A group whose larger zone relieves the limit, by noise or because its errors open the contact,
-    gets weight zero: the model never rewards a larger error.
+    is gradient·scales: weightᵢ² = gᵢ·(g·scales)/scaleᵢ with gᵢ = max(∂excess/∂scaleᵢ, 0). A group whose larger zone
+    relieves the limit, by noise or because its errors open the contact, gets weight zero: the model never rewards a
+    larger error. It is exact at the design, and near it to first order.
+
+    Examples
+    --------
+    An output that rises by 3 and 4 with two scales, at a design 1 inside its limit:
+
+    >>> stack = root_sum_square_stack("play", np.array([1.0, 1.0]), -1.0, np.array([3.0, 4.0]), groups=2)
+    >>> np.round(stack.root_sum_square, 3), stack.budget, float(stack.load(np.array([1.0, 1.0]), np.empty(0)))
+    (array([4.583, 5.292]), 8.0, 7.0)
     """
     by_scale = np.maximum(gradient[:groups], 0.0)
     spread = float(by_scale @ design[:groups])
@@ -292,7 +328,14 @@ def worst_case_stack(
     gradient: Float[np.ndarray, " variable"],
     groups: int,
 ) -> Stack:
-    """Return the model of a worst case, weights·scales + slopes·settings ≤ budget, from the same arguments."""
+    """Return the model of a worst case, weights·scales + slopes·settings ≤ budget, from the same arguments.
+
+    Examples
+    --------
+    >>> stack = worst_case_stack("play", np.array([1.0, 1.0]), -1.0, np.array([3.0, 4.0]), groups=2)
+    >>> stack.worst_case, stack.budget
+    (array([3., 4.]), 8.0)
+    """
     by_scale = np.maximum(gradient[:groups], 0.0)
     return Stack(
         name=name,

@@ -51,7 +51,36 @@ class QuantileBound:
 
 
 def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> QuantileBound:
-    """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown."""
+    """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown.
+
+    Parameters
+    ----------
+    sample
+        The units with their limits.
+    sign, limit
+        1 for an upper limit, −1 for a lower one [-], and the limit [unit of the output].
+    beyond
+        How far the unit lies beyond its limit that the guarantee's share of rejects just leaves in [unit of the
+        output], infinite where the units are too few.
+
+    Notes
+    -----
+    A one-sided confidence bound on a quantile is an order statistic: of n units the k-th largest, with k the most
+    rejects for which P(rejects ≤ k | share rejected) is at most one minus the confidence (binomial distribution).
+
+    References
+    ----------
+    C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404–413; G. J. Hahn, W. Q. Meeker, Statistical Intervals (1991).
+
+    Examples
+    --------
+    Of 100 units 1, 2, … 100 none but the one beyond 99 may be rejected:
+
+    >>> units = LimitedSample.all_of(np.arange(1.0, 101), Limits(upper=90.0))
+    >>> bound = order_statistic(units, 1, 90.0, beyond=9.0)
+    >>> bound.value, bound.excess, round(bound.standard_error, 2)
+    (99.0, 9.0, 1.4)
+    """
     turned = np.where(np.isfinite(sample.values), sign * sample.values, np.inf)
     further = min(int(np.count_nonzero(turned - sign * limit > beyond)), turned.size - 1)
     outermost = largest_first(turned, _SURROUNDED * further + _SURROUNDING)
@@ -66,7 +95,10 @@ def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, b
 
 
 def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple[QuantileBound, ...]:
-    """Return what a law says of every limit if such a share of it may lie beyond the limits [-]."""
+    """Return what a law says of every limit if such a share of it may lie beyond the limits [-].
+
+    With two limits both move by the same excess, outwards where it is above zero, until just that share lies beyond.
+    """
     excess = law.excess(sample.limits, beyond)
     error = _ACCURACY * law.half_width
     return tuple(
@@ -145,7 +177,7 @@ class Sampled(Guarantee, Protocol):
         ...
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what is compared with every limit at its least, with one-sided confidence: the other end of `bounds`."""
+        """Return the other end of `bounds`: the least that is compared with every limit, with one-sided confidence."""
         ...
 
 
@@ -162,7 +194,16 @@ class AtYield(NamedFields):
     -----
     The values are order statistics: of the units furthest beyond a limit, either one, so many are left out as the
     sample may reject. So they are inside exactly where the bound of the yield reaches the target, Clopper–Pearson's
-    where all units were solved.
+    where all units were solved. Where the output is linear in the deviations, its exact law takes their place.
+
+    Examples
+    --------
+    Of 1,000 equally spaced units up to 1, one may be rejected for 99.5 % with 95 % confidence:
+
+    >>> values = np.arange(1, 1001) / 1000
+    >>> units = LimitedSample.all_of(values, Limits(upper=1.0))
+    >>> [bound.value for bound in AtYield(0.995).bounds(units, 0.95)]
+    [0.999]
     """
 
     called: ClassVar[str] = "guarantee AtYield"
@@ -186,7 +227,14 @@ class AtYield(NamedFields):
         Raises
         ------
         InputError
-            Too few units for the target, even if none is rejected.
+            Fewer than ln(1 − confidence)/ln(target) units: too few for the target, even if none is rejected.
+
+        Examples
+        --------
+        >>> AtYield(0.99).require_enough(299)
+        >>> AtYield(0.99).require_enough(298)
+        Traceback (most recent call last):
+        tolalloc.exceptions.InputError: a yield of 99.0000%: units is 298; allowed is 299 or more.
         """
         if allowed_rejections(units, self.target, confidence) < 0:
             needed = int(np.ceil(np.log(1 - confidence) / np.log(self.target)))
@@ -230,6 +278,16 @@ class AtCpk(NamedFields):
     References
     ----------
     Bissell 1990, Appl. Statist. 39, 331–340; the delta method for other distributions.
+
+    Examples
+    --------
+    Standard normal units have a Cpk of 1 for a limit of 3; 400 of them show it, with 95 % confidence, for 3.17 alone:
+
+    >>> values = np.random.default_rng(0).standard_normal(400)
+    >>> units = LimitedSample.all_of(values, Limits(upper=3.0))
+    >>> (bound,) = AtCpk(1.0).bounds(units, 0.95)
+    >>> round(bound.value, 2), round(bound.standard_error, 2)
+    (3.17, 0.13)
     """
 
     called: ClassVar[str] = "guarantee AtCpk"
@@ -431,7 +489,7 @@ def _left(distance: float, locked: float) -> float:
 
 
 JOINT = "largest excess over all limits [-]"
-"""What a yield of all limits together is a share of: the excess over a limit, relative to it, below zero in a good unit."""
+"""What a yield of all limits at once limits: the excess over a limit, relative to it, below zero in a good unit."""
 
 
 @dataclass(frozen=True, kw_only=True)

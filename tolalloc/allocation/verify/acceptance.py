@@ -58,8 +58,8 @@ class AlphaSpending:
     --------
     Of 5 % the first design may spend 3.75 %, and the next one, where the first was not accepted, 0.9375 %:
 
-    >>> FIRST.error(0.05), FIRST.after(accepted=False).error(0.05)
-    (0.037500000000000006, 0.009375000000000001)
+    >>> round(FIRST.error(0.05), 6), round(FIRST.after(accepted=False).error(0.05), 6)
+    (0.0375, 0.009375)
     """
 
     number: int = 1  # Counted from 1 [-]
