@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tolalloc.reading.units import COST_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from tolalloc.drawings.sources import Source
 
 Row = TypeVar("Row")
 
@@ -27,13 +30,16 @@ class Column(Generic[Row]):
     key
         Name in a summary, where a program reads it; the header unless given, None where no program needs it.
     terminal
-        Whether a terminal shows it.
+        Place among the columns that a terminal shows, those of one place in their order; 0 if it shows it not.
+    nothing
+        Cell that says nothing: where all cells are so or empty, the column is left out; None to keep it always.
     """
 
     header: str
     value: Callable[[Row], Any]
     key: str | None = ""
-    terminal: bool = False
+    terminal: int = 0
+    nothing: str | None = None
 
     def titled(self, cost_unit: str) -> str:
         """Return the header with what costs are counted in."""
@@ -55,23 +61,62 @@ class Table(Generic[Row]):
     """
 
     name: str
-    columns: tuple[Column[Row], ...]
+    columns: Sequence[Column[Row]]
     rows: Sequence[Row]
 
     def frame(self, cost_unit: str = COST_UNITS) -> pd.DataFrame:
-        """Return the table for people: all columns, costs in their unit."""
-        return self._framed(self.columns, cost_unit)
+        """Return the table for people: all columns that say something, costs in their unit."""
+        return _framed(self._cells(self.columns), cost_unit)
 
     def terminal(self, cost_unit: str = COST_UNITS) -> pd.DataFrame:
         """Return the columns that a terminal shows."""
-        return self._framed(tuple(own for own in self.columns if own.terminal), cost_unit)
+        return _framed(self._cells(self._shown), cost_unit)
+
+    def shown(self, cost_unit: str = COST_UNITS) -> tuple[str, ...]:
+        """Return the headers of the columns that a terminal shows."""
+        return tuple(own.titled(cost_unit) for own in self._shown)
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the rows for a program, costs in cost units whatever people count them in."""
-        told = [(own.key or own.titled(COST_UNITS), own.value) for own in self.columns if own.key is not None]
-        return [{name: value(row) for name, value in told} for row in self.rows]
+        """Return the rows for a program, costs in cost units whatever people count them in; nothing for no number."""
+        told = self._cells([own for own in self.columns if own.key is not None])
+        named = {own.key or own.titled(COST_UNITS): cells for own, cells in told}
+        return [{name: plain(cells[at]) for name, cells in named.items()} for at in range(len(self.rows))]
 
-    def _framed(self, columns: tuple[Column[Row], ...], cost_unit: str) -> pd.DataFrame:
-        import pandas as pd
+    @property
+    def _shown(self) -> list[Column[Row]]:
+        return sorted((own for own in self.columns if own.terminal), key=lambda own: own.terminal)
 
-        return pd.DataFrame({own.titled(cost_unit): [own.value(row) for row in self.rows] for own in columns})
+    def _cells(self, columns: Sequence[Column[Row]]) -> list[tuple[Column[Row], list[Any]]]:
+        """Return the columns that say something with their cells."""
+        told = [(own, [own.value(row) for row in self.rows]) for own in columns]
+        return [
+            (own, cells)
+            for own, cells in told
+            if own.nothing is None or any(cell not in (own.nothing, "") for cell in cells)
+        ]
+
+
+def _framed(told: Sequence[tuple[Column[Row], list[Any]]], cost_unit: str) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame({own.titled(cost_unit): cells for own, cells in told})
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON knows it: numbers of Python, null for NaN and infinity.
+
+    >>> plain(float("inf")) is None, plain(1.5)
+    (True, 1.5)
+    """
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def own_words(members: Callable[[Row], Sequence[Source]]) -> tuple[Column[Row], ...]:
+    """Return the columns of own id, drawing and label of a row's sources, which stand where a drawing states any."""
+
+    def said(field: str) -> Callable[[Row], str]:
+        return lambda row: ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members(row)))))
+
+    headers = {"own_id": "own id", "drawing": "drawing", "label": "label"}
+    return tuple(Column(header=header, value=said(field), nothing="") for field, header in headers.items())

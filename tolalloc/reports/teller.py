@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.header import Header
@@ -27,9 +27,6 @@ class Teller(ABC, Generic[Result]):
     header
         What every answer says of its run.
     """
-
-    shown: ClassVar[tuple[str, ...]] = ()
-    """Columns of the first table that a terminal shows; the first six unless a teller says otherwise."""
 
     def __init__(self, result: Result, header: Header) -> None:
         self.result, self.header = result, header
@@ -68,6 +65,11 @@ class Teller(ABC, Generic[Result]):
     @abstractmethod
     def summary(self) -> dict[str, Any]:
         """The answer for a program, units of measurement in the names."""
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Columns of the first table that a terminal shows; the first six unless a teller says otherwise."""
+        return ()
 
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:

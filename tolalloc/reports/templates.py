@@ -6,16 +6,20 @@ is the teller's.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
+_BLANKS = re.compile(r"[ \n]+")
+"""Where a line of a text may be broken; a thin or a protected blank stays as it is."""
+
 
 @lru_cache(maxsize=64)
 def _texts(name: str) -> dict[str, str]:
     text = files("tolalloc.reports").joinpath("sentences", f"{name}.toml").read_text(encoding="utf-8")
-    return {key: " ".join(value.split()) for key, value in tomllib.loads(text).items()}
+    return {key: _BLANKS.sub(" ", value.strip()) for key, value in tomllib.loads(text).items()}
 
 
 class Sentences:

@@ -1,0 +1,251 @@
+"""The cheapest drawing that keeps every requirement, in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tolalloc.allocation.candidates import ALONE, Candidates
+from tolalloc.allocation.cost.process_costs_file import today
+from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
+from tolalloc.allocation.design_space import DesignSpace
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.graded import GradedAllocation
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.program.problem import Solution
+from tolalloc.allocation.requirement import Check, Requirement
+from tolalloc.allocation.robustness import Robustness
+from tolalloc.allocation.search import ZoneAllocation
+from tolalloc.allocation.trade import SettingTrade
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.drawings.drawing import Drawing
+from tolalloc.drawings.sources import Source
+from tolalloc.models.model import Examination, Model
+from tolalloc.reading.units import unit_of
+from tolalloc.sensitivity.sobol_analysis import SobolIndices
+
+_ROUNDING = 1e-6
+"""Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocationResult:
+    """The cheapest drawing that keeps every requirement.
+
+    Parameters
+    ----------
+    name
+        Name of the study.
+    model
+        The model at the sources of the tolerance table.
+    requirements
+        What must be kept, the leading one first.
+    space
+        Design variables with every setting free.
+    fixed
+        The allocation with the settings as they are, if the question asks for it and the model has any.
+    free
+        The allocation of tolerances and settings together.
+    graded
+        The same on ladders of zones, if the question asks for it.
+    shares
+        Sobol indices of the leading output at the zones of the drawing.
+    shares_of_dimensions
+        The same of the dimensions of the drawing: all members of a group exchanged together.
+    trade
+        Cost of the cheapest zones over the settings, if asked for.
+    fronts
+        What can be had at which cost, if asked for.
+    robustness
+        Answers under changed assumptions, if asked for.
+    prices
+        Price of a good unit over yield targets, if the question states what becomes of the others.
+    loss
+        What the leading output costs a user, if the question states it.
+    error
+        Probability up to which the answer may call a design met that misses a limit [-].
+    examination
+        What the model says of random units of the drawing, such as that they cannot be built.
+    statuses
+        Outcome → number of units that were solved for the answer, without those that the front was searched with [-].
+    """
+
+    name: str
+    model: Model
+    requirements: tuple[Requirement, ...]
+    space: DesignSpace
+    fixed: ZoneAllocation | None
+    free: ZoneAllocation
+    graded: GradedAllocation | None
+    shares: SobolIndices
+    shares_of_dimensions: SobolIndices
+    trade: SettingTrade | None
+    fronts: Fronts | None
+    robustness: Robustness | None
+    prices: YieldLadder | None
+    loss: QualityLoss | None
+    error: float
+    examination: Examination
+    statuses: Mapping[str, int]
+
+    @property
+    def free_label(self) -> str:
+        """What the search that frees everything may choose."""
+        return f"tolerances and {self.model.settings_word}" if self.space.settings else "tolerances"
+
+    @property
+    def leading(self) -> str:
+        """Name of the leading output, which the first requirement limits."""
+        return self.requirements[0].output
+
+    @property
+    def candidates(self) -> Candidates:
+        """What the searches found, among which the drawing is the cheapest."""
+        return Candidates(fixed=self.fixed, free=self.free, graded=self.graded)
+
+    @property
+    def designs(self) -> dict[str, VerifiedDesign]:
+        """The designs that a report compares, by what they are called."""
+        return self.candidates.designs(self.free_label)
+
+    @property
+    def searches(self) -> dict[str, ZoneAllocation]:
+        """The searches by what they were free to choose."""
+        return {**({ALONE: self.fixed} if self.fixed else {}), self.free_label: self.free}
+
+    @cached_property
+    def chosen(self) -> VerifiedDesign:
+        """What the drawing shall show: the cheapest of all that was shown to keep the limits."""
+        return self.candidates.drawn
+
+    @property
+    def keeps_table(self) -> bool:
+        """Whether nothing that was verified is cheaper than the tolerance table as it is."""
+        return self.chosen is self.free.baseline
+
+    @property
+    def drawn(self) -> DesignSpace:
+        """Design variables of the chosen design; groups share one zone where it is graded."""
+        return self.chosen.space
+
+    @property
+    def met(self) -> bool:
+        """Whether units that no search has seen show every requirement to be kept, with the stated error."""
+        return self.chosen.confirmed
+
+    @property
+    def cost(self) -> float:
+        """Cost of the drawing [cost units]."""
+        return self.chosen.cost
+
+    @property
+    def least_saving(self) -> float:
+        """Saving against proportional scaling that uses the limit to its last unit, as a share of its cost [-]."""
+        return 1 - (1 - self.free.saving_at_least) * self.chosen.cost / self.free.chosen.cost
+
+    @property
+    def bound(self) -> float | None:
+        """Lower bound on the cost of drawings that keep the limits; none if a verified one undercuts it [cost units].
+
+        For drawings near the verified ones, unless `bound_is_certified`; `LowerBound` says with which confidence.
+        """
+        return self.candidates.bound
+
+    @property
+    def bound_is_certified(self) -> bool:
+        """Whether the bound holds for every allowed drawing with free zones rather than near the verified ones."""
+        return self.candidates.unrestricted.lower_bound.certified
+
+    @cached_property
+    def drawn_sources(self) -> tuple[Source, ...]:
+        """All sources of the tolerance table at the zones of the drawing, with process, grade and cost."""
+        space, chosen, graded = self.drawn, self.chosen, self.graded
+        zones = dict(zip((source.name for source in space.errors.active), space.zones(chosen.design), strict=True))
+        made, costs = space.made_by(chosen.design), space.cost_of_sources(chosen.design)
+        on_grades = graded is not None and chosen is graded.chosen
+        labels = dict(zip(space.groups, graded.labels, strict=True)) if graded and on_grades else {}
+        return tuple(
+            replace(
+                source,
+                zone=float(zones[source.name]),
+                cost=costs[source.name],
+                process=made[source.name].name if self._has_prices(source) else source.process,
+                grade=labels.get(source.group, ""),
+            )
+            if source.name in made
+            else source
+            for source in self.space.errors.sources
+        )
+
+    def _has_prices(self, source: Source) -> bool:
+        """Return whether the process cost table knows a source; where it does not, no process was chosen."""
+        alone = (today(source),)
+        return self.space.processes.get(source.name, alone) != alone
+
+    @cached_property
+    def dimensions(self) -> dict[str, tuple[Source, ...]]:
+        """Dimension of the drawing that has a zone → its members as drawn."""
+        found: dict[str, list[Source]] = {}
+        for source in self.drawn_sources:
+            if source.zone > 0.0:
+                found.setdefault(source.group or source.name, []).append(source)
+        return {name: tuple(members) for name, members in found.items()}
+
+    @property
+    def process_changes(self) -> dict[str, float]:
+        """What leaving the old process costs once, of every source whose zone may change [cost units]."""
+        return {name: own.change for name, own in self.drawn.made_by(self.chosen.design).items()}
+
+    @cached_property
+    def drawing(self) -> Drawing:
+        """The drawing as the next study takes it, with the cost of every zone as it is made.
+
+        Leaving the old process was paid for, once.
+        """
+        changes = self.process_changes
+        sources = (replace(own, cost=own.cost - changes.get(own.name, 0.0)) for own in self.drawn_sources)
+        errors = replace(self.space.errors, sources=tuple(sources))
+        return Drawing(name=f"{self.name}, allocated", errors=errors)
+
+
+def solver_noise(solution: Solution) -> float:
+    """Return the cost below which a price tells nothing of a solution [cost units]."""
+    return max(solution.gap, _ROUNDING) * solution.cost
+
+
+def limit_price(side: Side, price: float) -> tuple[float, str]:
+    """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1."""
+    unit = unit_of(side.stack.name)
+    return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
+
+
+def unit_quantile(design: VerifiedDesign, check: Check) -> float:
+    """Return the limit that just the target share of a design's units keeps [unit of the output].
+
+    Parameters
+    ----------
+    design
+        The verified design.
+    check
+        How it stands against a requirement.
+
+    Returns
+    -------
+    float
+        Not a number unless the requirement is a yield with one limit; two share the units beyond.
+    """
+    guarantee = check.requirement.guarantee
+    if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
+        return float("nan")
+    side, confirming = check.sides[0], design.confirming
+    if confirming and not confirming.units.near.all():
+        excess = side.sign * (check.requirement.read(confirming.outputs) - side.limit)
+        beyond = confirming.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
+        return float(side.limit + side.sign * beyond)
+    sign, values = side.sign, check.requirement.read(design.outputs)
+    turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))
+    return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])

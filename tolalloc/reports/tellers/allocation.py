@@ -1,0 +1,250 @@
+"""The cheapest drawing that keeps every requirement: what to write, what it costs, and how sure that is."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tolalloc.allocation.result import AllocationResult
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.columns import plain
+from tolalloc.reports.document import Section
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.tellers import allocation_figures as figures
+from tolalloc.reports.tellers import allocation_sentences as texts
+from tolalloc.reports.tellers import allocation_tables as tables
+from tolalloc.reports.tellers.allocation_drawing import (
+    dimensions_table,
+    effects_figure,
+    sources_table,
+    tolerances_frame,
+    write_drawing,
+    zones_figure,
+)
+from tolalloc.reports.tellers.allocation_sentences import say
+from tolalloc.reports.wording import short
+from tolalloc.sensitivity.driver_tables import sobol_table
+
+
+class AllocationTeller(Teller[AllocationResult]):
+    """What is said and shown of the cheapest drawing."""
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        result = self.result
+        key = "title_kept" if result.keeps_table else "title"
+        if not result.met:
+            key = "title_missed"
+        elif result.examination.fault:
+            key = "title_fault"
+        return say(key, model=self.header.model, name=self.header.name)
+
+    @property
+    def subtitle(self) -> str:
+        """Under which conditions it holds."""
+        count = len(self.result.requirements)
+        conditions = [super().subtitle] if self.header.conditions else []
+        asked = say("requirements" if count > 1 else "requirement", count=count)
+        return ", ".join([asked, *conditions, say("seed", seed=self.header.seed)])
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The answer in sentences, each no stronger than what was computed."""
+        return texts.sentences(self.result, self.header.cost_unit)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on the answer."""
+        return texts.warnings(self.result, self.header)
+
+    @cached_property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        return texts.assumptions(self.result, self.header)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """What to write, its part in the variance and its cost."""
+        return dimensions_table(self.result).shown(self.header.cost_unit)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """The sections of the report."""
+        result, unit = self.result, self.header.cost_unit
+        sources, leading = sources_table(result), short(result.leading)
+        counts = (
+            f"{count} unit{'' if count == 1 else 's'}: {outcome}"
+            for outcome, count in self.header.statuses.items()
+            if count
+        )
+        return (
+            self._dimensions,
+            Section(
+                heading=say("heading_sources"),
+                figures=(zones_figure(sources.rows),),
+                tables=((sources.name, sources.frame(unit)),),
+                paragraphs=(say("sources"),),
+                unfolded=True,
+            ),
+            Section(heading=say("heading_shares", output=leading), tables=(("shares", sobol_table(result.shares)),)),
+            self._requirements,
+            *self._illustrated,
+            self._optimality,
+            *self._what_if,
+            Section(
+                heading=say("heading_work"),
+                paragraphs=(f"{', '.join(counts)}.",),
+                tables=(
+                    ("verified designs", tables.verified_table(result).frame(unit)),
+                    ("tolerances", tolerances_frame(result, unit)),
+                    ("work", tables.work_frame(self.header)),
+                ),
+            ),
+        )
+
+    @property
+    def _dimensions(self) -> Section:
+        """The first page: what to write, a line per dimension."""
+        result = self.result
+        made = " ".join((*texts.drawn_amounts(result), *texts.amounts_convention(result)))
+        return Section(
+            heading=say("heading_dimensions"),
+            paragraphs=(made, say("dimensions"), say("files")),
+            figures=effects_figure(result),
+            tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
+            unfolded=True,
+            first=True,
+        )
+
+    @property
+    def _requirements(self) -> Section:
+        """How the designs stand against the requirements."""
+        shown = (tables.requirements_table(self.result), tables.designs_table(self.result))
+        return Section(
+            heading=say("heading_requirements"),
+            paragraphs=texts.quantiles(self.result),
+            figures=(figures.units_figure(self.result),),
+            tables=tuple((own.name, own.frame(self.header.cost_unit)) for own in shown),
+        )
+
+    @property
+    def _illustrated(self) -> tuple[Section, ...]:
+        """The median units before and after, as the model pictures them."""
+        before, after = self.result.free.baseline, self.result.chosen
+        units = {
+            "median unit before": (before.settings, before.sample.unit_at(0.5)[0]),
+            "median unit after": (after.settings, after.sample.unit_at(0.5)[0]),
+        }
+        return self.result.model.illustrated(units)
+
+    @property
+    def _optimality(self) -> Section:
+        """How far from optimal the drawing can be."""
+        result, unit, fronts = self.result, self.header.cost_unit, self.result.fronts
+        return Section(
+            heading=say("heading_optimality"),
+            paragraphs=(say("bound"), say("bounds_table")),
+            figures=(figures.front_figure(result, fronts, unit),) if fronts else (),
+            tables=(
+                ("certificate", tables.certificate_frame(result, unit)),
+                *(tables.front_frames(result, fronts, unit) if fronts else ()),
+                ("bounds by process and table", tables.bounds_frame(result, unit)),
+            ),
+        )
+
+    @property
+    def _what_if(self) -> tuple[Section, ...]:
+        """What would be otherwise: settings, yields, assumptions."""
+        result, unit, found = self.result, self.header.cost_unit, list[Section]()
+        if result.trade:
+            found.append(
+                Section(
+                    heading=say("heading_trade", word=result.model.settings_word.capitalize()),
+                    paragraphs=texts.cheapest_settings(result, unit),
+                    figures=figures.trade_figures(result, result.trade, unit),
+                    tables=(("modification", tables.trade_frame(result.trade, unit)),),
+                )
+            )
+        if result.prices and result.prices.priced.size:
+            priced = (("unit price", tables.prices_frame(result.prices, unit)),)
+            found.append(Section(heading=say("heading_good_unit"), tables=priced))
+        if result.robustness:
+            moved, variants = tables.robustness_frame(result, result.robustness), result.robustness
+            found.append(
+                Section(
+                    heading=say("heading_robustness"),
+                    figures=(figures.robustness_figure(moved),),
+                    tables=(("robustness", moved), ("variants", tables.variants_frame(variants, unit))),
+                )
+            )
+        return tuple(found)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The whole answer for a program, units in the names."""
+        result, header = self.result, self.header
+        chosen, free, robustness = result.chosen, result.free, result.robustness
+        limit = "limit [arcsec]" if unit_of(result.leading) == "arcsec" else f"limit of {result.leading}"
+        answered = {
+            "study": header.name,
+            "study hash": header.digest,
+            result.model.kind: header.model,
+            **header.conditions,
+            limit: free.limit,
+            "yield target [-]": getattr(result.requirements[0].guarantee, "target", None),
+            "seed": header.seed,
+            "quick": header.quick,
+            "met": result.met,
+            "overall error of the verification [-]": result.error,
+            "yield [-]": chosen.achieved.estimate,
+            "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],
+            "yield lower bound, one-sided 95 % [-]": chosen.achieved.bound,
+            "yield of all limits [-]": chosen.joint.estimate,
+            f"{short(result.leading)} kept [{unit_of(result.leading)}]": chosen.quantile_bound,
+            **self._costs,
+            "blocking requirement": None if result.met else chosen.blocking.requirement.output,
+            "beyond its limit by [unit of the output]": None if result.met else -chosen.blocking.slack,
+            "cannot be built because": result.examination.fault or None,
+            **result.examination.figures,
+            **result.model.amounts(chosen.settings),
+            "requirements": tables.requirements_table(result).records(),
+            "drawing": sources_table(result).records(),
+            "zones that stay the same": [
+                group for group, same in zip(robustness.groups, robustness.same, strict=True) if same
+            ]
+            if robustness
+            else None,
+            **result.model.facts,
+            "statuses": dict(header.statuses),
+            "warnings": list(self.warnings),
+        }
+        return {name: plain(value) for name, value in answered.items()}
+
+    @property
+    def _costs(self) -> dict[str, Any]:
+        """What the drawing costs and what it is compared with, for a program."""
+        result, chosen, free = self.result, self.result.chosen, self.result.free
+        return {
+            "cost [cost units]": chosen.cost,
+            "cost of the tolerance table [cost units]": free.baseline.cost,
+            "tolerance table met": free.baseline.met,
+            "cost of proportional scaling [cost units]": free.proportional.cost,
+            "proportional scaling met": free.proportional.met,
+            "saving [-]": 1 - chosen.cost / free.proportional.cost,
+            "saving at least [-]": result.least_saving,
+            "cost of tolerances alone [cost units]": result.fixed.chosen.cost if result.fixed else None,
+            f"cost of {result.free_label} [cost units]": free.chosen.cost,
+            "cost on grades [cost units]": result.graded.chosen.cost if result.graded else None,
+            "lower bound [cost units]": result.bound if result.met else None,
+            "lower bound holds for every drawing": result.bound_is_certified if result.met else None,
+            "gap of the convex program [-]": free.optimum.gap,
+        }
+
+    def add_files(self, folder: Path) -> None:
+        """Write the drawing as files that are read back, go on calculating, and enter a drawing program."""
+        write_drawing(self.result, self.header, folder)
+
+
+TELLER = AllocationTeller

@@ -1,0 +1,258 @@
+"""What to write on the drawing: its tables by source and by dimension, their pictures, and the files that go on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.result import AllocationResult
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.table_file import setting_line
+from tolalloc.drawings.tolerance_table import table_frame
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
+from tolalloc.reports.columns import Column, Table, own_words
+from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.feature_frame import Frames, callout, write_frames
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, say
+from tolalloc.reports.tellers.allocation_workbook import calculator_sheets, style_calculator
+from tolalloc.reports.wording import short, with_unit
+from tolalloc.reports.writer import write_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SAME = 1e-9
+"""Relative difference up to which two zones are the same [-]."""
+_STEP = 0.1
+"""Share of a zone by which the figure of effects opens it [-]."""
+
+_Source = tuple[Source, Source]
+"""A source before and after."""
+_Dimension = tuple[str, Sequence[_Source]]
+"""The name of a dimension and its members."""
+
+
+def sources_table(result: AllocationResult) -> Table[_Source]:
+    """Return the drawing in short: zone, grade, process, share of the variance and cost of every source."""
+    shares, changes, unit = _shares(result), result.process_changes, unit_of(result.leading)
+    by_deviation, by_zone = (_by_source(result, own) for own in (result.chosen.by_deviation, result.chosen.by_zone))
+    none = float("nan")
+    columns: list[Column[_Source]] = [
+        Column(header="source", value=lambda row: row[0].name),
+        *own_words(lambda row: row[:1]),
+        Column(header="callout", value=lambda row: row[0].feature.value),
+        Column(header="zone before [µm]", value=lambda row: row[0].zone / MICROMETRE),
+        Column(header="zone [µm]", value=lambda row: row[1].zone / MICROMETRE),
+        Column(header="change [%]", value=_change),
+        Column(header="grade", value=lambda row: row[1].grade),
+        *_processes(result),
+        Column(header="share of variance [%]", value=lambda row: shares.get(row[0].name, none)),
+    ]
+    if by_deviation:
+        columns.append(Column(header=f"Sens [{unit}/µm]", value=lambda row: by_deviation.get(row[0].name, none)))
+    if by_zone:
+        header = f"kept value per zone [{unit}/µm]"
+        columns.append(Column(header=header, value=lambda row: by_zone.get(row[0].name, none)))
+    columns.append(Column(header="cost before [{cost}]", value=lambda row: row[0].cost))
+    columns.append(Column(header="cost [{cost}]", value=lambda row: row[1].cost))
+    if any(changes.values()):
+        header = "of it for a new process [{cost}]"
+        columns.append(Column(header=header, value=lambda row: changes.get(row[0].name, 0.0)))
+    columns.append(Column(header="locked", value=lambda row: "yes" if row[0].locked else "no"))
+    pairs = zip(result.space.errors.sources, result.drawn_sources, strict=True)
+    return Table(name="drawing", columns=columns, rows=[pair for pair in pairs if pair[0].zone != 0.0])
+
+
+def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
+    """Return the drawing with one line per dimension, which all members of a group share."""
+    parts = _parts(result)
+    before, after = _processes(result)
+    columns: list[Column[_Dimension]] = [
+        Column(header="dimension", value=lambda row: row[0], terminal=1),
+        *own_words(lambda row: [new for _, new in row[1]]),
+        Column(header="places [-]", value=lambda row: len(row[1])),
+        Column(header="write [mm]", value=lambda row: frames([new for _, new in row[1]]), terminal=2),
+        Column(header="zone before [µm]", value=lambda row: _span([old.zone / MICROMETRE for old, _ in row[1]])),
+        Column(header="zone [µm]", value=lambda row: _span([new.zone / MICROMETRE for _, new in row[1]])),
+        Column(header="change [%]", value=lambda row: _change(row[1][0])),
+        Column(header="grade", value=lambda row: row[1][0][1].grade, nothing="", terminal=5),
+        Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
+        Column(header="process", value=lambda row: after.value(row[1][0]), nothing="as today", terminal=6),
+        Column(
+            header="part in the variance (total index) [%]",
+            value=lambda row: parts.get(row[1][0][0].group or row[1][0][0].name, np.nan),
+            terminal=3,
+        ),
+        Column(header="cost before [{cost}]", value=lambda row: np.sum([old.cost for old, _ in row[1]])),
+        Column(header="cost [{cost}]", value=lambda row: np.sum([new.cost for _, new in row[1]]), terminal=4),
+        Column(header="locked", value=lambda row: "yes" if row[1][0][0].locked else "no", nothing="no"),
+    ]
+    known = {own.name: own for own in result.space.errors.sources}
+    rows = [(name, [(known[own.name], own) for own in members]) for name, members in result.dimensions.items()]
+    return Table(name="dimensions", columns=columns, rows=rows)
+
+
+def frames(members: Sequence[Source]) -> Frames:
+    """Return the different frames of the members of a dimension."""
+    return Frames(dict.fromkeys(map(callout, members)))
+
+
+def _change(row: _Source) -> float:
+    """Return the change of a zone [%]."""
+    return (row[1].zone / row[0].zone - 1) * 100
+
+
+def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Source]]:
+    """Return the columns of the process of a source, before and now."""
+    made, today = (
+        space.made_by(design.design)
+        for space, design in ((result.drawn, result.chosen), (result.space, result.free.baseline))
+    )
+    return (
+        Column(
+            header="process before",
+            value=lambda row: today[row[0].name].name if row[0].name in made else row[0].process,
+        ),
+        Column(header="process", value=lambda row: made[row[0].name].name if row[0].name in made else row[0].process),
+    )
+
+
+def _span(zones: Sequence[float]) -> float | str:
+    """Return the zone of all members, or the smallest and the largest of them."""
+    low, high = min(zones), max(zones)
+    return low if high - low <= _SAME * high else f"{low:.4g}…{high:.4g}"
+
+
+def _parts(result: AllocationResult) -> dict[str, float]:
+    """Return the total index of every dimension, correlated ones under each of their names [%]."""
+    found = result.shares_of_dimensions
+    return {
+        name: float(total) * 100.0
+        for joined, total in zip(found.sources, found.total, strict=True)
+        for name in joined.split(" + ")
+    }
+
+
+def _by_source(result: AllocationResult, derivatives: Float[np.ndarray, " source"] | None) -> dict[str, float]:
+    """Return derivatives of the chosen design by the name of the source, none where there are none [output per µm]."""
+    if derivatives is None:
+        return {}
+    names = [source.name for source in result.drawn.errors.active]
+    return dict(zip(names, (derivatives * MICROMETRE).tolist(), strict=True))
+
+
+def _shares(result: AllocationResult) -> dict[str, float]:
+    """Return the share of every source in the sum of the total indices [%]."""
+    total = result.shares.total / result.shares.total.sum() * 100
+    return {name: float(share) for name, share in zip(result.shares.sources, total, strict=True)}
+
+
+def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> pd.DataFrame:
+    """Return the tolerance table in the layout of the input, with share of the variance and change added."""
+    frame = table_frame(result.drawn_sources, cost_unit=cost_unit)
+    known = sources_table(result).frame(cost_unit).set_index("source")
+    known = known.reindex([source.name for source in result.drawn_sources])
+    for header in ("share of variance [%]", "change [%]", f"cost before [{cost_unit}]"):
+        frame[header] = known[header].to_numpy()
+    return frame
+
+
+def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
+    """Return what opening each dimension does to what is kept of the leading output, largest effect first.
+
+    Nothing where the model of the drawing knows no derivatives by zones.
+    """
+    if result.chosen.by_zone is None:
+        return ()
+    names = [source.name for source in result.drawn.errors.active]
+    slope = dict(zip(names, result.chosen.by_zone.tolist(), strict=True))
+    effects = {
+        name: sum(_STEP * source.zone * slope.get(source.name, 0.0) for source in members)
+        for name, members in result.dimensions.items()
+    }
+    order = sorted(effects, key=lambda name: -abs(effects[name]))
+    kept = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading)
+    label, lengths = "effect with its sign, to first order", [effects[name] for name in order]
+    figure = Figure(
+        name="effects",
+        title=say("figure_effects", step=_STEP, output=short(result.leading), kept=kept),
+        x_label=f"change of {result.leading}",
+        series=(Series(label=label, kind="bars", x=order, y=lengths),),
+        vertical=((0.0, ""),),
+    )
+    return (figure,)
+
+
+def zones_figure(rows: Sequence[_Source]) -> Figure:
+    """Return the zones before and after."""
+    names = [before.name for before, _ in rows]
+    before, after = ([own.zone / MICROMETRE for own in side] for side in zip(*rows, strict=True))
+    return Figure(
+        name="zones",
+        title=say("figure_zones"),
+        x_label="zone [µm]",
+        series=(
+            Series(label="before", kind="bars", x=names, y=before),
+            Series(label="after", kind="bars", x=names, y=after),
+        ),
+    )
+
+
+def write_drawing(result: AllocationResult, header: Header, folder: Path) -> None:
+    """Write ``allocation.csv``, which is read back, ``drawing.xlsx``, which goes on calculating, and ``frames.dxf``."""
+    cost_unit, notes = header.cost_unit, (*drawn_amounts(result), *amounts_convention(result))
+    write_csv(table_frame(result.drawn_sources, folder, cost_unit), folder / "allocation.csv")
+    with (folder / "allocation.csv").open("a", encoding="utf-8") as file:
+        file.write("".join(f"{line}\n" for line in _table_comments(result, header.digest, notes)))
+    calculator = calculator_sheets(result, cost_unit)
+    others = {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}
+    write_sheets({**calculator, **others}, folder / "drawing.xlsx")
+    style_calculator(result, calculator, notes, folder / "drawing.xlsx")
+    named = [(name, frame) for name, members in result.dimensions.items() for frame in frames(members)]
+    write_frames(named, folder / "frames.dxf", notes)
+
+
+def _table_comments(result: AllocationResult, digest: str, notes: Sequence[str]) -> list[str]:
+    """Return what a table says below its rows: of which study it is, what it costs, and the settings that belong to it.
+
+    Without commas and semicolons, so that no program that reads the rows parts them into cells.
+    """
+    paid = sum(result.process_changes.values())
+    once = say("table_once", paid=paid) if paid else ""
+    said = [say("table_study", name=result.name, digest=digest[:12], cost=result.cost, once=once), *notes]
+    values = zip(result.space.shared.names, result.chosen.settings.tolist(), strict=True)
+    lines = [f"# {sentence}".replace(",", " and").replace(";", " -") for sentence in said]
+    return [*lines, *(setting_line(name, value) for name, value in values)]
+
+
+def _settings_sheet(result: AllocationResult) -> dict[str, pd.DataFrame]:
+    """Return a sheet of the settings that belong to the drawing and of what is made for them; none without any."""
+    if not result.space.settings:
+        return {}
+    import pandas as pd
+
+    drawn, names = result.model.drawn_amounts, result.space.shared.names
+    value, before = (
+        {
+            **dict(zip(names, design.settings, strict=True)),
+            **dict(zip(drawn.names, drawn.by_setting @ design.settings, strict=True)),
+        }
+        for design in (result.chosen, result.free.baseline)
+    )
+    rows: list[dict[str, object]] = [
+        {
+            "what": name.split(" [")[0],
+            "value [unit]": float(value[name]),
+            "before [unit]": float(before[name]),
+            "unit": unit_of(name),
+        }
+        for name in dict.fromkeys([*drawn.names, *names])
+    ]
+    rows += [{"what": sentence} for sentence in amounts_convention(result)]
+    return {result.model.settings_word: pd.DataFrame(rows)}

@@ -1,0 +1,136 @@
+"""The figures of an allocation beside those of its drawing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.result import AllocationResult
+from tolalloc.allocation.trade import SettingTrade
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.tellers.allocation_sentences import say
+from tolalloc.reports.wording import quantity, short, with_unit
+
+
+def units_figure(result: AllocationResult) -> Figure:
+    """Return the leading output of random units before and after, with the yield after."""
+    limits, leading = result.requirements[0].limits, result.leading
+    before, after = result.free.baseline.sample.values, result.chosen.sample.values
+    return Figure(
+        name=short(leading).replace("-", "_").replace(" ", "_"),
+        title=say("figure_units", share=result.chosen.achieved.estimate),
+        x_label=leading,
+        y_label="share of the units [%]",
+        series=(
+            Series(label="tolerance table as it is", kind="histogram", x=list(before)),
+            Series(label="as drawn", kind="histogram", x=list(after)),
+        ),
+        vertical=tuple(
+            (limit, f"limit {with_unit(f'{limit:g}', leading)}")
+            for limit in (limits.upper, limits.lower)
+            if limit is not None
+        ),
+    )
+
+
+def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Figure:
+    """Return cost against what is kept of the leading output."""
+    limit, leading, guarantee = result.free.limit, result.leading, result.requirements[0].guarantee
+    error = with_unit(f"{result.chosen.sides[0].standard_error:.2g}", leading)
+    by = f" by {guarantee.target:.2%} of units" if isinstance(guarantee, AtYield) else ""
+    searched, exact = fronts.searched, fronts.exact
+    checked, knee = ~np.isnan(searched.on_kernel), searched.knee
+    others = say("figure_front_others") if len(result.requirements) > 1 else ""
+    designs = tuple(
+        Series(label=label, kind="points", x=[design.quantile_bound], y=[design.cost])
+        for label, design in result.designs.items()
+    )
+    return Figure(
+        name="front",
+        title=say("figure_front", limit=with_unit(f"{limit:g}", leading), others=others),
+        x_label=f"{short(leading)} kept{by} [{unit_of(leading)}]",
+        y_label=f"cost [{cost_unit}]",
+        series=(
+            Series(
+                label=f"cheapest by the local models (±{error})", kind="line", x=list(exact.limits), y=list(exact.cost)
+            ),
+            Series(
+                label="NSGA-II, as its stand-in tells", kind="line", x=list(searched.quantile), y=list(searched.cost)
+            ),
+            Series(
+                label="NSGA-II, solved on the kernel",
+                kind="points",
+                x=list(searched.on_kernel[checked]),
+                y=list(searched.cost[checked]),
+            ),
+            *designs,
+            Series(label="knee of NSGA-II", kind="points", x=[searched.quantile[knee]], y=[searched.cost[knee]]),
+        ),
+        vertical=((limit, ""),),  # a label would stand among the legend's
+    )
+
+
+def trade_figures(result: AllocationResult, trade: SettingTrade, cost_unit: str) -> tuple[Figure | HeatMap, ...]:
+    """Return what the settings are worth, nothing where no choice has a cost."""
+    if not np.isfinite(trade.cost).any():
+        return ()
+    curves = _trade_figure(result, trade, cost_unit)
+    return (curves, _trade_map(trade, cost_unit)) if len(trade.names) == 2 else (curves,)
+
+
+def _trade_map(trade: SettingTrade, cost_unit: str) -> HeatMap:
+    """Return the cost of the cheapest zones over both settings."""
+    first, second = trade.values
+    return HeatMap(
+        name="modification_cost",
+        title=say("figure_trade_map"),
+        columns=[f"{value:.3g}" for value in second],
+        rows=[f"{quantity(trade.names[0])} {value:.3g} {unit_of(trade.names[0])}" for value in first],
+        x_label=trade.names[1],
+        label=f"cost [{cost_unit}]",
+        values=[[float(value) for value in row] for row in trade.cost],
+    )
+
+
+def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str) -> Figure:
+    """Return the cost of the cheapest zones over the last setting, a line for each value of the others."""
+    along, lines = trade.values[-1], []
+    for at in np.ndindex(trade.cost.shape[:-1]):
+        chosen = [
+            f"{quantity(name)} {values[place]:.3g} {unit_of(name)}"
+            for name, values, place in zip(trade.names, trade.values, at, strict=False)
+        ]
+        if np.isfinite(trade.cost[at]).any():
+            lines.append(_where_known(", ".join(chosen) or "cheapest zones", along, trade.cost[at]))
+    now = result.space.settings[-1].value
+    return Figure(
+        name="modification_trade",
+        title=say("figure_trade"),
+        x_label=trade.names[-1],
+        y_label=f"cost of the cheapest zones [{cost_unit}]",
+        series=tuple(lines),
+        vertical=((now, "as it is"), (float(result.chosen.settings[-1]), "chosen")),
+    )
+
+
+def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray, " step"]) -> Series:
+    """Return a line through what is known, a point where that is one value."""
+    known = np.isfinite(y)
+    return Series(label=label, kind="line" if known.sum() > 1 else "points", x=list(x[known]), y=list(y[known]))
+
+
+def robustness_figure(frame: pd.DataFrame) -> Figure:
+    """Return how far every free zone moves when an assumption is wrong, from the table that says so."""
+    bars = Series(
+        label="free zone; between its smallest and largest under all changed assumptions",
+        kind="bars",
+        x=list(frame["group"]),
+        y=list(frame["free zone [µm]"]),
+        low=list(np.minimum(frame["smallest under all changes [µm]"], frame["free zone [µm]"])),
+        high=list(np.maximum(frame["largest under all changes [µm]"], frame["free zone [µm]"])),
+    )
+    return Figure(name="robustness", title=say("figure_robustness"), x_label="zone [µm]", series=(bars,))

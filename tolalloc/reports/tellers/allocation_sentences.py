@@ -1,0 +1,305 @@
+"""An allocation in sentences, each no stronger than what was computed; their texts are in ``allocation.toml``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.result import AllocationResult, limit_price, unit_quantile
+from tolalloc.allocation.robustness import COST_CHANGE, SAME
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.reading.units import unit_of
+from tolalloc.reports.feature_frame import callout_assumptions
+from tolalloc.reports.header import Header
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import QUICK_RUN, quantity, short, with_unit
+from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
+
+_NOTHING = 1e-3
+"""Price of a whole limit, over the cost, below which it costs nothing [-]."""
+_WRITTEN = 0.005
+"""Difference of two amounts below which they are written alike, in their units."""
+_EVEN_ODDS = 0.5
+_SAME_COST = 5e-4
+"""Relative difference of costs below which they are printed alike [-]."""
+
+say = Sentences("allocation")
+
+
+def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return the answer in sentences; the first ones stand in the headline of a report."""
+    chosen, achieved = result.chosen, result.chosen.achieved
+    found = [result.examination.fault] if result.examination.fault else []
+    found.append(
+        say(
+            "met",
+            verdict=say("verdict_met" if result.met else "verdict_missed"),
+            share=achieved.estimate,
+            units=achieved.units,
+            limits=_limits(result),
+            low=achieved.low,
+            high=achieved.high,
+        )
+    )
+    found += [*drawn_amounts(result), _cost(result, cost_unit)]
+    if len(result.requirements) > 1:
+        found.append(say("all_limits", share=chosen.joint.estimate))
+    if result.met and result.error < _EVEN_ODDS:
+        found.append(say("error", error=result.error))
+    return (
+        *found,
+        *_solved(chosen),
+        _compared(result),
+        *_certificate(result),
+        *_modification(result, cost_unit),
+        *_prices(result, cost_unit),
+        *_good_unit(result, cost_unit),
+        *_settled(result),
+        *result.model.at(chosen.settings).remarks,
+    )
+
+
+def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
+    """Return what must be made with the zones: the amounts of the settings, and what they were."""
+    drawn = result.model.drawn_amounts
+    if not result.space.settings:
+        return ()
+    before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
+    amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
+    amounts = " and ".join(
+        say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
+        for name, was, new in zip(drawn.names, before, chosen, strict=True)
+    )
+    word = result.model.settings_word
+    return (say("amounts_many" if word.endswith("s") else "amounts_one", word=word, amounts=amounts),)
+
+
+def amounts_convention(result: AllocationResult) -> tuple[str, ...]:
+    """Return what the signs of these amounts mean, if that must be said."""
+    convention = result.model.drawn_amounts.convention
+    return (say("convention", convention=convention),) if convention and result.space.settings else ()
+
+
+def _signed(amount: float) -> str:
+    """Return an amount with a true minus sign."""
+    return f"{amount:.2f}".replace("-", "−")
+
+
+def _limits(result: AllocationResult) -> str:
+    """Return the limits of the leading output."""
+    limits, leading = result.requirements[0].limits, result.leading
+    if limits.upper is None:
+        return say("limit_lower", lower=with_unit(f"{limits.lower:g}", leading))
+    upper = with_unit(f"{limits.upper:g}", leading)
+    return upper if limits.lower is None else say("limit_both", lower=limits.lower, upper=upper)
+
+
+def _against(cost: float, other: float) -> str:
+    """Return how a cost stands against another one, in words."""
+    change = cost / other - 1
+    if abs(change) < _SAME_COST:
+        return say("against_same")
+    return say("against_below" if change < 0 else "against_above", change=abs(change))
+
+
+def _cost(result: AllocationResult, cost_unit: str) -> str:
+    """Return what the drawing costs, and what proportional scaling does."""
+    chosen, alike = result.chosen, result.free.proportional
+    used = "" if alike.met else say("cost_missed")
+    if alike.met and result.requirements[0].limits.lower is None:
+        unit = unit_of(result.leading).replace("arcsec", "arcsecond")
+        least = chosen.cost / (1 - result.least_saving)
+        used = say("cost_used", against=_against(chosen.cost, least), unit=unit, least=least)
+    settings = f" {say('cost_settings', word=result.model.settings_word)}" if result.space.settings else ""
+    against = _against(chosen.cost, alike.cost)
+    gaps = {"against": against, "settings": settings, "alike": alike.cost, "used": used}
+    return say("cost", cost=chosen.cost, cost_unit=cost_unit, **gaps)
+
+
+def _solved(design: VerifiedDesign) -> tuple[str, ...]:
+    """Return which of the verifying units were solved, where that were not all of them."""
+    units = design.confirming.units if design.confirming else None
+    if units is None or units.near.all():
+        return ()
+    return (say("solved", units=units.near.size, whatever=units.drawn.whatever),)
+
+
+def missed(design: VerifiedDesign) -> str:
+    """Return which limit blocks a design that is not met, and by how much."""
+    check, side = design.blocking, design.blocking.tightest
+    return say(
+        "missed" if np.isfinite(side.value) else "missed_unanswered",
+        output=quantity(check.requirement.output),
+        limit=side.limit,
+        unit=unit_of(check.requirement.output),
+        shown=check.requirement.guarantee.words,
+        value=side.value,
+        excess=side.excess,
+    )
+
+
+def _compared(result: AllocationResult) -> str:
+    """Return what every verified drawing costs, and which one is drawn."""
+    costs = (
+        say("design" if own.met else "design_missed", name=name, cost=own.cost) for name, own in result.designs.items()
+    )
+    listed = say("found", designs="; ".join(costs))
+    return say("kept", found=listed) if result.met and result.keeps_table else listed
+
+
+def _certificate(result: AllocationResult) -> tuple[str, ...]:
+    """Return how far from optimal the answer can be."""
+    if result.met and result.bound is None:
+        return (say("no_bound"),)
+    return (*_free(result), *_graded(result))
+
+
+def _free(result: AllocationResult) -> tuple[str, ...]:
+    """Return how far free zones can be from optimal; nothing where they miss a limit."""
+    found = result.candidates.unrestricted
+    if not found.chosen.met:
+        return ()
+    bound, cost, graded = found.lower_bound, found.chosen.cost, result.graded
+    gaps = {"bound": bound.cost, "cost": cost, "below": max(1 - bound.cost / cost, 0.0), "confidence": bound.confidence}
+    if bound.certified:
+        return (say("bound_certified", zones="free zones" if graded else "zones", **gaps),)
+    return (say("bound_local", around="free zones" if graded else "drawing", **gaps),)
+
+
+def _graded(result: AllocationResult) -> tuple[str, ...]:
+    """Return how far grades can be from optimal, if they were asked for."""
+    graded, free = result.graded, result.candidates.unrestricted.chosen
+    if not graded:
+        return ()
+    compared = say("graded_compared", against=_against(graded.chosen.cost, free.cost)) if free.met else ""
+    said = say("graded", cost=graded.chosen.cost, compared=compared)
+    if not graded.chosen.met:
+        return (say("graded_missed", graded=said),)
+    return (say("graded_bound", graded=said, bound=graded.bound),)
+
+
+def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return what the settings buy."""
+    joint, word = result.free.chosen, result.model.settings_word
+    if result.fixed is None:
+        return () if joint.met else (say("none_verified", missed=missed(joint)),)
+    alone = result.fixed.chosen
+    if not joint.met:
+        said = say("none_free", free=result.free_label, missed=missed(joint))
+        return (said,) if alone.met else (said, say("none_alone", missed=missed(alone)))
+    if not alone.met:
+        return (say("alone_missed", missed=missed(alone), word=word),)
+    saving = 1 - joint.cost / alone.cost
+    if saving < _SAME_COST:
+        return (say("nothing_cheaper", word=word, cost=alone.cost),)
+    doubt = say("saves_doubt") if max(result.fixed.gap, result.free.gap) > saving else ""
+    gaps = {"saved": alone.cost - joint.cost, "share": saving, "alone": alone.cost, "doubt": doubt}
+    return (say("saves", word=word, cost_unit=cost_unit, **gaps),)
+
+
+def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return what the limits cost, to first order."""
+    free, said = result.free, []
+    for side in free.chosen.sides if free.chosen.met else ():
+        price = free.prices[side.stack.name]
+        if price * abs(side.limit) > _NOTHING * free.chosen.cost:
+            cost, per = limit_price(side, price)
+            gaps = {"output": quantity(side.stack.name), "limit": side.limit, "unit": unit_of(side.stack.name)}
+            said.append(say("price", price=cost, cost_unit=cost_unit, per=per, **gaps))
+    return tuple(said)
+
+
+def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return the yield with the cheapest good unit, if the study states what becomes of the others."""
+    found = result.prices
+    if found is None:
+        return ()
+    if not found.priced.size:
+        return (say("good_none"),)
+    ends = {float(found.priced.max()): "good_above", float(found.priced.min()): "good_below"}
+    key = "good_only" if found.priced.size == 1 else ends.get(found.best, "good_inside")
+    said, price = say(key, target=found.best * 100), np.nanmin(found.prices)
+    return (say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
+
+
+def _settled(result: AllocationResult) -> tuple[str, ...]:
+    """Return which zones do not depend on what was assumed."""
+    found = result.robustness
+    if found is None:
+        return ()
+    same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
+    names = f": {', '.join(same)}" if same else ""
+    key = "same_one" if len(same) == 1 else "same_many"
+    said = [say(key, same=len(same), count=len(found.groups), most=SAME, names=names)]
+    if found.costs:
+        dearest = max(0.0, *(variant.regret for variant in found.costs))
+        key = "corner" if len(found.costs) == 1 else "corners"
+        said.append(say(key, count=len(found.costs), change=COST_CHANGE * 100, dearest=dearest))
+    return tuple(said)
+
+
+def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
+    """Return what a reader must know before acting on the answer."""
+    chosen, found = result.chosen, []
+    if header.quick:
+        found.append(QUICK_RUN)
+    if result.error >= _EVEN_ODDS:
+        found.append(say("even_odds"))
+    if not result.met:
+        found.append(say("not_verified", missed=missed(chosen)))
+    if not result.free.proportional.met:
+        found.append(say("alike_missed"))
+    uncertain = result.robustness.uncertain if result.robustness else ()
+    lost = sum(not variant.kept for variant in uncertain)
+    if lost and result.free.chosen.met:
+        what = result.model.uncertain[0].name.split(" (")[0]
+        found.append(say("uncertain", lost=lost, count=len(uncertain), what=what))
+    found += [f"{own.sentence}." for own in result.space.settings if own.strays]
+    found += result.model.cautions(chosen.settings)
+    if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
+        found.append(say("surrogate"))
+    if result.fronts and (lost := result.fronts.searched.failed):
+        found.append(say("front_failed_one" if lost == 1 else "front_failed_many", count=lost))
+    if failed := header.failed:
+        found.append(say("failed_one" if failed == 1 else "failed_many", count=failed))
+    return tuple(found)
+
+
+def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
+    """Return what no source states."""
+    space = result.space
+    keys = (
+        "assumed_zones",
+        "assumed_processes" if space.processes else "assumed_costs",
+        *(("assumed_settings",) if space.settings else ()),
+        "assumed_correlated" if space.errors.is_correlated else "assumed_independent",
+    )
+    drawn = tuple(source for source in space.errors.sources if source.zone > 0.0)
+    return (*header.assumptions, *map(say, keys), *callout_assumptions(drawn))
+
+
+def quantiles(result: AllocationResult) -> tuple[str, ...]:
+    """Return how much safer than asked the drawing is, since its units are few."""
+    chosen, said = result.chosen, []
+    for check in chosen.checks:
+        kept, side, asked = unit_quantile(chosen, check), check.sides[0], check.requirement
+        if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
+            gaps = {"kept": kept, "value": side.value, "target": asked.guarantee.target, "units": chosen.joint.units}
+            names = {"output": quantity(asked.output), "unit": unit_of(asked.output)}
+            key = "quantile_upper" if side.sign > 0 else "quantile_lower"
+            said.append(say(key, confidence=chosen.confidence, **gaps, **names))
+    return tuple(said)
+
+
+def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return where the zones are cheapest among the settings that were tried."""
+    trade = result.trade
+    if trade is None or not np.isfinite(trade.cheapest).all():
+        return (say("trade_none"),)
+    error = ""
+    if np.isfinite(trade.error):
+        error = say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
+    settings = " and ".join(
+        f"{value:.3g} {unit_of(name)} {quantity(name)}" for name, value in zip(trade.names, trade.cheapest, strict=True)
+    )
+    return (say("trade", settings=settings, cost=np.nanmin(trade.cost), cost_unit=cost_unit, error=error),)

@@ -1,0 +1,255 @@
+"""The tables of an allocation beside its drawing: limits, designs, how far from optimal, what would be otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from tolalloc.allocation.candidates import GRADES
+from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.fronts import Fronts
+from tolalloc.allocation.local_model import Side
+from tolalloc.allocation.pareto import Front
+from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
+from tolalloc.allocation.robustness import Robustness
+from tolalloc.allocation.trade import SettingTrade
+from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.header import Header
+from tolalloc.reports.wording import quantity, short
+
+_Limited = tuple[int, Side, Check]
+"""The place of a limited side among all of them, the side, and the requirement that limits it."""
+_Named = tuple[str, VerifiedDesign]
+"""What a design is called, and the design."""
+
+
+def requirements_table(result: AllocationResult) -> Table[_Limited]:
+    """Return every limited side with what each design was shown to keep, and what the limit costs."""
+
+    def price(row: _Limited) -> tuple[float, str]:
+        side, own = row[1], result.free.prices[row[1].stack.name]
+        return limit_price(side, own if own * side.scale > solver_noise(result.free.optimum) else 0.0)
+
+    def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
+        header = f"kept: {label} [unit of the output]"
+        return Column(header=header, value=lambda row: design.sides[row[0]].value)
+
+    columns: list[Column[_Limited]] = [
+        Column(header="requirement", value=lambda row: row[2].requirement.output),
+        Column(header="limit", value=_limit),
+        Column(header="shown for", value=lambda row: row[2].requirement.guarantee.words),
+        Column(
+            header="quantile of the units [unit of the output]",
+            value=lambda row: unit_quantile(result.chosen, row[2]),
+        ),
+        *(kept(label, design) for label, design in result.designs.items()),
+        Column(header="slack [unit of the output]", value=lambda row: -row[1].excess),
+        Column(header="standard error of it [unit of the output]", value=lambda row: row[1].standard_error),
+        Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
+        Column(header="for each", value=lambda row: price(row)[1]),
+        Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),
+    ]
+    checks = result.chosen.checks
+    rows = [
+        (number, side, next(check for check in checks if side in check.sides))
+        for number, side in enumerate(result.chosen.sides)
+    ]
+    return Table(name="requirements", columns=columns, rows=rows)
+
+
+def _limit(row: _Limited) -> str:
+    """Return a limit in words."""
+    _, side, check = row
+    return f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit_of(check.requirement.output)}"
+
+
+def designs_table(result: AllocationResult) -> Table[_Named]:
+    """Return cost, yield and settings of the compared designs."""
+    drawn, loss = result.model.drawn_amounts, result.loss
+
+    def lost(row: _Named) -> float:
+        values = row[1].sample.values
+        return loss.smaller_is_better(float(values.mean()), float(values.std(ddof=1))) if loss else float("nan")
+
+    def setting(at: int, name: str) -> Column[_Named]:
+        return Column(header=name, value=lambda row: row[1].settings.tolist()[at])
+
+    def amount(at: int, name: str) -> Column[_Named]:
+        return Column(header=name, value=lambda row: (drawn.by_setting @ row[1].settings).tolist()[at])
+
+    columns: list[Column[_Named]] = [
+        Column(header="design", value=lambda row: row[0]),
+        Column(header="cost [{cost}]", value=lambda row: row[1].cost),
+        Column(header=f"yield, {short(result.leading)} [%]", value=lambda row: row[1].achieved.estimate * 100),
+        Column(header="low 95 % [%]", value=lambda row: row[1].achieved.low * 100),
+        Column(header="high 95 % [%]", value=lambda row: row[1].achieved.high * 100),
+        Column(header="yield, all limits [%]", value=lambda row: row[1].joint.estimate * 100),
+        *(setting(at, name) for at, name in enumerate(result.space.shared.names)),
+        *(amount(at, name) for at, name in enumerate(drawn.names)),
+        *((Column(header="mean quality loss [{cost}]", value=lost),) if loss else ()),
+        Column(header="units [-]", value=lambda row: row[1].achieved.units),
+        Column(header="OK", value=lambda row: "yes" if row[1].met else "no"),
+    ]
+    return Table(name="designs", columns=columns, rows=list(result.designs.items()))
+
+
+def verified_table(result: AllocationResult) -> Table[_Named]:
+    """Return all designs that were judged on units of their own, in order, each with the search that found it."""
+    tried = {label: search.tried for label, search in result.searches.items()}
+    if result.graded:
+        tried[GRADES] = result.graded.tried
+    kept = f"{short(result.leading)} kept [{unit_of(result.leading)}]"
+    columns: list[Column[_Named]] = [
+        Column(header="search", value=lambda row: row[0]),
+        Column(header="design", value=lambda row: row[1].name),
+        Column(header="cost [{cost}]", value=lambda row: row[1].cost),
+        Column(header=kept, value=lambda row: row[1].quantile_bound),
+        Column(header="yield [%]", value=lambda row: row[1].achieved.estimate * 100),
+        Column(header="nearest limit", value=lambda row: row[1].blocking.requirement.output),
+        Column(header="met", value=lambda row: "yes" if row[1].met else "no"),
+    ]
+    rows = [(search, design) for search, designs in tried.items() for design in designs]
+    return Table(name="verified designs", columns=columns, rows=rows)
+
+
+def work_frame(header: Header) -> pd.DataFrame:
+    """Return what each stage took."""
+    stages = header.stages.items()
+    return pd.DataFrame([{"stage": name, "units [-]": own["units"], "seconds [s]": own["seconds"]} for name, own in stages])
+
+
+def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
+    """Return cost, lower bound and the cheapest design of the local model of every search."""
+    at_limits = f"cheapest by the local model, at the limits [{cost_unit}]"
+    rows: list[dict[str, object]] = [
+        {
+            "search": label,
+            f"verified cost [{cost_unit}]": found.chosen.cost,
+            f"lower bound, 95 % [{cost_unit}]": found.bound,
+            "verified cost above the lower bound [%]": found.gap * 100,
+            "lower bound holds for": "every drawing" if found.lower_bound.certified else "drawings near by",
+            at_limits: found.optimum.cost + found.locked_cost,
+            f"cheapest by the local model, inside [{cost_unit}]": found.inside.cost + found.locked_cost,
+            "gap of the convex program [-]": found.optimum.gap,
+            "designs verified [-]": len(found.tried),
+        }
+        for label, found in result.searches.items()
+    ]
+    if graded := result.graded:
+        rows.append(
+            {
+                "search": GRADES,
+                f"verified cost [{cost_unit}]": graded.chosen.cost,
+                f"lower bound, 95 % [{cost_unit}]": graded.bound,
+                "verified cost above the lower bound [%]": (graded.chosen.cost / graded.bound - 1) * 100,
+                "lower bound holds for": "choices near by",
+                at_limits: graded.solution.cost + graded.space.locked_cost,
+                "gap of the convex program [-]": graded.solution.gap,
+                "designs verified [-]": len(graded.tried),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
+    """Return what the smallest and the largest zones, of process and tolerance table together, cost free zones."""
+    space, found = result.space, result.free
+    zones, scales = space.first_zones / MICROMETRE, found.optimum.zones
+    made = [feature.processes[at] for feature, at in zip(space.features, found.optimum.processes, strict=True)]
+    saved = found.optimum.bound_prices * scales[:, np.newaxis]  # had the bound moved by its own size
+    noise = solver_noise(found.optimum)
+    prices = np.where(saved > noise, found.optimum.bound_prices, 0.0) / zones[:, np.newaxis]
+    return pd.DataFrame(
+        {
+            "group": space.groups,
+            "process": [process.name for process in made],
+            "smallest of process and table [µm]": [process.minimum for process in made] * zones,
+            "cheapest zone of the models [µm]": scales * zones,
+            "largest of process and table [µm]": [process.maximum for process in made] * zones,
+            f"marginal price of the smallest [{cost_unit}/µm]": prices[:, 0],
+            f"marginal price of the largest [{cost_unit}/µm]": prices[:, 1],
+        }
+    )
+
+
+def front_frames(result: AllocationResult, fronts: Fronts, cost_unit: str) -> tuple[tuple[str, pd.DataFrame], ...]:
+    """Return the exact front with its bound, and the searched ones with what the real model says of them."""
+    unit, cost = unit_of(result.leading), f"cost [{cost_unit}]"
+    kept = f"{short(result.leading)} kept, told [{unit}]"
+    groups, searched, names = len(result.drawn.groups), fronts.searched, result.drawn.shared.names
+    exact = pd.DataFrame(
+        {
+            f"{short(result.leading)} limit [{unit}]": fronts.exact.limits,
+            cost: fronts.exact.cost,
+            f"proven for the local model [{cost_unit}]": fronts.exact.bound,
+        }
+    )
+    found = pd.DataFrame({kept: searched.quantile, f"on the kernel [{unit}]": searched.on_kernel, cost: searched.cost})
+    for at, name in enumerate(names):
+        found[name] = searched.designs[:, groups + at]
+    found["knee"] = _knees(searched)
+    tables = (("front", exact), ("searched front", found))
+    front = fronts.with_setting
+    if front is None:
+        return tables
+    third = {cost: front.cost, kept: front.quantile, f"on the kernel [{unit}]": front.on_kernel}
+    third |= {names[-1]: front.further[:, 0], "knee": _knees(front)}
+    return (*tables, ("front with clearance", pd.DataFrame(third)))
+
+
+def _knees(front: Front) -> list[str]:
+    """Return where the knee of a front stands."""
+    return ["yes" if at == front.knee else "" for at in range(front.cost.size)]
+
+
+def trade_frame(trade: SettingTrade, cost_unit: str) -> pd.DataFrame:
+    """Return cost and price of one more unit of each setting, for every choice of settings."""
+    values = np.meshgrid(*trade.values, indexing="ij")
+    frame = pd.DataFrame({name: own.ravel() for name, own in zip(trade.names, values, strict=True)})
+    frame[f"cost [{cost_unit}]"] = trade.cost.ravel()
+    for at, name in enumerate(trade.names):
+        header = f"1 {unit_of(name)} more {quantity(name)} costs at the rate of [{cost_unit}/{unit_of(name)}]"
+        frame[header] = trade.price(at).ravel()
+    return frame
+
+
+def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFrame:
+    """Return how far every free zone moves when an assumption is wrong."""
+    ratios, best = found.ratios, found.optimum * (result.space.first_zones / MICROMETRE)
+    return pd.DataFrame(
+        {
+            "group": found.groups,
+            "free zone [µm]": best,
+            "smallest under all changes [µm]": best * ratios.min(axis=0),
+            "largest under all changes [µm]": best * ratios.max(axis=0),
+            "same in all": ["yes" if same else "no" for same in found.same],
+        }
+    )
+
+
+def variants_frame(found: Robustness, cost_unit: str) -> pd.DataFrame:
+    """Return the answers under changed assumptions."""
+    rows = [
+        {
+            "assumption": variant.name,
+            f"cheapest then [{cost_unit}]": variant.cost,
+            "free zones cost more by [%]": variant.regret * 100,
+            "free zones keep all": "yes" if variant.kept else "no",
+        }
+        for variant in found.variants
+    ]
+    return pd.DataFrame(rows)
+
+
+def prices_frame(found: YieldLadder, cost_unit: str) -> pd.DataFrame:
+    """Return the price of a good unit over yield targets."""
+    return pd.DataFrame(
+        {
+            "yield target [%]": found.targets * 100,
+            f"cheapest unit made to it [{cost_unit}]": found.manufacturing,
+            f"price of a good unit [{cost_unit}]": found.prices,
+        }
+    )

@@ -1,0 +1,320 @@
+"""The drawing as sheets that go on calculating: change a zone and see cost and what each limit then keeps.
+
+The cells hold formulas, so the workbook needs no tolalloc. It says what the local models around the drawing say, no
+more: small changes of zones are judged well, large ones by ``tolalloc`` on units of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from math import floor
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+from openpyxl import load_workbook
+from openpyxl.styles import Border, Font, PatternFill, Side
+from openpyxl.utils import get_column_letter
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.worksheet import Worksheet
+
+from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
+from tolalloc.allocation.cost.model import SumOfCosts, Weighted
+from tolalloc.allocation.cost.sampled import Spline, Tabulated
+from tolalloc.allocation.local_model import Side as LimitedSide
+from tolalloc.allocation.result import AllocationResult
+from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reports.excel import Formula, keep_values
+from tolalloc.reports.feature_frame import FeatureFrame, callout
+from tolalloc.reports.tellers.allocation_sentences import say
+
+_FIRST = 2
+"""Row of the first entry below the header."""
+_WEIGHTS = 13
+"""Column of the first weight; those before it are printed."""
+_INPUT = PatternFill("solid", fgColor="FFF2CC")
+_RESULT = PatternFill("solid", fgColor="E2EFDA")
+_EDGE = Side(style="thin", color="7F7F7F")
+
+
+def calculator_sheets(result: AllocationResult, cost_unit: str) -> dict[str, pd.DataFrame]:
+    """Return the sheets ``drawing`` (to change and to print) and ``requirements`` (how the limits follow)."""
+    return {"drawing": _drawing(result, cost_unit), "requirements": _requirements(result, cost_unit)}
+
+
+def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
+    """Return one row per group, with what to write, what it costs and what it adds to every limited side."""
+    space, chosen = result.drawn, result.chosen
+    groups, callouts = len(space.groups), [callout(result.dimensions[name][0]) for name in space.groups]
+    scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / MICROMETRE
+    rows = range(_FIRST, _FIRST + groups)
+    made = [
+        feature.processes[at]
+        for feature, at in zip(space.features, space.process_positions(chosen.design), strict=True)
+    ]
+    table = pd.DataFrame(
+        {
+            "group": space.groups,
+            "zone to change [µm]": zones,
+            "zone in the tolerance table [µm]": space.first_zones / MICROMETRE,
+            "scale [-]": [Formula(f"=B{row}/C{row}", scale) for row, scale in zip(rows, scales.tolist(), strict=True)],
+            "smallest [µm]": space.first_zones * [process.minimum for process in made] / MICROMETRE,
+            "largest [µm]": space.first_zones * [process.maximum for process in made] / MICROMETRE,
+            "inside": [
+                Formula(f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")', "yes") for row in rows
+            ],
+            "process": chosen.processes,
+            f"cost [{cost_unit}]": [
+                Formula(
+                    f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}",
+                    float(process.total(np.array(scale))),
+                )
+                for process, row, scale in zip(made, rows, scales, strict=True)
+            ],
+            "characteristic": [f"{own.symbol} {own.characteristic}".strip() for own in callouts],
+            "write [mm]": [
+                Formula(f"=INT(B{row}*{_steps(own)}+0.001)/10000", floor(zone * _steps(own) + 0.001) / 10000)
+                for row, own, zone in zip(rows, callouts, zones.tolist(), strict=True)
+            ],
+            "datum": [" ".join(own.datums) for own in callouts],
+        }
+    )
+    for side in chosen.sides:
+        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + _relief(
+            side
+        )
+        table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
+    return table
+
+
+def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
+    """Return by how much a larger zone relieves a limit, 0 or below, which no model of a search rewards.
+
+    Per scale and to first order [unit of the output]; a smaller zone then costs as much.
+    """
+    groups = side.stack.worst_case.size
+    if side.batches is None:
+        return np.zeros(groups)
+    return np.asarray(np.minimum(side.batches[:, :groups].mean(axis=0), 0.0))
+
+
+def _without_weight(result: AllocationResult) -> tuple[str, ...]:
+    """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
+    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.sides], axis=0)
+    names = [group for group, weight in zip(result.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
+    return (say("workbook_weightless", groups=", ".join(names)),) if names else ()
+
+
+def _steps(frame: FeatureFrame) -> int:
+    """Return how many steps of a tenth of a micrometre a micrometre of the zone is written as; ± has half of them."""
+    return 5 if frame.characteristic == "size" else 10
+
+
+def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
+    """Return one row per limited side with what the zones of the other sheet would keep, and the total cost."""
+    space, chosen = result.drawn, result.chosen
+    first, last = _FIRST, _FIRST + len(space.groups) - 1
+    scales, watched = f"drawing!$D${first}:$D${last}", []
+    for at, side in enumerate(chosen.sides):
+        adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
+        load = (
+            f"SUMPRODUCT(drawing!${adds}${first}:${adds}${last},{scales})"
+            f"+SQRT(SUMPRODUCT((drawing!${spreads}${first}:${spreads}${last}*{scales})^2))"
+        )
+        rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.budget
+        rest -= float(_relief(side) @ chosen.scales)
+        upper, row = side.sign > 0, _FIRST + at
+        predicted = float(side.limit + side.sign * side.predicted(chosen.design))
+        kept = "yes" if side.sign * predicted <= side.sign * side.limit else "no"
+        watched.append(
+            {
+                "what": side.stack.name,
+                "limit": side.limit,
+                "verified on fresh units": side.value,
+                "predicted for the zones": Formula(
+                    f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))", predicted
+                ),
+                "kept by the model": Formula(f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")', kept),
+            }
+        )
+    total = Formula(f"=SUM(drawing!I{first}:I{last})+{number(space.locked_cost)}", chosen.cost)
+    return pd.DataFrame([*watched, {"what": f"cost [{cost_unit}]", "predicted for the zones": total}])
+
+
+def style_calculator(
+    result: AllocationResult, sheets: Mapping[str, pd.DataFrame], notes: Sequence[str], path: Path
+) -> None:
+    """Make the written sheets a drawing: cells to change marked and guarded, cost and limits below, notes.
+
+    Parameters
+    ----------
+    result
+        What the sheets were made of.
+    sheets
+        What `calculator_sheets` made of it.
+    notes
+        What must be said with the zones.
+    path
+        Workbook with these sheets, and others behind them.
+    """
+    workbook = load_workbook(path)
+    drawing, requirements = workbook["drawing"], workbook["requirements"]
+    _mark(result, drawing)
+    for row in range(_FIRST, requirements.max_row + 1):
+        requirements.cell(row, 4).number_format, requirements.cell(row, 4).fill = "0.000", _RESULT
+    values = {
+        name: {
+            f"{get_column_letter(column)}{row}": cell.value
+            for column, header in enumerate(frame.columns, start=1)
+            for row, cell in enumerate(frame[header], start=_FIRST)
+            if isinstance(cell, Formula) and cell.value is not None
+        }
+        for name, frame in sheets.items()
+    }
+    below = (*notes, *_without_weight(result), say("workbook_change"), say("workbook_models"))
+    values["drawing"] |= _below(drawing, sheets["requirements"], len(result.drawn.groups), below)
+    drawing.freeze_panes = "C2"
+    drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
+    for sheet in (drawing, requirements):
+        for column in range(2, sheet.max_column + 1):
+            sheet.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
+    workbook.calculation.fullCalcOnLoad = True
+    workbook.save(path)
+    keep_values(path, values)
+
+
+def _mark(result: AllocationResult, drawing: Worksheet) -> None:
+    """Mark and guard the zones to change, and show what to write as a drawing does."""
+    guard = DataValidation(
+        type="decimal",
+        operator="between",
+        formula1=f"$E{_FIRST}",
+        formula2=f"$F{_FIRST}",
+        allow_blank=False,
+        showErrorMessage=True,
+        errorStyle="stop",
+    )
+    guard.errorTitle, guard.error = "zone", say("workbook_guard")
+    drawing.add_data_validation(guard)
+    for row, name in enumerate(result.drawn.groups, start=_FIRST):
+        drawing.cell(row, 2).fill, drawing.cell(row, 2).border = _INPUT, Border(*[_EDGE] * 4)
+        guard.add(drawing.cell(row, 2))
+        drawing.cell(row, 4).number_format = "0.000"
+        drawing.cell(row, 11).number_format = _written_as(callout(result.dimensions[name][0]))
+
+
+def _written_as(frame: FeatureFrame) -> str:
+    """Return the format of a number that looks as on the drawing, whatever the language of its reader."""
+    sign = "±" if frame.characteristic == "size" else "⌀" if frame.zone.startswith("⌀") else ""
+    return f'"{sign}"0.0000' if sign else "0.0000"
+
+
+def _below(drawing: Worksheet, watched: pd.DataFrame, groups: int, notes: tuple[str, ...]) -> dict[str, float | str]:
+    """Write cost, limits and notes below the drawing, and return what the formulas there give."""
+    start, values = _FIRST + groups + 1, dict[str, float | str]()
+    for column, header in enumerate(("what", "limit", "predicted", "kept"), start=1):
+        drawing.cell(start, column, header).font = Font(bold=True)
+    for at, own in enumerate(watched.to_dict("records")):
+        row, there = start + 1 + at, _FIRST + at
+        drawing.cell(row, 1, str(own["what"]))
+        for column, place, held in (
+            (2, "B", own["limit"]),
+            (3, "D", own["predicted for the zones"]),
+            (4, "E", own["kept by the model"]),
+        ):
+            value = held.value if isinstance(held, Formula) else held
+            if isinstance(value, str) or (value is not None and value == value):
+                cell = drawing.cell(row, column, f"=requirements!{place}{there}")
+                cell.number_format, cell.fill = "0.00", _RESULT
+                values[cell.coordinate] = value
+    for row, text in enumerate(notes, start=drawing.max_row + 2):
+        drawing.cell(row, 1, text).font = Font(italic=True)
+    return values
+
+
+@singledispatch
+def cost_formula(model: object, zone: str) -> str:
+    """Return a cost as a formula of a spreadsheet, without the equals sign.
+
+    Parameters
+    ----------
+    model
+        The cost model.
+    zone
+        Expression of the zone in the unit of the model.
+    """
+    raise TypeError(f"{type(model).__name__} has no formula of {zone}")
+
+
+@cost_formula.register
+def _(model: Reciprocal, zone: str) -> str:
+    return f"({number(model.fixed)}+{number(model.factor)}/{zone})"
+
+
+@cost_formula.register
+def _(model: ReciprocalPower, zone: str) -> str:
+    return f"({number(model.fixed)}+{number(model.factor)}/{zone}^{number(model.exponent)})"
+
+
+@cost_formula.register
+def _(model: Exponential, zone: str) -> str:
+    return f"({number(model.fixed)}+{number(model.factor)}*EXP(-{zone}/{number(model.scale)}))"
+
+
+@cost_formula.register
+def _(model: Combined, zone: str) -> str:
+    falling = f"EXP(-{zone}/{number(model.scale)})/{zone}^{number(model.exponent)}"
+    return f"({number(model.fixed)}+{number(model.factor)}*{falling})"
+
+
+@cost_formula.register
+def _(model: SumOfCosts, zone: str) -> str:
+    parts = [cost_formula(own.rescaled(ratio), zone) for own, ratio in zip(model.models, model.ratios, strict=True)]
+    return f"({'+'.join(parts)})"
+
+
+@cost_formula.register
+def _(model: Weighted, zone: str) -> str:
+    return f"({number(model.weight)}*{cost_formula(model.model, zone)})"
+
+
+@cost_formula.register
+def _(model: Tabulated, zone: str) -> str:
+    zones, slopes = np.array(model.points.zones), np.diff(model.points.costs) / np.diff(model.points.zones)
+    return _piecewise(zone, model.points.costs[0], slopes[0], zones[:-1], np.diff(slopes, prepend=slopes[0])[:, None])
+
+
+@cost_formula.register
+def _(model: Spline, zone: str) -> str:
+    zones, costs = np.array(model.points.zones), np.array(model.points.costs)
+    slopes, lengths = model.slope(zones), np.diff(zones)
+    secants, ends = np.diff(costs) / lengths, slopes[:-1] + slopes[1:]
+    # Square and cubic coefficients of every piece, none before the first point and behind the last.
+    square = np.concatenate([[0.0], (3 * secants - slopes[:-1] - ends) / lengths, [0.0]])
+    cubic = np.concatenate([[0.0], (ends - 2 * secants) / lengths**2, [0.0]])
+    bent = np.diff(square) - 3 * cubic[:-1] * np.concatenate([[0.0], lengths])
+    return _piecewise(zone, costs[0], slopes[0], zones, np.stack([np.zeros(zones.size), bent, np.diff(cubic)], axis=1))
+
+
+def _piecewise(
+    zone: str,
+    cost: float,
+    slope: float,
+    zones: Float[np.ndarray, " point"],
+    changes: Float[np.ndarray, "point power"],
+) -> str:
+    """Return a line that gets terms of first, second, … power behind every point: no IF in an IF, however many."""
+    terms = [
+        f"{number(change)}*MAX({zone}-{number(point)},0)^{power}"
+        for point, own in zip(zones, changes, strict=True)
+        for power, change in enumerate(own, start=1)
+        if change
+    ]
+    return f"({'+'.join([number(cost), f'{number(slope)}*({zone}-{number(zones[0])})', *terms])})"
+
+
+def number(value: float) -> str:
+    """Return a number with all its digits, as a workbook stores it whatever the language of its reader."""
+    return repr(float(value)).upper()
