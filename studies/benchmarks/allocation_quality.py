@@ -30,6 +30,7 @@ from jaxtyping import Float
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from allocation_rivals import SEARCH_UNITS, Compared, Rival
+from tolalloc.allocation.answer.answer import AllocationAnswer
 
 from tests.random_cases import random_study
 from tolalloc.allocation.answer.answer import AllocationAnswer

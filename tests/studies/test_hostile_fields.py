@@ -10,11 +10,11 @@ from unittest import mock
 import pandas as pd
 import pytest
 from openpyxl import load_workbook
+from tolalloc.allocation.answer.calculator import Formula
 
 import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tests.studies.scripts import study_script
-from tolalloc.allocation.answer.calculator import Formula
 from tolalloc.cli.console import Bars, Lines, print_table
 from tolalloc.cli.main import main
 from tolalloc.drawings.drawing import Drawing

@@ -12,15 +12,15 @@ import ezdxf
 import numpy as np
 import pytest
 from openpyxl import load_workbook
+from tolalloc.allocation.answer.cost_formulas import cost_formula
+from tolalloc.allocation.answer.dimensions import dimensions
+from tolalloc.allocation.answer.dimensions import frames as frames_of_members
+from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
 from typer.testing import CliRunner
 
 import tolalloc as ta
 from tests.builders import prepared
 from tolalloc import RADIAL_CLEARANCE as RADIAL
-from tolalloc.allocation.answer.cost_formulas import cost_formula
-from tolalloc.allocation.answer.dimensions import dimensions
-from tolalloc.allocation.answer.dimensions import frames as frames_of_members
-from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Points, Spline, Tabulated
 from tolalloc.allocation.cost.process_costs import load_process_costs

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 
 import tolalloc as ta
 from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
-from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION

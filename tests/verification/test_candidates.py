@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from tolalloc.allocation.answer.answer import AllocationAnswer
 
 import tolalloc as ta
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.search.candidates import ALIKE, GRADES, TABLE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.verify.verification import VerifiedDesign

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from tolalloc.study.comparison import ComparisonAnswer
+from tolalloc.study.finished_run import read_run
 from typer.testing import CliRunner
 
 import tolalloc as ta
@@ -18,8 +20,6 @@ from tolalloc.exceptions import InputError
 from tolalloc.reports.currency import in_currency
 from tolalloc.reports.feature_frame import FeatureFrame, Frames
 from tolalloc.reports.header import Header
-from tolalloc.study.comparison import ComparisonAnswer
-from tolalloc.study.finished_run import read_run
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.study import run
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.answer.answer import AllocationAnswer
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
@@ -22,6 +21,7 @@ from tolalloc.allocation.front.what_if import (
     robustness,
     setting_trade,
 )
+from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import (
     GradedAllocation,
@@ -51,7 +51,6 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Model
-from tolalloc.reports.header import Header
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
@@ -284,8 +283,8 @@ def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " st
 
 
 def allocate_drawing(
-    question: DrawingQuestion, record: RunRecord, header: Header, checkpoint: Path | None = None
-) -> AllocationAnswer:
+    question: DrawingQuestion, record: RunRecord, name: str, digest: str = "", checkpoint: Path | None = None
+) -> AllocationResult:
     """Return the cheapest drawing that keeps the requirements.
 
     Parameters
@@ -294,8 +293,10 @@ def allocate_drawing(
         What is asked.
     record
         Keeps statuses and times.
-    header
-        Header of the answer, to which statuses and stages are added.
+    name
+        Name of the study.
+    digest
+        Of what was asked, so that a checkpoint of another question is not gone on from.
     checkpoint
         File that keeps the answers of the search for the front, so that an interrupted run goes on from them.
 
@@ -307,7 +308,7 @@ def allocate_drawing(
         Too many units failed.
     """
     question.require_answerable()
-    kept = Checkpoint(path=checkpoint, every=4, question=header.digest) if checkpoint else None
+    kept = Checkpoint(path=checkpoint, every=4, question=digest) if checkpoint else None
     fixed = graded = trade = fronts = robust = None
     with one_blas_thread():
         if question.fixed_first and question.space.settings:
@@ -345,8 +346,8 @@ def allocate_drawing(
         with record.stage("units of the drawing"):
             examination = question.examined(chosen)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
-    return AllocationAnswer(
-        header=replace(header, statuses=statuses, stages=record.stages),
+    return AllocationResult(
+        name=name,
         model=question.model,
         requirements=question.requirements,
         space=question.space,
@@ -362,4 +363,5 @@ def allocate_drawing(
         loss=question.quality_loss,
         error=question.effort.error,
         examination=examination,
+        statuses=statuses,
     )

@@ -8,25 +8,24 @@ from functools import cached_property
 
 import numpy as np
 
-from tolalloc.allocation.candidates import ALONE, Candidates
-from tolalloc.allocation.cost.process_costs_file import today
+from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
-from tolalloc.allocation.design_space import DesignSpace
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.graded import GradedAllocation
-from tolalloc.allocation.guarantee import AtYield
-from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.program.problem import Solution
-from tolalloc.allocation.requirement import Check, Requirement
-from tolalloc.allocation.robustness import Robustness
-from tolalloc.allocation.search import ZoneAllocation
-from tolalloc.allocation.trade import SettingTrade
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.front.pareto_front import Fronts
+from tolalloc.allocation.front.robustness import Robustness
+from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.search.candidates import Candidates
+from tolalloc.allocation.search.discrete import GradedAllocation
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.problem import Solution
+from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
-from tolalloc.models.model import Examination, Model
+from tolalloc.models.model import Model
 from tolalloc.reading.units import unit_of
-from tolalloc.sensitivity.sobol_analysis import SobolIndices
+from tolalloc.sensitivity.sobol import SobolIndices
 
 _ROUNDING = 1e-6
 """Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""
@@ -69,7 +68,7 @@ class AllocationResult:
     error
         Probability up to which the answer may call a design met that misses a limit [-].
     examination
-        What the model says of random units of the drawing, such as that they cannot be built.
+        What the model counted of random units of the drawing, units in the names.
     statuses
         Outcome → number of units that were solved for the answer, without those that the front was searched with [-].
     """
@@ -89,13 +88,8 @@ class AllocationResult:
     prices: YieldLadder | None
     loss: QualityLoss | None
     error: float
-    examination: Examination
+    examination: Mapping[str, float]
     statuses: Mapping[str, int]
-
-    @property
-    def free_label(self) -> str:
-        """What the search that frees everything may choose."""
-        return f"tolerances and {self.model.settings_word}" if self.space.settings else "tolerances"
 
     @property
     def leading(self) -> str:
@@ -106,16 +100,6 @@ class AllocationResult:
     def candidates(self) -> Candidates:
         """What the searches found, among which the drawing is the cheapest."""
         return Candidates(fixed=self.fixed, free=self.free, graded=self.graded)
-
-    @property
-    def designs(self) -> dict[str, VerifiedDesign]:
-        """The designs that a report compares, by what they are called."""
-        return self.candidates.designs(self.free_label)
-
-    @property
-    def searches(self) -> dict[str, ZoneAllocation]:
-        """The searches by what they were free to choose."""
-        return {**({ALONE: self.fixed} if self.fixed else {}), self.free_label: self.free}
 
     @cached_property
     def chosen(self) -> VerifiedDesign:
@@ -135,7 +119,7 @@ class AllocationResult:
     @property
     def met(self) -> bool:
         """Whether units that no search has seen show every requirement to be kept, with the stated error."""
-        return self.chosen.confirmed
+        return self.chosen.accepted
 
     @property
     def cost(self) -> float:
@@ -217,7 +201,7 @@ def solver_noise(solution: Solution) -> float:
     return max(solution.gap, _ROUNDING) * solution.cost
 
 
-def limit_price(side: Side, price: float) -> tuple[float, str]:
+def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1."""
     unit = unit_of(side.stack.name)
     return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
@@ -239,12 +223,12 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
         Not a number unless the requirement is a yield with one limit; two share the units beyond.
     """
     guarantee = check.requirement.guarantee
-    if not isinstance(guarantee, AtYield) or len(check.sides) > 1:
+    if not isinstance(guarantee, AtYield) or len(check.constraints) > 1:
         return float("nan")
-    side, confirming = check.sides[0], design.confirming
-    if confirming and not confirming.units.near.all():
-        excess = side.sign * (check.requirement.read(confirming.outputs) - side.limit)
-        beyond = confirming.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
+    side, independent = check.constraints[0], design.independent
+    if independent and not independent.units.near.all():
+        excess = side.sign * (check.requirement.read(independent.outputs) - side.limit)
+        beyond = independent.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
         return float(side.limit + side.sign * beyond)
     sign, values = side.sign, check.requirement.read(design.outputs)
     turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))

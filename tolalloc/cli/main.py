@@ -11,7 +11,6 @@ import typer
 
 from tolalloc.cli.assemble import assemble
 from tolalloc.cli.check import check
-from tolalloc.cli.compare import compare
 from tolalloc.cli.console import note
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.doctor import doctor
@@ -55,7 +54,7 @@ _COMMANDS = (
     allocate,
     whatif,
     series,
-    compare,
+    inquiry_command("compare"),
     inquiry_command("costs"),
     inquiry_command("te"),
     inquiry_command("contact"),

@@ -24,9 +24,10 @@ def series(
     as_json: AsJson = False,
 ) -> None:
     """Run many studies, a product series or a grid of limits, and tell all answers in one table."""
+    from tolalloc.reports.finished_run import common_currency
     from tolalloc.reports.header import Header
-    from tolalloc.study.finished_run import common_currency
-    from tolalloc.study.series import SeriesAnswer, run_series
+    from tolalloc.study.answer import Answer
+    from tolalloc.study.series import run_series
 
     read = [load_script(script) for script in scripts]
     asked = [(own.study.with_effort("quick") if quick else own.study, own.in_force) for own in read]
@@ -36,11 +37,12 @@ def series(
         with solvers(scheduler) as solved_by, shown_progress() as progress:
             for member in run_series(asked, out, progress, fresh=fresh, solved_by=solved_by):
                 members.append(member)
-                note(f"{len(members)} of {len(asked)}: {member.name}, {member.row['answer']}")
+                note(f"{len(members)} of {len(asked)}: {member.name}, {member.verdict}")
     except KeyboardInterrupt:
         raise StoppedError(
             f"Stopped after {len(members)} of {len(asked)} studies; the same command goes on with the others."
         ) from None
     currency = common_currency(member.found for member in members if member.found)
-    answer = SeriesAnswer(header=Header(name="series", model="", currency=currency), members=tuple(members))
-    tell(answer, as_json, (answer.table, "Answers"))
+    header = Header(name="series", model="", currency=currency)
+    answer = Answer(kind="series", header=header, result=tuple(members))
+    tell(answer, as_json, *answer.teller.terminal)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
 from tolalloc.drawings.seeds import SeedTree
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from tolalloc.reports.document import Document
     from tolalloc.running.progress import RunRecord
     from tolalloc.sensitivity.result import RankingResult
+
+Result = TypeVar("Result")
 
 _ZONES = "source names with their zones in µm, such as {'pin.diameter': 3.0}"
 
@@ -110,7 +112,7 @@ class Difference(Question):
         """Return both drawings on the same units."""
         from tolalloc.allocation.difference import difference
 
-        return difference(
+        found = difference(
             model=prepared.model,
             space=prepared.space,
             requirements=prepared.requirements,
@@ -118,8 +120,8 @@ class Difference(Question):
             units=self.units,
             seeds=SeedTree(prepared.study.seed).child("difference"),
             record=record,
-            header=prepared.header,
         )
+        return _answer(self.kind, prepared.header, record, found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +180,9 @@ class Allocation(Question):
             quality_loss=self.quality_loss,
             place=prepared.place,
         )
-        return allocate_drawing(question, record, prepared.header, checkpoint)
+        found = allocate_drawing(question, record, study.name, prepared.header.digest, checkpoint)
+        answer = _answer(self.kind, prepared.header, record, found)
+        return replace(answer, header=replace(answer.header, statuses=found.statuses))
 
 
 @dataclass(frozen=True)
@@ -205,6 +209,11 @@ class Calculation(Question):
         return Answer(
             kind=self.kind, header=Header(name=study.name, model="", seed=made.seed, quick=study.quick), result=made
         )
+
+
+def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Answer[Result]:
+    """Return the answer that a result is, with the units that were solved for it and the stages that they took."""
+    return Answer(kind=kind, header=replace(header, statuses=record.counts, stages=record.stages), result=result)
 
 
 def questions_of(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:

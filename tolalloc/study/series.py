@@ -4,113 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
-
-import pandas as pd
 
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.reports.answer import Answer
-from tolalloc.reports.document import Section
+from tolalloc.reports.finished_run import FinishedRun, Member, read_run
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import Progress
-from tolalloc.study.finished_run import FinishedRun, read_run
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.study import Study, run
 
-_NUMBERS = {
-    "cost [cost units]": "cost [cost units]",
-    "lower bound [cost units]": "bound [cost units]",
-    "yield [-]": "yield [-]",
-}
-"""Number in a summary → column of the table."""
-
-
 InForce = Callable[[], AbstractContextManager[None]]
 """Lets imports find the modules of one study, and none of another one."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Member:
-    """One study of a series and what became of it.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    folder
-        Its run folder.
-    found
-        What the folder says; none if it could not be run.
-    fault
-        Why it could not be run, in a sentence.
-    """
-
-    name: str
-    folder: Path
-    found: FinishedRun | None = None
-    fault: str = ""
-
-    @property
-    def row(self) -> dict[str, object]:
-        """Its row in the table of answers."""
-        if self.found is None:
-            return {"study": self.name, "answer": f"not run: {self.fault}"}
-        summary = self.found.summary
-        met = ("met" if summary["met"] else "NOT met") if "met" in summary else "ranked"
-        first = str(self.found.ranking["source"].iloc[0]) if len(self.found.ranking) else ""
-        numbers = {column: float(summary[name]) for name, column in _NUMBERS.items() if summary.get(name) is not None}
-        return {"study": self.name, "answer": met, **numbers, "largest driver": first, "folder": self.folder.name}
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeriesAnswer(Answer):
-    """What became of every study of a series."""
-
-    kind: ClassVar[str] = "series"
-
-    members: tuple[Member, ...]
-
-    @property
-    def title(self) -> str:
-        """What it is."""
-        return f"A series of {len(self.members)} studies"
-
-    @property
-    def subtitle(self) -> str:
-        """Which ones."""
-        return ", ".join(member.name for member in self.members)
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """How many have an answer."""
-        done = [member for member in self.members if member.found]
-        judged = [member for member in done if member.found and "met" in member.found.summary]
-        met = sum(bool(member.found and member.found.summary["met"]) for member in judged)
-        kept = f"; of {len(judged)} allocations {met} keep their limits" if judged else ""
-        return (f"{len(done)} of {len(self.members)} studies have an answer{kept}.",)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Which could not be run, and why."""
-        return tuple(f"{member.name}: {member.fault}" for member in self.members if member.fault)
-
-    @cached_property
-    def sections(self) -> tuple[Section, ...]:
-        """One table."""
-        return (Section(heading="Answers", tables=(("answers", self.table),), unfolded=True),)
-
-    @cached_property
-    def table(self) -> pd.DataFrame:
-        """A row per study."""
-        return pd.DataFrame([member.row for member in self.members])
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The table for a program."""
-        return {"studies": [member.row for member in self.members]}
 
 
 def run_series(

@@ -21,7 +21,7 @@ from tolalloc.study.problem import Effort, Problem
 from tolalloc.study.questions import Allocation, Calculation, Question, Ranking, questions_of
 
 if TYPE_CHECKING:
-    from tolalloc.allocation.answer.answer import AllocationAnswer
+    from tolalloc.allocation.result import AllocationResult
     from tolalloc.reports.answer import Answer as Told
     from tolalloc.sensitivity.result import RankingResult
 
@@ -180,9 +180,9 @@ class Study(Problem):
 
     def allocate(
         self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
-    ) -> AllocationAnswer:
+    ) -> Answer[AllocationResult]:
         """Return the cheapest drawing that keeps every limit."""
-        return cast("AllocationAnswer", self.ask("allocation", effort, progress))
+        return cast("Answer[AllocationResult]", self.ask("allocation", effort, progress))
 
     def run(
         self,

@@ -16,6 +16,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.files import write_new
+from tolalloc.reading.units import MICROMETRE
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.study import Study
 
@@ -103,10 +104,10 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     if answer.kind == "ranking":
         frame = answer.to_frame()
         return {**drawn, "shares": dict(zip(frame["source"], frame["contribution [%]"].astype(float), strict=True))}
-    frame = answer.drawing_table
-    zones = {str(row["source"]): float(row["zone [µm]"]) for _, row in frame.iterrows()}
+    result = answer.result
+    zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
-    return {**drawn, "met": bool(answer.met), "cost": float(answer.cost), "zones": zones, "settings": chosen}
+    return {**drawn, "met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
 
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")

@@ -10,6 +10,7 @@ from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import plain
 from tolalloc.reports.document import Section
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import allocation_figures as figures
 from tolalloc.reports.tellers import allocation_sentences as texts
@@ -22,9 +23,11 @@ from tolalloc.reports.tellers.allocation_drawing import (
     write_drawing,
     zones_figure,
 )
-from tolalloc.reports.tellers.allocation_sentences import say
+from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import short
 from tolalloc.sensitivity.driver_tables import sobol_table
+
+_say = Sentences("allocation")
 
 
 class AllocationTeller(Teller[AllocationResult]):
@@ -37,17 +40,17 @@ class AllocationTeller(Teller[AllocationResult]):
         key = "title_kept" if result.keeps_table else "title"
         if not result.met:
             key = "title_missed"
-        elif result.examination.fault:
+        elif texts.examined(result).fault:
             key = "title_fault"
-        return say(key, model=self.header.model, name=self.header.name)
+        return _say(key, model=self.header.model, name=self.header.name)
 
     @property
     def subtitle(self) -> str:
         """Under which conditions it holds."""
         count = len(self.result.requirements)
         conditions = [super().subtitle] if self.header.conditions else []
-        asked = say("requirements" if count > 1 else "requirement", count=count)
-        return ", ".join([asked, *conditions, say("seed", seed=self.header.seed)])
+        asked = _say("requirements" if count > 1 else "requirement", count=count)
+        return ", ".join([asked, *conditions, _say("seed", seed=self.header.seed)])
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:
@@ -82,19 +85,19 @@ class AllocationTeller(Teller[AllocationResult]):
         return (
             self._dimensions,
             Section(
-                heading=say("heading_sources"),
+                heading=_say("heading_sources"),
                 figures=(zones_figure(sources.rows),),
                 tables=((sources.name, sources.frame(unit)),),
-                paragraphs=(say("sources"),),
+                paragraphs=(_say("sources"),),
                 unfolded=True,
             ),
-            Section(heading=say("heading_shares", output=leading), tables=(("shares", sobol_table(result.shares)),)),
+            Section(heading=_say("heading_shares", output=leading), tables=(("shares", sobol_table(result.shares)),)),
             self._requirements,
             *self._illustrated,
             self._optimality,
             *self._what_if,
             Section(
-                heading=say("heading_work"),
+                heading=_say("heading_work"),
                 paragraphs=(f"{', '.join(counts)}.",),
                 tables=(
                     ("verified designs", tables.verified_table(result).frame(unit)),
@@ -110,8 +113,8 @@ class AllocationTeller(Teller[AllocationResult]):
         result = self.result
         made = " ".join((*texts.drawn_amounts(result), *texts.amounts_convention(result)))
         return Section(
-            heading=say("heading_dimensions"),
-            paragraphs=(made, say("dimensions"), say("files")),
+            heading=_say("heading_dimensions"),
+            paragraphs=(made, _say("dimensions"), _say("files")),
             figures=effects_figure(result),
             tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
             unfolded=True,
@@ -123,7 +126,7 @@ class AllocationTeller(Teller[AllocationResult]):
         """How the designs stand against the requirements."""
         shown = (tables.requirements_table(self.result), tables.designs_table(self.result))
         return Section(
-            heading=say("heading_requirements"),
+            heading=_say("heading_requirements"),
             paragraphs=texts.quantiles(self.result),
             figures=(figures.units_figure(self.result),),
             tables=tuple((own.name, own.frame(self.header.cost_unit)) for own in shown),
@@ -137,15 +140,15 @@ class AllocationTeller(Teller[AllocationResult]):
             "median unit before": (before.settings, before.sample.unit_at(0.5)[0]),
             "median unit after": (after.settings, after.sample.unit_at(0.5)[0]),
         }
-        return self.result.model.illustrated(units)
+        return portrait_of(self.result.model).illustrated(units)
 
     @property
     def _optimality(self) -> Section:
         """How far from optimal the drawing can be."""
         result, unit, fronts = self.result, self.header.cost_unit, self.result.fronts
         return Section(
-            heading=say("heading_optimality"),
-            paragraphs=(say("bound"), say("bounds_table")),
+            heading=_say("heading_optimality"),
+            paragraphs=(_say("bound"), _say("bounds_table")),
             figures=(figures.front_figure(result, fronts, unit),) if fronts else (),
             tables=(
                 ("certificate", tables.certificate_frame(result, unit)),
@@ -161,7 +164,7 @@ class AllocationTeller(Teller[AllocationResult]):
         if result.trade:
             found.append(
                 Section(
-                    heading=say("heading_trade", word=result.model.settings_word.capitalize()),
+                    heading=_say("heading_trade", word=portrait_of(result.model).settings_word.capitalize()),
                     paragraphs=texts.cheapest_settings(result, unit),
                     figures=figures.trade_figures(result, result.trade, unit),
                     tables=(("modification", tables.trade_frame(result.trade, unit)),),
@@ -169,12 +172,12 @@ class AllocationTeller(Teller[AllocationResult]):
             )
         if result.prices and result.prices.priced.size:
             priced = (("unit price", tables.prices_frame(result.prices, unit)),)
-            found.append(Section(heading=say("heading_good_unit"), tables=priced))
+            found.append(Section(heading=_say("heading_good_unit"), tables=priced))
         if result.robustness:
             moved, variants = tables.robustness_frame(result, result.robustness), result.robustness
             found.append(
                 Section(
-                    heading=say("heading_robustness"),
+                    heading=_say("heading_robustness"),
                     figures=(figures.robustness_figure(moved),),
                     tables=(("robustness", moved), ("variants", tables.variants_frame(variants, unit))),
                 )
@@ -186,11 +189,12 @@ class AllocationTeller(Teller[AllocationResult]):
         """The whole answer for a program, units in the names."""
         result, header = self.result, self.header
         chosen, free, robustness = result.chosen, result.free, result.robustness
+        portrait, examined = portrait_of(result.model), texts.examined(result)
         limit = "limit [arcsec]" if unit_of(result.leading) == "arcsec" else f"limit of {result.leading}"
         answered = {
             "study": header.name,
             "study hash": header.digest,
-            result.model.kind: header.model,
+            portrait.kind: header.model,
             **header.conditions,
             limit: free.limit,
             "yield target [-]": getattr(result.requirements[0].guarantee, "target", None),
@@ -206,9 +210,9 @@ class AllocationTeller(Teller[AllocationResult]):
             **self._costs,
             "blocking requirement": None if result.met else chosen.blocking.requirement.output,
             "beyond its limit by [unit of the output]": None if result.met else -chosen.blocking.slack,
-            "cannot be built because": result.examination.fault or None,
-            **result.examination.figures,
-            **result.model.amounts(chosen.settings),
+            "cannot be built because": examined.fault or None,
+            **examined.figures,
+            **portrait.amounts(chosen.settings),
             "requirements": tables.requirements_table(result).records(),
             "drawing": sources_table(result).records(),
             "zones that stay the same": [
@@ -216,7 +220,7 @@ class AllocationTeller(Teller[AllocationResult]):
             ]
             if robustness
             else None,
-            **result.model.facts,
+            **portrait.facts,
             "statuses": dict(header.statuses),
             "warnings": list(self.warnings),
         }
@@ -235,7 +239,7 @@ class AllocationTeller(Teller[AllocationResult]):
             "saving [-]": 1 - chosen.cost / free.proportional.cost,
             "saving at least [-]": result.least_saving,
             "cost of tolerances alone [cost units]": result.fixed.chosen.cost if result.fixed else None,
-            f"cost of {result.free_label} [cost units]": free.chosen.cost,
+            f"cost of {texts.free_label(result)} [cost units]": free.chosen.cost,
             "cost on grades [cost units]": result.graded.chosen.cost if result.graded else None,
             "lower bound [cost units]": result.bound if result.met else None,
             "lower bound holds for every drawing": result.bound_is_certified if result.met else None,

@@ -19,13 +19,17 @@ from tolalloc.reports.excel import write_sheets
 from tolalloc.reports.feature_frame import Frames, callout, write_frames
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, say
+from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
 from tolalloc.reports.tellers.allocation_workbook import calculator_sheets, style_calculator
+from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import short, with_unit
 from tolalloc.reports.writer import write_csv
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_say = Sentences("allocation")
 
 _SAME = 1e-9
 """Relative difference up to which two zones are the same [-]."""
@@ -75,9 +79,9 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     before, after = _processes(result)
     columns: list[Column[_Dimension]] = [
         Column(header="dimension", value=lambda row: row[0], terminal=1),
-        *own_words(lambda row: [new for _, new in row[1]]),
+        *own_words(_after),
         Column(header="places [-]", value=lambda row: len(row[1])),
-        Column(header="write [mm]", value=lambda row: frames([new for _, new in row[1]]), terminal=2),
+        Column(header="write [mm]", value=lambda row: frames(_after(row)), terminal=2),
         Column(header="zone before [µm]", value=lambda row: _span([old.zone / MICROMETRE for old, _ in row[1]])),
         Column(header="zone [µm]", value=lambda row: _span([new.zone / MICROMETRE for _, new in row[1]])),
         Column(header="change [%]", value=lambda row: _change(row[1][0])),
@@ -101,6 +105,11 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
 def frames(members: Sequence[Source]) -> Frames:
     """Return the different frames of the members of a dimension."""
     return Frames(dict.fromkeys(map(callout, members)))
+
+
+def _after(row: _Dimension) -> list[Source]:
+    """Return the members of a dimension as drawn."""
+    return [own for _, own in row[1]]
 
 
 def _change(row: _Source) -> float:
@@ -181,7 +190,7 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
     label, lengths = "effect with its sign, to first order", [effects[name] for name in order]
     figure = Figure(
         name="effects",
-        title=say("figure_effects", step=_STEP, output=short(result.leading), kept=kept),
+        title=_say("figure_effects", step=_STEP, output=short(result.leading), kept=kept),
         x_label=f"change of {result.leading}",
         series=(Series(label=label, kind="bars", x=order, y=lengths),),
         vertical=((0.0, ""),),
@@ -195,7 +204,7 @@ def zones_figure(rows: Sequence[_Source]) -> Figure:
     before, after = ([own.zone / MICROMETRE for own in side] for side in zip(*rows, strict=True))
     return Figure(
         name="zones",
-        title=say("figure_zones"),
+        title=_say("figure_zones"),
         x_label="zone [µm]",
         series=(
             Series(label="before", kind="bars", x=names, y=before),
@@ -224,8 +233,8 @@ def _table_comments(result: AllocationResult, digest: str, notes: Sequence[str])
     Without commas and semicolons, so that no program that reads the rows parts them into cells.
     """
     paid = sum(result.process_changes.values())
-    once = say("table_once", paid=paid) if paid else ""
-    said = [say("table_study", name=result.name, digest=digest[:12], cost=result.cost, once=once), *notes]
+    once = _say("table_once", paid=paid) if paid else ""
+    said = [_say("table_study", name=result.name, digest=digest[:12], cost=result.cost, once=once), *notes]
     values = zip(result.space.shared.names, result.chosen.settings.tolist(), strict=True)
     lines = [f"# {sentence}".replace(",", " and").replace(";", " -") for sentence in said]
     return [*lines, *(setting_line(name, value) for name, value in values)]
@@ -255,4 +264,4 @@ def _settings_sheet(result: AllocationResult) -> dict[str, pd.DataFrame]:
         for name in dict.fromkeys([*drawn.names, *names])
     ]
     rows += [{"what": sentence} for sentence in amounts_convention(result)]
-    return {result.model.settings_word: pd.DataFrame(rows)}
+    return {portrait_of(result.model).settings_word: pd.DataFrame(rows)}

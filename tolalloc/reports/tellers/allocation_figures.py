@@ -6,14 +6,17 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.front.pareto_front import Fronts
+from tolalloc.allocation.front.trade import SettingTrade
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.trade import SettingTrade
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.figure import Figure, HeatMap, Series
-from tolalloc.reports.tellers.allocation_sentences import say
+from tolalloc.reports.tellers.allocation_sentences import designs
+from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, short, with_unit
+
+_say = Sentences("allocation")
 
 
 def units_figure(result: AllocationResult) -> Figure:
@@ -22,7 +25,7 @@ def units_figure(result: AllocationResult) -> Figure:
     before, after = result.free.baseline.sample.values, result.chosen.sample.values
     return Figure(
         name=short(leading).replace("-", "_").replace(" ", "_"),
-        title=say("figure_units", share=result.chosen.achieved.estimate),
+        title=_say("figure_units", share=result.chosen.achieved.estimate),
         x_label=leading,
         y_label="share of the units [%]",
         series=(
@@ -40,18 +43,18 @@ def units_figure(result: AllocationResult) -> Figure:
 def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Figure:
     """Return cost against what is kept of the leading output."""
     limit, leading, guarantee = result.free.limit, result.leading, result.requirements[0].guarantee
-    error = with_unit(f"{result.chosen.sides[0].standard_error:.2g}", leading)
+    error = with_unit(f"{result.chosen.constraints[0].standard_error:.2g}", leading)
     by = f" by {guarantee.target:.2%} of units" if isinstance(guarantee, AtYield) else ""
     searched, exact = fronts.searched, fronts.exact
     checked, knee = ~np.isnan(searched.on_kernel), searched.knee
-    others = say("figure_front_others") if len(result.requirements) > 1 else ""
-    designs = tuple(
+    others = _say("figure_front_others") if len(result.requirements) > 1 else ""
+    compared = tuple(
         Series(label=label, kind="points", x=[design.quantile_bound], y=[design.cost])
-        for label, design in result.designs.items()
+        for label, design in designs(result).items()
     )
     return Figure(
         name="front",
-        title=say("figure_front", limit=with_unit(f"{limit:g}", leading), others=others),
+        title=_say("figure_front", limit=with_unit(f"{limit:g}", leading), others=others),
         x_label=f"{short(leading)} kept{by} [{unit_of(leading)}]",
         y_label=f"cost [{cost_unit}]",
         series=(
@@ -67,7 +70,7 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
                 x=list(searched.on_kernel[checked]),
                 y=list(searched.cost[checked]),
             ),
-            *designs,
+            *compared,
             Series(label="knee of NSGA-II", kind="points", x=[searched.quantile[knee]], y=[searched.cost[knee]]),
         ),
         vertical=((limit, ""),),  # a label would stand among the legend's
@@ -87,7 +90,7 @@ def _trade_map(trade: SettingTrade, cost_unit: str) -> HeatMap:
     first, second = trade.values
     return HeatMap(
         name="modification_cost",
-        title=say("figure_trade_map"),
+        title=_say("figure_trade_map"),
         columns=[f"{value:.3g}" for value in second],
         rows=[f"{quantity(trade.names[0])} {value:.3g} {unit_of(trade.names[0])}" for value in first],
         x_label=trade.names[1],
@@ -109,7 +112,7 @@ def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str)
     now = result.space.settings[-1].value
     return Figure(
         name="modification_trade",
-        title=say("figure_trade"),
+        title=_say("figure_trade"),
         x_label=trade.names[-1],
         y_label=f"cost of the cheapest zones [{cost_unit}]",
         series=tuple(lines),
@@ -133,4 +136,4 @@ def robustness_figure(frame: pd.DataFrame) -> Figure:
         low=list(np.minimum(frame["smallest under all changes [µm]"], frame["free zone [µm]"])),
         high=list(np.maximum(frame["largest under all changes [µm]"], frame["free zone [µm]"])),
     )
-    return Figure(name="robustness", title=say("figure_robustness"), x_label="zone [µm]", series=(bars,))
+    return Figure(name="robustness", title=_say("figure_robustness"), x_label="zone [µm]", series=(bars,))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.allocation.guarantee import AtYield
+from tolalloc.allocation.front.robustness import COST_CHANGE, SAME
 from tolalloc.allocation.result import AllocationResult, limit_price, unit_quantile
-from tolalloc.allocation.robustness import COST_CHANGE, SAME
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.search.candidates import ALONE
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.space.requirement import AtYield
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
@@ -23,17 +26,38 @@ _EVEN_ODDS = 0.5
 _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
-say = Sentences("allocation")
+_say = Sentences("allocation")
+
+
+def free_label(result: AllocationResult) -> str:
+    """Return what the search that frees everything may choose."""
+    return f"tolerances and {portrait_of(result.model).settings_word}" if result.space.settings else "tolerances"
+
+
+def designs(result: AllocationResult) -> dict[str, VerifiedDesign]:
+    """Return the designs that a report compares, by what they are called."""
+    return result.candidates.designs(free_label(result))
+
+
+def searches(result: AllocationResult) -> dict[str, ZoneAllocation]:
+    """Return the searches by what they were free to choose."""
+    return {**({ALONE: result.fixed} if result.fixed else {}), free_label(result): result.free}
+
+
+def examined(result: AllocationResult) -> Examination:
+    """Return what is said of random units of the drawing, such as that they cannot be built."""
+    return portrait_of(result.model.at(result.chosen.settings)).examination(result.examination)
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen, achieved = result.chosen, result.chosen.achieved
-    found = [result.examination.fault] if result.examination.fault else []
+    fault = examined(result).fault
+    found = [fault] if fault else []
     found.append(
-        say(
+        _say(
             "met",
-            verdict=say("verdict_met" if result.met else "verdict_missed"),
+            verdict=_say("verdict_met" if result.met else "verdict_missed"),
             share=achieved.estimate,
             units=achieved.units,
             limits=_limits(result),
@@ -43,9 +67,9 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     )
     found += [*drawn_amounts(result), _cost(result, cost_unit)]
     if len(result.requirements) > 1:
-        found.append(say("all_limits", share=chosen.joint.estimate))
+        found.append(_say("all_limits", share=chosen.joint.estimate))
     if result.met and result.error < _EVEN_ODDS:
-        found.append(say("error", error=result.error))
+        found.append(_say("error", error=result.error))
     return (
         *found,
         *_solved(chosen),
@@ -55,7 +79,7 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         *_prices(result, cost_unit),
         *_good_unit(result, cost_unit),
         *_settled(result),
-        *result.model.at(chosen.settings).remarks,
+        *portrait_of(result.model.at(chosen.settings)).remarks,
     )
 
 
@@ -67,17 +91,17 @@ def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
     before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
     amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
     amounts = " and ".join(
-        say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
+        _say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
         for name, was, new in zip(drawn.names, before, chosen, strict=True)
     )
-    word = result.model.settings_word
-    return (say("amounts_many" if word.endswith("s") else "amounts_one", word=word, amounts=amounts),)
+    word = portrait_of(result.model).settings_word
+    return (_say("amounts_many" if word.endswith("s") else "amounts_one", word=word, amounts=amounts),)
 
 
 def amounts_convention(result: AllocationResult) -> tuple[str, ...]:
     """Return what the signs of these amounts mean, if that must be said."""
     convention = result.model.drawn_amounts.convention
-    return (say("convention", convention=convention),) if convention and result.space.settings else ()
+    return (_say("convention", convention=convention),) if convention and result.space.settings else ()
 
 
 def _signed(amount: float) -> str:
@@ -89,45 +113,47 @@ def _limits(result: AllocationResult) -> str:
     """Return the limits of the leading output."""
     limits, leading = result.requirements[0].limits, result.leading
     if limits.upper is None:
-        return say("limit_lower", lower=with_unit(f"{limits.lower:g}", leading))
+        return _say("limit_lower", lower=with_unit(f"{limits.lower:g}", leading))
     upper = with_unit(f"{limits.upper:g}", leading)
-    return upper if limits.lower is None else say("limit_both", lower=limits.lower, upper=upper)
+    return upper if limits.lower is None else _say("limit_both", lower=limits.lower, upper=upper)
 
 
 def _against(cost: float, other: float) -> str:
     """Return how a cost stands against another one, in words."""
     change = cost / other - 1
     if abs(change) < _SAME_COST:
-        return say("against_same")
-    return say("against_below" if change < 0 else "against_above", change=abs(change))
+        return _say("against_same")
+    return _say("against_below" if change < 0 else "against_above", change=abs(change))
 
 
 def _cost(result: AllocationResult, cost_unit: str) -> str:
     """Return what the drawing costs, and what proportional scaling does."""
     chosen, alike = result.chosen, result.free.proportional
-    used = "" if alike.met else say("cost_missed")
+    used = "" if alike.met else _say("cost_missed")
     if alike.met and result.requirements[0].limits.lower is None:
         unit = unit_of(result.leading).replace("arcsec", "arcsecond")
         least = chosen.cost / (1 - result.least_saving)
-        used = say("cost_used", against=_against(chosen.cost, least), unit=unit, least=least)
-    settings = f" {say('cost_settings', word=result.model.settings_word)}" if result.space.settings else ""
+        used = _say("cost_used", against=_against(chosen.cost, least), unit=unit, least=least)
+    settings = (
+        f" {_say('cost_settings', word=portrait_of(result.model).settings_word)}" if result.space.settings else ""
+    )
     against = _against(chosen.cost, alike.cost)
     gaps = {"against": against, "settings": settings, "alike": alike.cost, "used": used}
-    return say("cost", cost=chosen.cost, cost_unit=cost_unit, **gaps)
+    return _say("cost", cost=chosen.cost, cost_unit=cost_unit, **gaps)
 
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:
     """Return which of the verifying units were solved, where that were not all of them."""
-    units = design.confirming.units if design.confirming else None
+    units = design.independent.units if design.independent else None
     if units is None or units.near.all():
         return ()
-    return (say("solved", units=units.near.size, whatever=units.drawn.whatever),)
+    return (_say("solved", units=units.near.size, whatever=units.drawn.whatever),)
 
 
 def missed(design: VerifiedDesign) -> str:
     """Return which limit blocks a design that is not met, and by how much."""
     check, side = design.blocking, design.blocking.tightest
-    return say(
+    return _say(
         "missed" if np.isfinite(side.value) else "missed_unanswered",
         output=quantity(check.requirement.output),
         limit=side.limit,
@@ -141,16 +167,17 @@ def missed(design: VerifiedDesign) -> str:
 def _compared(result: AllocationResult) -> str:
     """Return what every verified drawing costs, and which one is drawn."""
     costs = (
-        say("design" if own.met else "design_missed", name=name, cost=own.cost) for name, own in result.designs.items()
+        _say("design" if own.met else "design_missed", name=name, cost=own.cost)
+        for name, own in designs(result).items()
     )
-    listed = say("found", designs="; ".join(costs))
-    return say("kept", found=listed) if result.met and result.keeps_table else listed
+    listed = _say("found", designs="; ".join(costs))
+    return _say("kept", found=listed) if result.met and result.keeps_table else listed
 
 
 def _certificate(result: AllocationResult) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
     if result.met and result.bound is None:
-        return (say("no_bound"),)
+        return (_say("no_bound"),)
     return (*_free(result), *_graded(result))
 
 
@@ -162,8 +189,8 @@ def _free(result: AllocationResult) -> tuple[str, ...]:
     bound, cost, graded = found.lower_bound, found.chosen.cost, result.graded
     gaps = {"bound": bound.cost, "cost": cost, "below": max(1 - bound.cost / cost, 0.0), "confidence": bound.confidence}
     if bound.certified:
-        return (say("bound_certified", zones="free zones" if graded else "zones", **gaps),)
-    return (say("bound_local", around="free zones" if graded else "drawing", **gaps),)
+        return (_say("bound_certified", zones="free zones" if graded else "zones", **gaps),)
+    return (_say("bound_local", around="free zones" if graded else "drawing", **gaps),)
 
 
 def _graded(result: AllocationResult) -> tuple[str, ...]:
@@ -171,41 +198,41 @@ def _graded(result: AllocationResult) -> tuple[str, ...]:
     graded, free = result.graded, result.candidates.unrestricted.chosen
     if not graded:
         return ()
-    compared = say("graded_compared", against=_against(graded.chosen.cost, free.cost)) if free.met else ""
-    said = say("graded", cost=graded.chosen.cost, compared=compared)
+    compared = _say("graded_compared", against=_against(graded.chosen.cost, free.cost)) if free.met else ""
+    said = _say("graded", cost=graded.chosen.cost, compared=compared)
     if not graded.chosen.met:
-        return (say("graded_missed", graded=said),)
-    return (say("graded_bound", graded=said, bound=graded.bound),)
+        return (_say("graded_missed", graded=said),)
+    return (_say("graded_bound", graded=said, bound=graded.bound),)
 
 
 def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return what the settings buy."""
-    joint, word = result.free.chosen, result.model.settings_word
+    joint, word = result.free.chosen, portrait_of(result.model).settings_word
     if result.fixed is None:
-        return () if joint.met else (say("none_verified", missed=missed(joint)),)
+        return () if joint.met else (_say("none_verified", missed=missed(joint)),)
     alone = result.fixed.chosen
     if not joint.met:
-        said = say("none_free", free=result.free_label, missed=missed(joint))
-        return (said,) if alone.met else (said, say("none_alone", missed=missed(alone)))
+        said = _say("none_free", free=free_label(result), missed=missed(joint))
+        return (said,) if alone.met else (said, _say("none_alone", missed=missed(alone)))
     if not alone.met:
-        return (say("alone_missed", missed=missed(alone), word=word),)
+        return (_say("alone_missed", missed=missed(alone), word=word),)
     saving = 1 - joint.cost / alone.cost
     if saving < _SAME_COST:
-        return (say("nothing_cheaper", word=word, cost=alone.cost),)
-    doubt = say("saves_doubt") if max(result.fixed.gap, result.free.gap) > saving else ""
+        return (_say("nothing_cheaper", word=word, cost=alone.cost),)
+    doubt = _say("saves_doubt") if max(result.fixed.gap, result.free.gap) > saving else ""
     gaps = {"saved": alone.cost - joint.cost, "share": saving, "alone": alone.cost, "doubt": doubt}
-    return (say("saves", word=word, cost_unit=cost_unit, **gaps),)
+    return (_say("saves", word=word, cost_unit=cost_unit, **gaps),)
 
 
 def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return what the limits cost, to first order."""
     free, said = result.free, []
-    for side in free.chosen.sides if free.chosen.met else ():
+    for side in free.chosen.constraints if free.chosen.met else ():
         price = free.prices[side.stack.name]
         if price * abs(side.limit) > _NOTHING * free.chosen.cost:
             cost, per = limit_price(side, price)
             gaps = {"output": quantity(side.stack.name), "limit": side.limit, "unit": unit_of(side.stack.name)}
-            said.append(say("price", price=cost, cost_unit=cost_unit, per=per, **gaps))
+            said.append(_say("price", price=cost, cost_unit=cost_unit, per=per, **gaps))
     return tuple(said)
 
 
@@ -215,11 +242,11 @@ def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     if found is None:
         return ()
     if not found.priced.size:
-        return (say("good_none"),)
+        return (_say("good_none"),)
     ends = {float(found.priced.max()): "good_above", float(found.priced.min()): "good_below"}
     key = "good_only" if found.priced.size == 1 else ends.get(found.best, "good_inside")
-    said, price = say(key, target=found.best * 100), np.nanmin(found.prices)
-    return (say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
+    said, price = _say(key, target=found.best * 100), np.nanmin(found.prices)
+    return (_say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
 
 
 def _settled(result: AllocationResult) -> tuple[str, ...]:
@@ -230,11 +257,11 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
     names = f": {', '.join(same)}" if same else ""
     key = "same_one" if len(same) == 1 else "same_many"
-    said = [say(key, same=len(same), count=len(found.groups), most=SAME, names=names)]
+    said = [_say(key, same=len(same), count=len(found.groups), most=SAME, names=names)]
     if found.costs:
         dearest = max(0.0, *(variant.regret for variant in found.costs))
         key = "corner" if len(found.costs) == 1 else "corners"
-        said.append(say(key, count=len(found.costs), change=COST_CHANGE * 100, dearest=dearest))
+        said.append(_say(key, count=len(found.costs), change=COST_CHANGE * 100, dearest=dearest))
     return tuple(said)
 
 
@@ -244,24 +271,24 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
     if header.quick:
         found.append(QUICK_RUN)
     if result.error >= _EVEN_ODDS:
-        found.append(say("even_odds"))
+        found.append(_say("even_odds"))
     if not result.met:
-        found.append(say("not_verified", missed=missed(chosen)))
+        found.append(_say("not_verified", missed=missed(chosen)))
     if not result.free.proportional.met:
-        found.append(say("alike_missed"))
+        found.append(_say("alike_missed"))
     uncertain = result.robustness.uncertain if result.robustness else ()
     lost = sum(not variant.kept for variant in uncertain)
     if lost and result.free.chosen.met:
         what = result.model.uncertain[0].name.split(" (")[0]
-        found.append(say("uncertain", lost=lost, count=len(uncertain), what=what))
+        found.append(_say("uncertain", lost=lost, count=len(uncertain), what=what))
     found += [f"{own.sentence}." for own in result.space.settings if own.strays]
-    found += result.model.cautions(chosen.settings)
+    found += portrait_of(result.model).cautions(chosen.settings)
     if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
-        found.append(say("surrogate"))
+        found.append(_say("surrogate"))
     if result.fronts and (lost := result.fronts.searched.failed):
-        found.append(say("front_failed_one" if lost == 1 else "front_failed_many", count=lost))
+        found.append(_say("front_failed_one" if lost == 1 else "front_failed_many", count=lost))
     if failed := header.failed:
-        found.append(say("failed_one" if failed == 1 else "failed_many", count=failed))
+        found.append(_say("failed_one" if failed == 1 else "failed_many", count=failed))
     return tuple(found)
 
 
@@ -275,19 +302,19 @@ def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
         "assumed_correlated" if space.errors.is_correlated else "assumed_independent",
     )
     drawn = tuple(source for source in space.errors.sources if source.zone > 0.0)
-    return (*header.assumptions, *map(say, keys), *callout_assumptions(drawn))
+    return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn))
 
 
 def quantiles(result: AllocationResult) -> tuple[str, ...]:
     """Return how much safer than asked the drawing is, since its units are few."""
     chosen, said = result.chosen, []
     for check in chosen.checks:
-        kept, side, asked = unit_quantile(chosen, check), check.sides[0], check.requirement
+        kept, side, asked = unit_quantile(chosen, check), check.constraints[0], check.requirement
         if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
             gaps = {"kept": kept, "value": side.value, "target": asked.guarantee.target, "units": chosen.joint.units}
             names = {"output": quantity(asked.output), "unit": unit_of(asked.output)}
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
-            said.append(say(key, confidence=chosen.confidence, **gaps, **names))
+            said.append(_say(key, confidence=chosen.confidence, **gaps, **names))
     return tuple(said)
 
 
@@ -295,11 +322,11 @@ def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ..
     """Return where the zones are cheapest among the settings that were tried."""
     trade = result.trade
     if trade is None or not np.isfinite(trade.cheapest).all():
-        return (say("trade_none"),)
+        return (_say("trade_none"),)
     error = ""
     if np.isfinite(trade.error):
-        error = say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
+        error = _say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
     settings = " and ".join(
         f"{value:.3g} {unit_of(name)} {quantity(name)}" for name, value in zip(trade.names, trade.cheapest, strict=True)
     )
-    return (say("trade", settings=settings, cost=np.nanmin(trade.cost), cost_unit=cost_unit, error=error),)
+    return (_say("trade", settings=settings, cost=np.nanmin(trade.cost), cost_unit=cost_unit, error=error),)

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.candidates import GRADES
 from tolalloc.allocation.cost.unit_price import YieldLadder
-from tolalloc.allocation.fronts import Fronts
-from tolalloc.allocation.local_model import Side
-from tolalloc.allocation.pareto import Front
-from tolalloc.allocation.requirement import Check
+from tolalloc.allocation.front.pareto_front import Front, Fronts
+from tolalloc.allocation.front.robustness import Robustness
+from tolalloc.allocation.front.trade import SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
-from tolalloc.allocation.robustness import Robustness
-from tolalloc.allocation.trade import SettingTrade
-from tolalloc.allocation.verification import VerifiedDesign
+from tolalloc.allocation.search.candidates import GRADES
+from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.space.requirement import Check
+from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.allocation_sentences import designs, searches
 from tolalloc.reports.wording import quantity, short
 
-_Limited = tuple[int, Side, Check]
+_Limited = tuple[int, OneSidedConstraint, Check]
 """The place of a limited side among all of them, the side, and the requirement that limits it."""
 _Named = tuple[str, VerifiedDesign]
 """What a design is called, and the design."""
@@ -35,7 +35,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [unit of the output]"
-        return Column(header=header, value=lambda row: design.sides[row[0]].value)
+        return Column(header=header, value=lambda row: design.constraints[row[0]].value)
 
     columns: list[Column[_Limited]] = [
         Column(header="requirement", value=lambda row: row[2].requirement.output),
@@ -45,7 +45,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
             header="quantile of the units [unit of the output]",
             value=lambda row: unit_quantile(result.chosen, row[2]),
         ),
-        *(kept(label, design) for label, design in result.designs.items()),
+        *(kept(label, design) for label, design in designs(result).items()),
         Column(header="slack [unit of the output]", value=lambda row: -row[1].excess),
         Column(header="standard error of it [unit of the output]", value=lambda row: row[1].standard_error),
         Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
@@ -54,8 +54,8 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
     ]
     checks = result.chosen.checks
     rows = [
-        (number, side, next(check for check in checks if side in check.sides))
-        for number, side in enumerate(result.chosen.sides)
+        (number, side, next(check for check in checks if side in check.constraints))
+        for number, side in enumerate(result.chosen.constraints)
     ]
     return Table(name="requirements", columns=columns, rows=rows)
 
@@ -93,12 +93,12 @@ def designs_table(result: AllocationResult) -> Table[_Named]:
         Column(header="units [-]", value=lambda row: row[1].achieved.units),
         Column(header="OK", value=lambda row: "yes" if row[1].met else "no"),
     ]
-    return Table(name="designs", columns=columns, rows=list(result.designs.items()))
+    return Table(name="designs", columns=columns, rows=list(designs(result).items()))
 
 
 def verified_table(result: AllocationResult) -> Table[_Named]:
     """Return all designs that were judged on units of their own, in order, each with the search that found it."""
-    tried = {label: search.tried for label, search in result.searches.items()}
+    tried = {label: search.tried for label, search in searches(result).items()}
     if result.graded:
         tried[GRADES] = result.graded.tried
     kept = f"{short(result.leading)} kept [{unit_of(result.leading)}]"
@@ -118,7 +118,9 @@ def verified_table(result: AllocationResult) -> Table[_Named]:
 def work_frame(header: Header) -> pd.DataFrame:
     """Return what each stage took."""
     stages = header.stages.items()
-    return pd.DataFrame([{"stage": name, "units [-]": own["units"], "seconds [s]": own["seconds"]} for name, own in stages])
+    return pd.DataFrame(
+        [{"stage": name, "units [-]": own["units"], "seconds [s]": own["seconds"]} for name, own in stages]
+    )
 
 
 def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
@@ -136,7 +138,7 @@ def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             "gap of the convex program [-]": found.optimum.gap,
             "designs verified [-]": len(found.tried),
         }
-        for label, found in result.searches.items()
+        for label, found in searches(result).items()
     ]
     if graded := result.graded:
         rows.append(
@@ -195,9 +197,9 @@ def front_frames(result: AllocationResult, fronts: Fronts, cost_unit: str) -> tu
     front = fronts.with_setting
     if front is None:
         return tables
-    third = {cost: front.cost, kept: front.quantile, f"on the kernel [{unit}]": front.on_kernel}
-    third |= {names[-1]: front.further[:, 0], "knee": _knees(front)}
-    return (*tables, ("front with clearance", pd.DataFrame(third)))
+    third = pd.DataFrame({cost: front.cost, kept: front.quantile, f"on the kernel [{unit}]": front.on_kernel})
+    third[names[-1]], third["knee"] = front.further[:, 0], _knees(front)
+    return (*tables, ("front with clearance", third))
 
 
 def _knees(front: Front) -> list[str]:

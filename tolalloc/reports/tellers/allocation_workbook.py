@@ -20,15 +20,16 @@ from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from tolalloc.allocation.cost.closed_forms import Combined, Exponential, Reciprocal, ReciprocalPower
-from tolalloc.allocation.cost.model import SumOfCosts, Weighted
-from tolalloc.allocation.cost.sampled import Spline, Tabulated
-from tolalloc.allocation.local_model import Side as LimitedSide
+from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
+from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
+from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
 from tolalloc.reports.feature_frame import FeatureFrame, callout
-from tolalloc.reports.tellers.allocation_sentences import say
+from tolalloc.reports.templates import Sentences
+
+_say = Sentences("allocation")
 
 _FIRST = 2
 """Row of the first entry below the header."""
@@ -81,7 +82,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             "datum": [" ".join(own.datums) for own in callouts],
         }
     )
-    for side in chosen.sides:
+    for side in chosen.constraints:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + _relief(
             side
         )
@@ -89,7 +90,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     return table
 
 
-def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
+def _relief(side: OneSidedConstraint) -> Float[np.ndarray, " group"]:
     """Return by how much a larger zone relieves a limit, 0 or below, which no model of a search rewards.
 
     Per scale and to first order [unit of the output]; a smaller zone then costs as much.
@@ -102,9 +103,9 @@ def _relief(side: LimitedSide) -> Float[np.ndarray, " group"]:
 
 def _without_weight(result: AllocationResult) -> tuple[str, ...]:
     """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
-    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.sides], axis=0)
+    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.constraints], axis=0)
     names = [group for group, weight in zip(result.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
-    return (say("workbook_weightless", groups=", ".join(names)),) if names else ()
+    return (_say("workbook_weightless", groups=", ".join(names)),) if names else ()
 
 
 def _steps(frame: FeatureFrame) -> int:
@@ -117,7 +118,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     space, chosen = result.drawn, result.chosen
     first, last = _FIRST, _FIRST + len(space.groups) - 1
     scales, watched = f"drawing!$D${first}:$D${last}", []
-    for at, side in enumerate(chosen.sides):
+    for at, side in enumerate(chosen.constraints):
         adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
         load = (
             f"SUMPRODUCT(drawing!${adds}${first}:${adds}${last},{scales})"
@@ -173,7 +174,7 @@ def style_calculator(
         }
         for name, frame in sheets.items()
     }
-    below = (*notes, *_without_weight(result), say("workbook_change"), say("workbook_models"))
+    below = (*notes, *_without_weight(result), _say("workbook_change"), _say("workbook_models"))
     values["drawing"] |= _below(drawing, sheets["requirements"], len(result.drawn.groups), below)
     drawing.freeze_panes = "C2"
     drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
@@ -196,7 +197,7 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
         showErrorMessage=True,
         errorStyle="stop",
     )
-    guard.errorTitle, guard.error = "zone", say("workbook_guard")
+    guard.errorTitle, guard.error = "zone", _say("workbook_guard")
     drawing.add_data_validation(guard)
     for row, name in enumerate(result.drawn.groups, start=_FIRST):
         drawing.cell(row, 2).fill, drawing.cell(row, 2).border = _INPUT, Border(*[_EDGE] * 4)

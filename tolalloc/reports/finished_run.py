@@ -1,4 +1,4 @@
-"""What the folder of a finished run says, read back."""
+"""What the folders of finished runs say, read back: one, two side by side, or a series."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, read_text
 from tolalloc.reading.units import in_cost_units, unit_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
@@ -55,6 +56,70 @@ class FinishedRun:
     def limits(self) -> dict[str, float]:
         """Limits of the leading output by the names that the summary gives them, the upper one first."""
         return {name: value for name, value in self.summary.items() if name.startswith(_LIMITS)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Two finished runs side by side, in the order in which they were named."""
+
+    first: FinishedRun
+    second: FinishedRun
+
+    @property
+    def runs(self) -> tuple[FinishedRun, FinishedRun]:
+        """Both runs."""
+        return self.first, self.second
+
+    @property
+    def same_question(self) -> bool:
+        """Whether both were asked for the same reducer or model, torque, limits and yield."""
+        asked = ("reducer", "model", "torque [N·m]", "yield target [-]", *self.first.limits, *self.second.limits)
+        return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked)
+
+    @property
+    def same_versions(self) -> bool:
+        """Whether both ran with the same versions of the program and its libraries."""
+        return self.first.manifest.get("versions") == self.second.manifest.get("versions")
+
+    @property
+    def same_study(self) -> bool:
+        """Whether both are runs of one and the same study, seed included."""
+        return self.first.manifest.get("study hash") == self.second.manifest.get("study hash")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One study of a series and what became of it.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    folder
+        Its run folder.
+    found
+        What the folder says; none if it could not be run.
+    fault
+        Why it could not be run, in a sentence.
+    """
+
+    name: str
+    folder: Path
+    found: FinishedRun | None = None
+    fault: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether its allocation keeps its limits; none without an allocation."""
+        met = self.found.summary.get("met") if self.found else None
+        return None if met is None else bool(met)
+
+    @property
+    def verdict(self) -> str:
+        """What became of it, in a word."""
+        if self.found is None:
+            return f"not run: {self.fault}"
+        return {None: "ranked", True: "met", False: "NOT met"}[self.met]
 
 
 def common_currency(runs: Iterable[FinishedRun]) -> str:
@@ -111,6 +176,8 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
+    import pandas as pd
+
     text = "".join(line for line in StringIO(_text(path, "a table in CSV")) if not line.startswith("#"))
     try:
         found = pd.read_csv(StringIO(text)).rename(columns=_with_cost_units)

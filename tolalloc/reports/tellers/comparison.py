@@ -1,0 +1,204 @@
+"""Two finished studies side by side: answers, rankings with their intervals, zones and costs."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from tolalloc.reading.units import COST_UNITS, unit_of
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.finished_run import HIGH, LOW, TOTAL, Comparison, FinishedRun
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import quantity, with_unit
+
+_say = Sentences("comparison")
+
+
+class ComparisonTeller(Teller[Comparison]):
+    """What is said of two finished runs side by side."""
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return _say("title")
+
+    @property
+    def subtitle(self) -> str:
+        """Which ones."""
+        return _say("subtitle", first=self._names[0], second=self._names[1])
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The comparison in a few sentences."""
+        moved = list(self._ranking.loc[self._ranking["90 % intervals"] == "apart", "source"])
+        kept = (self._kept(label, run) for label, run in zip(self._names, self.result.runs, strict=True))
+        return (*kept, _say("moved", sources=", ".join(moved)) if moved else _say("unmoved"))
+
+    def _kept(self, label: str, run: FinishedRun) -> str:
+        """Return how many units of a run keep their limits, and at which cost if it allocated."""
+        found = run.summary
+        # Ranking and allocation of one run may name the same limit differently.
+        limits = " and ".join(dict.fromkeys(with_unit(f"{limit:g}", name) for name, limit in run.limits.items()))
+        if "met" not in found:  # a ranking alone decides nothing
+            return _say("kept", label=label, share=found["yield [-]"], limits=limits)
+        verdict, cost = _say("verdict_met" if found["met"] else "verdict_missed"), found["cost [cost units]"]
+        gaps = {"verdict": verdict, "cost": cost, "cost_unit": self.header.cost_unit}
+        return _say("allocated", label=label, share=found["yield [-]"], limits=limits, **gaps)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the two hard to compare."""
+        result, found = self.result, []
+        if not result.same_question:
+            found.append(_say("other_question"))
+        if not result.same_versions:
+            found.append(_say("other_versions"))
+        labelled = zip(self._names, result.runs, strict=True)
+        found += [_say("quick", label=label) for label, run in labelled if run.manifest.get("quick")]
+        if result.first.currency != result.second.currency:
+            first, second = (run.currency or COST_UNITS for run in result.runs)
+            found.append(_say("other_currency", first=first, second=second))
+        if result.same_study:
+            found.append(_say("same_study"))
+        return tuple(found)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Answers, rankings, zones."""
+        unit = self.header.cost_unit
+        named = self._answers["quantity"].map(lambda name: _named(name, unit))
+        answers = self._answers.assign(quantity=named)
+        return (
+            Section(heading=_say("heading_answers"), tables=(("answers", answers),)),
+            Section(
+                heading=_say("heading_rankings"),
+                paragraphs=(_say("rankings"),),
+                figures=(self._figure,),
+                tables=(("rankings", self._ranking),),
+            ),
+            Section(heading=_say("heading_zones"), tables=(("zones", _zones(self.result, unit)),)),
+        )
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """Every number and word that is not the same in both, rankings and zones."""
+        answers, rankings, zones = (frame for own in self.sections for _, frame in own.tables)
+        differing = answers[answers[self._names[0]] != answers[self._names[1]]]
+        first = () if differing.empty else ((differing, "answers that differ"),)
+        return (*first, (rankings, "rankings"), (zones, "zones"))
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The comparison for a program."""
+        ranking, zones = self._ranking, _zones(self.result, COST_UNITS)
+        return {
+            "A": self.result.first.name,
+            "B": self.result.second.name,
+            "same question": self.result.same_question,
+            "answers": self._answers.to_dict("records"),
+            "rankings": ranking.astype(object).where(ranking.notna(), None).to_dict("records"),
+            "zones": zones.astype(object).where(zones.notna(), None).to_dict("records"),
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def _names(self) -> tuple[str, str]:
+        """Names of both runs, with their folders where two are of one study."""
+        names = [run.name for run in self.result.runs]
+        if names[0] == names[1]:
+            names = [f"{run.name} in {run.folder}" for run in self.result.runs]
+        return f"A: {names[0]}", f"B: {names[1]}"
+
+    @cached_property
+    def _ranking(self) -> pd.DataFrame:
+        """Every source with its rank and total index in both, and whether their intervals lie apart."""
+        columns = ["rank [-]", TOTAL, LOW, HIGH]
+        first, second = (run.ranking.set_index("source")[columns] for run in self.result.runs)
+        joint = first.add_suffix(" A").join(second.add_suffix(" B"), how="outer")
+        apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
+        missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
+        return pd.DataFrame(
+            {
+                "source": joint.index,
+                "rank A [-]": joint["rank [-] A"].to_numpy(),
+                "rank B [-]": joint["rank [-] B"].to_numpy(),
+                "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
+                "total index B [-]": joint[f"{TOTAL} B"].to_numpy(),
+                "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
+            }
+        ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
+
+    @cached_property
+    def _answers(self) -> pd.DataFrame:
+        """Every number of the two answers, and the difference where there is one."""
+        first, second = (run.summary for run in self.result.runs)
+        rows = []
+        for name in dict.fromkeys([*first, *second]):
+            values = [summary.get(name) for summary in (first, second)]
+            if any(isinstance(value, list | dict) for value in values):
+                continue
+            row: dict[str, object] = {"quantity": name}
+            row |= {label: "–" if value is None else value for label, value in zip(self._names, values, strict=True)}
+            numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+            row["B − A"] = float(numbers[1] - numbers[0]) if len(numbers) == 2 else ""
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    @property
+    def _figure(self) -> Figure:
+        """The total indices of both with their intervals."""
+        names = list(self._ranking["source"])
+        series = []
+        for label, run in zip(self._names, self.result.runs, strict=True):
+            own = run.ranking.set_index("source").reindex(names).fillna(0.0)
+            columns = (list(own[column].astype(float)) for column in (TOTAL, LOW, HIGH))
+            total, low, high = columns
+            series.append(Series(label=label, kind="bars", x=names, y=total, low=low, high=high))
+        return Figure(
+            name="rankings",
+            title=_say("figure"),
+            x_label="total index ST [-]",
+            series=tuple(series),
+        )
+
+
+def _named(name: str, cost_unit: str) -> str:
+    """Return the name of a number of a summary with what costs are counted in."""
+    return f"{quantity(name)} [{cost_unit}]" if unit_of(name) == COST_UNITS else name
+
+
+def _zones(comparison: Comparison, cost_unit: str) -> pd.DataFrame:
+    """Return every zone and cost in both."""
+    parts = []
+    for run in comparison.runs:
+        zone = run.zones["plus [unit]"] - run.zones["minus [unit]"]
+        parts.append(pd.DataFrame({"zone": zone, "cost": run.zones["cost [cost units]"], "unit": run.zones["unit"]}))
+        parts[-1].index = pd.Index(_names(run.zones), name="source")
+    joint = parts[0].add_suffix(" A").join(parts[1].add_suffix(" B"), how="outer")
+    joint = joint[(joint[["zone A", "zone B"]] != 0.0).any(axis=1)]  # what both neglect is left out
+    change = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
+    return pd.DataFrame(
+        {
+            "source": joint.index,
+            "unit": joint["unit A"].fillna(joint["unit B"]).to_numpy(),
+            "zone A": joint["zone A"].to_numpy(),
+            "zone B": joint["zone B"].to_numpy(),
+            "B over A, less 1 [%]": change.to_numpy(),
+            f"cost A [{cost_unit}]": joint["cost A"].to_numpy(),
+            f"cost B [{cost_unit}]": joint["cost B"].to_numpy(),
+        }
+    )
+
+
+def _names(zones: pd.DataFrame) -> pd.Series:
+    """Return what the sources of a tolerance table are, whatever its own ids."""
+    own = zones.get("source")
+    return zones["id"] if own is None else own.where(own.notna() & (own != ""), zones["id"])
+
+
+TELLER = ComparisonTeller

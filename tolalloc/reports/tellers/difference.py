@@ -1,0 +1,142 @@
+"""What other zones do to cost, yield and quantiles: both drawings on the same random units."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+from tolalloc.allocation.difference import DifferenceResult
+from tolalloc.allocation.space.design_space import outside_range
+from tolalloc.capability.monte_carlo import Change
+from tolalloc.drawings.sources import Source
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
+from tolalloc.reports.columns import Column, Table, own_words
+from tolalloc.reports.document import Section
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import short
+
+_BEYOND = 10
+"""Units beyond a quantile below which its interval is too narrow [-]."""
+_say = Sentences("difference")
+
+_Changed = tuple[str, str, tuple[float, float], Change]
+"""What changes, its unit, before and after, and the change with its interval."""
+
+_CHANGES: tuple[Column[_Changed], ...] = (
+    Column(header="what", value=lambda row: row[0]),
+    Column(header="unit", value=lambda row: row[1]),
+    Column(header="before [unit]", value=lambda row: row[2][0]),
+    Column(header="after [unit]", value=lambda row: row[2][1]),
+    Column(header="change [unit]", value=lambda row: row[3].estimate),
+    Column(header="low 95 % [unit]", value=lambda row: row[3].low),
+    Column(header="high 95 % [unit]", value=lambda row: row[3].high),
+)
+_ZONES: tuple[Column[tuple[Source, Source]], ...] = (
+    Column(header="source", value=lambda row: row[0].name),
+    *own_words(lambda row: row[:1]),
+    Column(header="zone before [µm]", value=lambda row: row[0].zone / MICROMETRE),
+    Column(header="zone after [µm]", value=lambda row: row[1].zone / MICROMETRE),
+    Column(header="cost before [{cost}]", value=lambda row: row[0].cost),
+    Column(header="cost after [{cost}]", value=lambda row: row[1].cost),
+)
+
+
+class DifferenceTeller(Teller[DifferenceResult]):
+    """What is said of two drawings on the same random units."""
+
+    @property
+    def title(self) -> str:
+        """What the answer is about."""
+        return _say("title", model=self.header.model, name=self.header.name)
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """What changes of the cost, the yield and the leading output."""
+        result, cost = self.result, self.result.cost_change
+        leading, found = result.requirements[0], _in_percent(result.yield_change)
+        quantiles = " and ".join(
+            _say(
+                "quantile",
+                share=_percent(share),
+                output=short(own.output),
+                unit=unit_of(own.output),
+                change=change.estimate,
+                low=change.low,
+                high=change.high,
+            )
+            for (own, share), change in zip(result.limited, result.quantile_changes, strict=True)
+            if own is leading
+        )
+        costs = {"before": result.whole_cost, "after": result.whole_cost + cost, "change": cost}
+        shares = {"change": found.estimate, "low": found.low, "high": found.high}
+        return (
+            _say("cost", cost_unit=self.header.cost_unit, **costs),
+            _say("yield", units=result.values.shape[1], quantiles=quantiles, **shares),
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        units = self.result.values.shape[1]
+        found = [sentence for own in self.result.after if (sentence := outside_range(own))]
+        if any(units * min(share, 1 - share) < _BEYOND for _, share in self.result.limited):
+            found.append(_say("few", units=units, beyond=_BEYOND))
+        if lost := self.result.unanswered:
+            found.append(_say("unanswered", lost=lost, solutions=2 * units))
+        return tuple(found)
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Headings with their tables."""
+        unit = self.header.cost_unit
+        shown: dict[str, Table[Any]] = {"heading_changes": self._changes(unit), "heading_zones": self._zones}
+        return tuple(Section(heading=_say(key), tables=((own.name, own.frame(unit)),)) for key, own in shown.items())
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units in the names."""
+        return {
+            "study": self.header.name,
+            "seed": self.header.seed,
+            "units [-]": self.result.values.shape[1],
+            "changes": self._changes(COST_UNITS).records(),
+            "zones": self._zones.records(),
+            "statuses": dict(self.header.statuses),
+            "warnings": list(self.warnings),
+        }
+
+    def _changes(self, cost_unit: str) -> Table[_Changed]:
+        """Return cost, yield and every limited quantile before and after, with the intervals of what is random."""
+        result, none = self.result, float("nan")
+        costs = (result.whole_cost, result.whole_cost + result.cost_change)
+        shares = (100 * result.yields[0], 100 * result.yields[1])
+        rows: list[_Changed] = [
+            ("cost", cost_unit, costs, Change(estimate=costs[1] - costs[0], low=none, high=none)),
+            ("yield, all limits", "%", shares, _in_percent(result.yield_change)),
+        ]
+        found = zip(result.limited, result.quantiles, result.quantile_changes, strict=True)
+        rows += [
+            (f"{_percent(share)} of {short(own.output)}", unit_of(own.output), both, change)
+            for (own, share), both, change in found
+        ]
+        return Table(name="changes", columns=_CHANGES, rows=rows)
+
+    @property
+    def _zones(self) -> Table[tuple[Source, Source]]:
+        """The zones that change, with their costs."""
+        rows = list(zip(self.result.before, self.result.after, strict=True))
+        return Table(name="changed zones", columns=_ZONES, rows=rows)
+
+
+def _in_percent(found: Change) -> Change:
+    """Return the change of a share in percent."""
+    return Change(estimate=100 * found.estimate, low=100 * found.low, high=100 * found.high)
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent, with as many digits as half of the usual rejects take."""
+    return f"{100 * share:.5g}%"
+
+
+TELLER = DifferenceTeller
