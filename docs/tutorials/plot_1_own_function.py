@@ -43,14 +43,15 @@ print(*ranking.sentences, sep="\n")
 
 found = study.allocate(effort="quick")
 print(*found.sentences, sep="\n")
-print(f"met: {found.met}, cost {found.cost:.2f}, bound {found.bound:.2f}")
+result = found.result
+print(f"met: {result.met}, cost {result.cost:.2f}, bound {result.bound:.2f}")
 
 # %%
 # For a linear gap the classical answer is at hand. With costs a/t the cheapest zones of a root sum square stand as
 # the cube roots of the costs, here the cube root of 3 = 1.44. The package asks for a yield of 99.73 % on both sides
 # and finds:
 
-table = found.drawing_table
+table = found.to_frame("drawing")
 print(table.to_string(index=False, max_colwidth=24))
 
 # %%

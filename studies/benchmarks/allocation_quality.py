@@ -30,10 +30,9 @@ from jaxtyping import Float
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from allocation_rivals import SEARCH_UNITS, Compared, Rival
-from tolalloc.allocation.answer.answer import AllocationAnswer
 
 from tests.random_cases import random_study
-from tolalloc.allocation.answer.answer import AllocationAnswer
+from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
@@ -46,7 +45,7 @@ ALGORITHMS = ("NSGA-II", "CMA-ES")
 RIVALS = ("table", "proportional", *ALGORITHMS)
 
 
-def undercut(answer: AllocationAnswer) -> bool:
+def undercut(answer: AllocationResult) -> bool:
     """Return whether a verified design of a report costs less than a bound printed there.
 
     What fresh units judged after its search, and did not confirm, is not verified.
@@ -101,11 +100,11 @@ def rival(
 def row(number: int, asked: argparse.Namespace) -> dict[str, Any]:
     """Return what everybody found for one study."""
     study, start = random_study(number), time.process_time()
-    answer = study.ask("allocation", effort=asked.effort)
+    answer = study.allocate(effort=asked.effort).result
     seconds, graded = time.process_time() - start, answer.graded is not None
     prepared = Prepared(study=study)
     compared = Compared(prepared=prepared, seeds=SeedTree(study.seed).child("quality"), units=asked.units)
-    calls, chosen, free = sum(answer.header.statuses.values()), answer.chosen, answer.free
+    calls, chosen, free = sum(answer.statuses.values()), answer.chosen, answer.free
     found = {"package": judged(compared, chosen.space, chosen.design, graded)}
     found["package"] |= {"seconds": seconds, "calls": calls}
     table, alike = free.baseline, free.proportional

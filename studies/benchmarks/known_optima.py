@@ -230,7 +230,7 @@ def run(number: int, seed: int, effort: str) -> Row:
     """Return what an allocation makes of a case."""
     own = case(number, seed)
     best, start = own.cost(optimum(own)), time.perf_counter()
-    answer = study_of(own, seed).allocate(effort=effort)
+    answer = study_of(own, seed).allocate(effort=effort).result
     seconds = time.perf_counter() - start
     scales = np.array([source.zone * 1e3 / ZONE for source in answer.drawn_sources])
     return Row(

@@ -14,7 +14,6 @@ from tolalloc.models.model import Model
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tolalloc"
 REMAINING = (
-    "tolalloc.allocation.answer",
     "tolalloc.assembly",
     "tolalloc.bench",
     "tolalloc.reducers",

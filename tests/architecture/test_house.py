@@ -24,7 +24,7 @@ DOORS = {
     "sklearn": ("sensitivity/surrogate/", "reducers/surrogates.py"),
     "matplotlib": ("reports/",),
     "jinja2": ("reports/",),
-    "openpyxl": ("cli/start.py", "reports/", "allocation/answer/", "drawings/table_file.py"),
+    "openpyxl": ("cli/start.py", "reports/", "drawings/table_file.py"),
     "distributed": ("running/workers.py",),
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),

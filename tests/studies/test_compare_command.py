@@ -7,9 +7,8 @@ import json
 import pandas as pd
 import pytest
 
+import tolalloc as ta
 from tests.studies.command import refused, tolalloc
-from tolalloc.study.comparison import ComparisonAnswer
-from tolalloc.study.finished_run import read_run
 
 SUMMARY = {
     "reducer": "RV-20E",
@@ -84,10 +83,10 @@ def test_two_runs_of_one_study_are_told_apart_by_their_folders_and_by_what_diffe
     for run in runs:
         zones = run / "allocation.csv"
         zones.write_text(zones.read_text(encoding="utf-8") + neglected, encoding="utf-8")
-    compared = ComparisonAnswer.of(*map(read_run, runs))
-    assert compared.names == (f"A: mine in {runs[0]}", f"B: mine in {runs[1]}")
+    compared = ta.compare(*runs)
+    assert compared.subtitle == f"A: mine in {runs[0]}; B: mine in {runs[1]}."
     assert list(compared.to_frame("zones")["source"]) == ["disc1.pitch", "pin.diameter"]
-    (row,) = compared.differing.to_dict("records")
+    (row,) = compared.teller.terminal[0][0].to_dict("records")
     assert (row["quantity"], row["B − A"]) == ("flank clearance [µm]", 1.5)
 
 

@@ -10,7 +10,6 @@ from unittest import mock
 import pandas as pd
 import pytest
 from openpyxl import load_workbook
-from tolalloc.allocation.answer.calculator import Formula
 
 import tolalloc as ta
 from tests.studies.command import refused, tolalloc
@@ -18,7 +17,7 @@ from tests.studies.scripts import study_script
 from tolalloc.cli.console import Bars, Lines, print_table
 from tolalloc.cli.main import main
 from tolalloc.drawings.drawing import Drawing
-from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.excel import Formula, write_sheets
 from tolalloc.reports.writer import write_csv
 
 

@@ -229,7 +229,7 @@ def test_a_saved_design_is_confirmed_by_the_command(driver, study, script):
     name.send_keys("narrow", Keys.ENTER)
     until(lambda: "Saved as narrow.py" in by_id(driver, "saved").text)
     saved = load_study(script.parent / "narrow.py")
-    found = saved.ask(ta.Difference(zones={"housing": 21.5}, units=6144)).changes.set_index("what")
+    found = saved.ask(ta.Difference(zones={"housing": 21.5}, units=6144)).tables["changes"].set_index("what")
     assert said == f"{found.loc['yield, all limits', 'after [unit]']:.2f} %"
     assert by_id(driver, "cost").text == f"{found.loc['cost', 'after [unit]']:.2f}"
     by_id(driver, "save").click()

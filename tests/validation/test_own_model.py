@@ -36,7 +36,7 @@ def found(study):
         largest_failed_share=study.largest_failed_share,
         effort=ta.Effort(allocation=QUICK_ALLOCATION),
     )
-    return own.allocate()
+    return own.allocate().result
 
 
 def published():
@@ -153,11 +153,12 @@ def test_grades_of_a_model_without_settings(study):
         questions=[ta.Allocation(grades=True, what_if=False)],
         effort=ta.Effort(allocation=QUICK_ALLOCATION),
     )
-    found = own.allocate()
+    answer = own.allocate()
+    found = answer.result
     assert found.met
     assert all(source.grade for source in found.drawing.sources)
     assert found.cost >= published()["total"]
-    assert str(found).startswith("The cheapest verified drawing of contact angle")
+    assert str(answer).startswith("The cheapest verified drawing of contact angle")
 
 
 def test_what_a_function_takes_and_returns_is_checked(study):

@@ -12,10 +12,6 @@ import ezdxf
 import numpy as np
 import pytest
 from openpyxl import load_workbook
-from tolalloc.allocation.answer.cost_formulas import cost_formula
-from tolalloc.allocation.answer.dimensions import dimensions
-from tolalloc.allocation.answer.dimensions import frames as frames_of_members
-from tolalloc.allocation.answer.drawing import full_drawing_table, write_drawing
 from typer.testing import CliRunner
 
 import tolalloc as ta
@@ -29,6 +25,10 @@ from tolalloc.cli.main import app
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reports.feature_frame import callout
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.allocation_drawing import frames as frames_of_members
+from tolalloc.reports.tellers.allocation_drawing import sources_table, tolerances_frame, write_drawing
+from tolalloc.reports.tellers.allocation_workbook import cost_formula
 
 UM = 1e-6
 SEARCH = QUICK_ALLOCATION.search
@@ -124,7 +124,7 @@ def test_many_points_need_no_nested_conditions():
 
 def allocated(**changes):
     """Return the answer of the baseline's study with fields changed, at a small effort."""
-    return prepared(effort=ta.Effort(allocation=SMALL, is_quick=True), **changes).study.allocate()
+    return prepared(effort=ta.Effort(allocation=SMALL, is_quick=True), **changes).study.allocate().result
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +157,7 @@ def priced(tmp_path_factory):
 @pytest.fixture(scope="module", params=["graded", "priced"])
 def drawn(request, tmp_path_factory):
     results, folder = request.getfixturevalue(request.param), tmp_path_factory.mktemp(request.param)
-    write_drawing(results, folder)
+    write_drawing(results, Header(name=results.name, model=results.model.name), folder)
     return results, folder
 
 
@@ -262,7 +262,7 @@ def test_a_reader_that_calculates_nothing_sees_what_the_formulas_give(drawn):
 @pytest.mark.slow
 def test_what_is_written_on_the_drawing_allows_nothing_wider(drawn):
     results, folder = drawn
-    workbook, members = Workbook(folder / "drawing.xlsx"), dimensions(results)
+    workbook, members = Workbook(folder / "drawing.xlsx"), results.dimensions
     for row, name in enumerate(results.drawn.groups, start=2):
         frame, source = callout(members[name][0]), members[name][0]
         written = workbook.value("drawing", f"K{row}")
@@ -360,7 +360,7 @@ def test_a_table_without_a_process_cost_table_keeps_its_own_processes(graded, tm
     kept = {"pin.diameter": "ground", "housing.pitch": "turned hard"}
     sources = tuple(replace(own, process=kept.get(own.name, "")) for own in graded.space.errors.sources)
     space = replace(graded.space, errors=replace(graded.space.errors, sources=sources))
-    write_drawing(replace(graded, space=space), tmp_path)
+    write_drawing(replace(graded, space=space), Header(name="graded", model=graded.model.name), tmp_path)
     read = load_tolerance_table(tmp_path / "allocation.csv")
     assert {own.name: own.process for own in read if own.process} == kept
 
@@ -392,7 +392,7 @@ def test_check_accepts_a_study_that_goes_on_from_the_drawing(drawn):
 @pytest.mark.slow
 def test_the_tables_of_the_drawing_add_up(drawn):
     results, _ = drawn
-    short, full = results.drawing_table, full_drawing_table(results)
+    short, full = sources_table(results).frame(), tolerances_frame(results)
     assert short["cost [cost units]"].sum() == pytest.approx(results.chosen.cost)
     assert short["cost before [cost units]"].sum() == pytest.approx(results.free.baseline.cost)
     assert short["share of variance [%]"].sum() == pytest.approx(100)

@@ -6,17 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tolalloc.allocation.answer import figures, optimality_tables, tables, what_if_tables
 
 import tolalloc as ta
 from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reducers.reducer.files import load_identified_stiffness
 from tolalloc.reports.document import Section
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers import allocation_figures as figures
+from tolalloc.reports.tellers import allocation_tables as tables
+from tolalloc.study.answer import Answer
 
 pytestmark = pytest.mark.slow  # one allocation of all limits, in a minute or two, is what all read
 
@@ -58,21 +62,27 @@ def results(tmp_path_factory):
         name="said",
         effort=ta.Effort(allocation=SMALL, is_quick=True),
     )
-    found = study.allocate()
+    found = study.allocate().result
     assert found.chosen.met
     assert found.fixed.chosen.met
     return found
 
 
+def answer_of(results: AllocationResult, **changes) -> Answer[AllocationResult]:
+    """Return the answer that a result is."""
+    header = Header(name="said", model=results.model.name, seed=1, quick=True, statuses=results.statuses)
+    return Answer(kind="allocation", header=replace(header, **changes), result=results)
+
+
 def said(results, start: str) -> str:
     """Return the one sentence of the answer with a beginning."""
-    (sentence,) = [own for own in results.sentences if own.startswith(start)]
+    (sentence,) = [own for own in answer_of(results).sentences if own.startswith(start)]
     return sentence
 
 
 def section(results, start: str) -> Section:
     """Return the one section of the report whose heading has a beginning."""
-    (found,) = [own for own in results.sections if own.heading.startswith(start)]
+    (found,) = [own for own in answer_of(results).sections if own.heading.startswith(start)]
     return found
 
 
@@ -103,14 +113,14 @@ def test_the_certificate_says_for_which_drawings_it_holds(results):
 def test_nothing_is_certified_of_a_miss(results):
     graded = missing(results.graded)
     lost = replace(results, fixed=missing(results.fixed), free=missing(results.free), graded=graded)
-    sentences = lost.sentences
-    assert lost.summary["lower bound [cost units]"] is None
+    sentences = answer_of(lost).sentences
+    assert answer_of(lost).summary["lower bound [cost units]"] is None
     assert not [own for own in sentences if "Lower bound" in own or "at the rate of" in own]
     assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
 
 
 def test_the_certificate_table_has_bound_and_models(results):
-    table = optimality_tables.certificate_table(results).set_index("search")
+    table = tables.certificate_frame(results, "cost units").set_index("search")
     row, joint = table.loc["tolerances and modification"], results.free
     assert row["lower bound, 95 % [cost units]"] == joint.bound
     assert row["verified cost above the lower bound [%]"] == pytest.approx(100 * joint.gap)
@@ -133,8 +143,8 @@ def test_the_modification_saves_only_what_the_searches_can_tell(results):
     assert sentence.endswith("less than what the lower bounds leave open, so it may be due to the search.")
     for factor in (1.0, 0.9):
         same = replace(results, free=joint, fixed=costing(results.fixed, factor * cost))
-        assert "Nothing cheaper was found with the modification free" in " ".join(same.sentences)
-        assert "modification saves" not in " ".join(same.sentences)
+        assert "Nothing cheaper was found with the modification free" in " ".join(answer_of(same).sentences)
+        assert "modification saves" not in " ".join(answer_of(same).sentences)
 
 
 def test_a_search_that_missed_says_what(results):
@@ -142,7 +152,7 @@ def test_a_search_that_missed_says_what(results):
     assert "limit 50 arcsec: it keeps 53 arcsec (shown for 95.00% of units), 3 arcsec beyond; the" in alone
     joint = replace(results, free=missing(results.free, 7.0))
     assert "57 arcsec" in said(joint, "With tolerances and modification free no design was verified")
-    assert "modification saves" not in " ".join(joint.sentences)
+    assert "modification saves" not in " ".join(answer_of(joint).sentences)
     both = replace(joint, fixed=missing(results.fixed))
     assert "53 arcsec" in said(both, "Nor with tolerances alone")
     unknown = replace(results, fixed=missing(results.fixed, np.inf))
@@ -157,7 +167,7 @@ def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
     sentence = said(results, "Cost ")
     assert f"with the modification as it is ({hand.cost:.2f})" in sentence
     assert f"used the limit to its last arcsecond ({least:.2f})" in sentence
-    assert results.summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
+    assert answer_of(results).summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
 
 
 def ladder(prices) -> YieldLadder:
@@ -183,9 +193,9 @@ def test_the_cheapest_good_unit_at_the_end_of_the_ladder_is_no_optimum(results, 
 def test_where_no_yield_has_a_price_one_sentence_says_so(results):
     nothing = replace(results, prices=ladder([np.nan] * 3))
     assert said(nothing, "No good unit has a price: no yield")
-    assert not [own for own in nothing.sections if own.heading == "What a good unit costs"]
-    assert "nan" not in " ".join(nothing.sentences)
-    assert not [own for own in replace(results, prices=None).sentences if "good unit" in own]
+    assert not [own for own in answer_of(nothing).sections if own.heading == "What a good unit costs"]
+    assert "nan" not in " ".join(answer_of(nothing).sentences)
+    assert not [own for own in answer_of(replace(results, prices=None)).sentences if "good unit" in own]
 
 
 def test_a_yield_that_the_units_cannot_show_has_no_price(results):
@@ -196,11 +206,11 @@ def test_a_yield_that_the_units_cannot_show_has_no_price(results):
 def test_costs_are_changed_to_corners(results):
     assert "In 3 random corners of ±20 % on every cost the free zones are at most" in said(results, "In 3 random")
     assert len(results.robustness.costs) == 3
-    assert "free zones cost more by [%]" in what_if_tables.variants_table(results.robustness).columns
+    assert "free zones cost more by [%]" in tables.variants_frame(results.robustness, "cost units").columns
 
 
 def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
-    table = results.requirements_table
+    table = tables.requirements_table(results).frame()
     sample, target, at = results.chosen.sample, TARGET, "quantile of the units [unit of the output]"
     value = table[at][0]
     kept = np.count_nonzero(sample.values <= value) / sample.evaluation.status.size
@@ -218,8 +228,8 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
     side = results.free.chosen.constraints[0]
-    assert tables.limit_price(side, 0.9) == (0.9, "arcsec")
-    assert tables.limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
+    assert limit_price(side, 0.9) == (0.9, "arcsec")
+    assert limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
     price = results.free.prices[side.stack.name]
     sentence = said(results, "peak-to-peak transmission error: at its limit of 50 arcsec")
     assert f"at the rate of {price:.3g} cost units per arcsec" in sentence
@@ -227,24 +237,20 @@ def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
 
 def test_prices_below_the_noise_of_the_solver_are_nothing(results):
     optimum = results.free.optimum
-    noise = tables.solver_noise(optimum)
+    noise = solver_noise(optimum)
     assert noise >= max(optimum.gap, 0.0) * optimum.cost
     quiet = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 0.1 * noise / optimum.zones.max()))
-    found = optimality_tables.bounds_table(replace(results, free=replace(results.free, optimum=quiet)))
+    found = tables.bounds_frame(replace(results, free=replace(results.free, optimum=quiet)), "cost units")
     for end in ("smallest", "largest"):
         assert (found[f"marginal price of the {end} [cost units/µm]"] == 0.0).all()
     loud = replace(optimum, bound_prices=np.full_like(optimum.bound_prices, 10 * noise / optimum.zones.min()))
-    found = optimality_tables.bounds_table(replace(results, free=replace(results.free, optimum=loud)))
+    found = tables.bounds_frame(replace(results, free=replace(results.free, optimum=loud)), "cost units")
     assert (found["marginal price of the smallest [cost units/µm]"] > 0.0).all()
 
 
 def test_failed_units_are_counted_by_a_yield_alone(results):
     statuses = {"equilibrium found": 9, "no equilibrium": 2}
-    (sentence,) = [
-        own
-        for own in replace(results, header=replace(results.header, statuses=statuses)).warnings
-        if "no answer" in own
-    ]
+    (sentence,) = [own for own in answer_of(results, statuses=statuses).warnings if "no answer" in own]
     assert sentence == "2 units have no answer; a yield counts them as outside the limits, a Cpk leaves them out."
 
 
@@ -254,9 +260,9 @@ def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
     model = replace(results.model, identified=load_identified_stiffness("rv20e_table6"))
     lost = replace(results, model=model, robustness=replace(results.robustness, uncertain=uncertain))
     sentence = "With 1 of 2 drawn stiffness values the free zones are no longer shown to keep every limit."
-    assert sentence in lost.warnings
-    assert not [own for own in results.warnings if "drawn stiffness" in own]
-    assert "nan" not in " ".join(lost.sentences)
+    assert sentence in answer_of(lost).warnings
+    assert not [own for own in answer_of(results).warnings if "drawn stiffness" in own]
+    assert "nan" not in " ".join(answer_of(lost).sentences)
 
 
 def test_a_trade_without_any_cost_is_said_in_words(results):
@@ -266,12 +272,12 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
     assert told.paragraphs == ("With no choice that was tried were zones found that keep all requirements.",)
     assert told.figures == ()
     assert len(section(results, "Modification against tolerances").figures) == 2
-    for own in nothing.sections:
+    for own in answer_of(nothing).sections:
         assert "nan" not in " ".join(own.paragraphs)
 
 
 def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
-    front = figures.front_figure(results, results.fronts)
+    front = figures.front_figure(results, results.fronts, "cost units")
     assert "the search keeps the other requirements by their local models" in front.title
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched

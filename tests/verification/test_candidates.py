@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from tolalloc.allocation.answer.answer import AllocationAnswer
 
 import tolalloc as ta
+from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.search.candidates import ALIKE, GRADES, TABLE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.allocation_drawing import sources_table
+from tolalloc.reports.tellers.allocation_sentences import free_label
+from tolalloc.study.answer import Answer
 
 ZONE = {"plus": 0.01, "minus": -0.01, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
 
@@ -20,7 +24,7 @@ def gap(housing, shaft):
 
 
 @pytest.fixture(scope="module")
-def graded() -> AllocationAnswer:
+def graded() -> AllocationResult:
     study = ta.Study(
         ta.model(gap, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
         ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]),
@@ -28,9 +32,14 @@ def graded() -> AllocationAnswer:
         questions=[ta.Allocation(grades=True, what_if=False, front=False)],
         name="fit",
     )
-    found = study.allocate(effort="quick")
+    found = study.allocate(effort="quick").result
     assert found.met
     return found
+
+
+def told(result: AllocationResult) -> Answer[AllocationResult]:
+    """Return the answer that a result is."""
+    return Answer(kind="allocation", header=Header(name="fit", model="gap", seed=1), result=result)
 
 
 def at_cost(design: VerifiedDesign, cost: float) -> VerifiedDesign:
@@ -42,7 +51,7 @@ def confirming(allocation: ZoneAllocation) -> ZoneAllocation:
     return replace(allocation, chosen=replace(allocation.chosen, accepted=True))
 
 
-def with_table(answer: AllocationAnswer, cost: float) -> AllocationAnswer:
+def with_table(answer: AllocationResult, cost: float) -> AllocationResult:
     """Return the answer with a table that keeps the limits at a cost."""
     table = replace(answer.free.baseline, checks=answer.chosen.checks, cost=cost, accepted=True)
     alike = answer.free.proportional_tried[1:]
@@ -56,22 +65,22 @@ def test_free_zones_are_never_dearer_than_grades(graded):
 def test_a_table_that_costs_less_is_kept_and_said_to_be(graded):
     dearer = with_table(graded, 1.01 * graded.graded.chosen.cost)
     assert dearer.chosen is graded.graded.chosen
-    assert dearer.title.startswith("The cheapest verified drawing")
+    assert told(dearer).title.startswith("The cheapest verified drawing")
     kept = with_table(graded, 0.99 * graded.graded.chosen.cost)
     assert kept.keeps_table
     assert kept.met
-    assert kept.title.startswith("Keep the drawing")
-    (said,) = [sentence for sentence in kept.sentences if sentence.startswith("Keep the drawing: nothing")]
+    assert told(kept).title.startswith("Keep the drawing")
+    (said,) = [sentence for sentence in told(kept).sentences if sentence.startswith("Keep the drawing: nothing")]
     assert f"{TABLE} {kept.cost:.2f}" in said
-    assert kept.summary["cost [cost units]"] == kept.cost
-    assert kept.drawing_table["cost [cost units]"].notna().all()
+    assert told(kept).summary["cost [cost units]"] == kept.cost
+    assert sources_table(kept).frame()["cost [cost units]"].notna().all()
 
 
 def test_where_grades_are_asked_for_no_other_zones_are_drawn(graded):
-    admitted = graded.candidates.admitted(graded.free_label)
+    admitted = graded.candidates.admitted(free_label(graded))
     assert set(admitted) == {TABLE, GRADES}
     free = replace(graded, graded=None, free=confirming(graded.free))
-    assert set(free.candidates.admitted(free.free_label)) == {TABLE, ALIKE, free.free_label}
+    assert set(free.candidates.admitted(free_label(free))) == {TABLE, ALIKE, free_label(free)}
     assert free.chosen is free.free.chosen
 
 
@@ -79,7 +88,7 @@ def test_zones_beyond_what_they_may_be_are_not_drawn(graded):
     free, alike = graded.free, graded.free.proportional
     beyond = at_cost(replace(alike, design=alike.design + 10.0, checks=free.chosen.checks), 0.5 * free.chosen.cost)
     changed = replace(graded, graded=None, free=confirming(replace(free, proportional_tried=(free.baseline, beyond))))
-    assert ALIKE not in changed.candidates.admitted(changed.free_label)
+    assert ALIKE not in changed.candidates.admitted(free_label(changed))
     assert changed.chosen is changed.free.chosen
 
 
@@ -88,9 +97,9 @@ def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
     assert graded.bound <= graded.cost
     undercut = with_table(graded, 0.9 * graded.bound)
     assert undercut.bound is None
-    assert undercut.summary["lower bound [cost units]"] is None
-    assert any("so no lower bound is given" in sentence for sentence in undercut.sentences)
-    assert not any(sentence.startswith("Lower bound") for sentence in undercut.sentences)
+    assert told(undercut).summary["lower bound [cost units]"] is None
+    assert any("so no lower bound is given" in sentence for sentence in told(undercut).sentences)
+    assert not any(sentence.startswith("Lower bound") for sentence in told(undercut).sentences)
 
 
 def test_a_miss_is_titled_so(graded):
@@ -101,7 +110,7 @@ def test_a_miss_is_titled_so(graded):
     table = replace(answer.free.baseline, checks=lost.checks)
     answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))
     assert not answer.met
-    assert answer.title.startswith("No drawing shown to keep its limits")
+    assert told(answer).title.startswith("No drawing shown to keep its limits")
 
 
 def spring(part, preload):
@@ -119,12 +128,13 @@ def test_a_setting_outside_what_it_may_become_is_not_drawn_though_it_is_cheapest
         questions=[ta.Allocation(grades=grades, what_if=False, front=False)],
         name="preloaded",
     )
-    found = study.allocate(effort="quick")
+    answer = study.allocate(effort="quick")
+    found = answer.result
     (value,) = found.chosen.settings
     assert value == pytest.approx(-1.0, abs=0.01)
     assert found.met
     assert found.cost > found.fixed.chosen.cost
-    (said,) = [sentence for sentence in found.warnings if sentence.startswith("preload")]
+    (said,) = [sentence for sentence in answer.warnings if sentence.startswith("preload")]
     assert said == (
         "preload: 0 mm today, not among the -3…-1 mm that it may become; only the table as it is may keep it."
     )

@@ -240,7 +240,7 @@ def test_quick_answers_do_not_lose_a_drawing_that_is_just_good_enough():
         limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.13)},
         questions=[ta.Allocation(front=False, what_if=False)],
     )
-    met = [replace(study, seed=seed).allocate(effort="quick").met for seed in range(1, 25)]
+    met = [replace(study, seed=seed).allocate(effort="quick").result.met for seed in range(1, 25)]
     assert sum(met) >= 22  # 18 where four nearly equal designs were judged one after the other
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from tolalloc.study.comparison import ComparisonAnswer
-from tolalloc.study.finished_run import read_run
 from typer.testing import CliRunner
 
 import tolalloc as ta
@@ -17,8 +15,9 @@ from tests.verification.test_own_words import ROWS, summed
 from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError
-from tolalloc.reports.currency import in_currency
+from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.feature_frame import FeatureFrame, Frames
+from tolalloc.reports.finished_run import read_run
 from tolalloc.reports.header import Header
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.study import run
@@ -81,13 +80,16 @@ def test_a_drawing_goes_on_in_its_currency(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_two_runs_are_compared_in_their_currency_or_told_apart(folder):
-    same = read_run(folder)
-    other = replace(same, manifest={**same.manifest, "currency": "USD"})
-    assert " EUR." in "".join(ComparisonAnswer.of(same, same).told)
-    assert "The costs of A are in EUR and those of B in USD; they cannot be compared." in (
-        ComparisonAnswer.of(same, other).warned
-    )
+def test_two_runs_are_compared_in_their_currency_or_told_apart(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "other")
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    (tmp_path / "other" / "manifest.json").write_text(json.dumps({**manifest, "currency": "USD"}), encoding="utf-8")
+    alike = ta.compare(folder, folder)
+    assert " EUR." in "".join(alike.sentences)
+    assert "cost [EUR]" in set(alike.tables["answers"]["quantity"])
+    assert "cost [cost units]" in {row["quantity"] for row in alike.summary["answers"]}
+    apart = "The costs of A are in EUR and those of B in USD; they cannot be compared."
+    assert apart in ta.compare(folder, tmp_path / "other").warnings
 
 
 def test_two_currencies_are_refused(tmp_path):
@@ -133,6 +135,7 @@ def test_prices_of_a_shop_are_fitted_in_their_currency(tmp_path):
 
 def test_a_frame_stays_a_frame_in_a_currency():
     frames = Frames([FeatureFrame("position", "⌀0.0047", ("A",))])
-    found = in_currency(pd.DataFrame({"cost [cost units]": [1.0], "write [mm]": [frames]}), "EUR")
+    columns = (Column(header="cost [{cost}]", value=lambda _: 1.0), Column(header="write [mm]", value=lambda _: frames))
+    found = Table(name="frames", columns=columns, rows=[0]).frame("EUR")
     assert list(found.columns) == ["cost [EUR]", "write [mm]"]
     assert str(found["write [mm]"][0]) == "⌖ ⌀0.0047 A"

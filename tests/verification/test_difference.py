@@ -45,11 +45,11 @@ def true_change() -> tuple[float, float]:
 def test_a_linear_models_change_lies_in_the_intervals():
     found = fit().ask(ta.Difference(zones={"hous*": 20.0}, units=8192))
     share, quantile = true_change()
-    assert found.yield_change.low < share < found.yield_change.high
-    assert found.quantile_changes[0].low < quantile < found.quantile_changes[0].high
-    assert found.cost_change == pytest.approx(2.0)  # 1/zone: twice the cost of 2
-    assert found.whole_cost == 4.0
-    assert list(found.zones["source"]) == ["housing"]
+    assert found.result.yield_change.low < share < found.result.yield_change.high
+    assert found.result.quantile_changes[0].low < quantile < found.result.quantile_changes[0].high
+    assert found.result.cost_change == pytest.approx(2.0)  # 1/zone: twice the cost of 2
+    assert found.result.whole_cost == 4.0
+    assert list(found.tables["changed zones"]["source"]) == ["housing"]
     assert found.warnings == ()
 
 
@@ -57,19 +57,19 @@ def test_two_limits_have_a_quantile_each():
     limit = ta.Limit(lower=0.085, upper=0.115, show=ta.AtYield(target=0.96))
     found = replace(fit(), limits={"gap [mm]": limit}).ask(ta.Difference(zones={"hous*": 20.0}, units=8192))
     narrower = norm.ppf(0.98) * (np.hypot(0.01, 0.02) - np.hypot(0.02, 0.02)) / 3
-    above, below = found.quantile_changes  # 2 % of the units beyond either
+    above, below = found.result.quantile_changes  # 2 % of the units beyond either
     assert above.low < narrower < above.high < 0.0
     assert 0.0 < below.low < -narrower < below.high
-    assert list(found.changes["what"])[2:] == ["98% of gap", "2% of gap"]
+    assert list(found.tables["changes"]["what"])[2:] == ["98% of gap", "2% of gap"]
     assert "the 98% quantile of the gap by -" in found.sentences[1]
     assert "and the 2% quantile of the gap by +" in found.sentences[1]
 
 
 def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
     same = fit().ask(ta.Difference(zones={"housing": 40.0}))
-    assert same.yield_change.estimate == 0.0
-    assert (same.quantile_changes[0].low, same.quantile_changes[0].high) == (0.0, 0.0)
-    little = fit().ask(ta.Difference(zones={"housing": 39.0}, units=8192)).quantile_changes[0]
+    assert same.result.yield_change.estimate == 0.0
+    assert (same.result.quantile_changes[0].low, same.result.quantile_changes[0].high) == (0.0, 0.0)
+    little = fit().ask(ta.Difference(zones={"housing": 39.0}, units=8192)).result.quantile_changes[0]
     # Two runs of 8,192 units differ by √2 standard errors of either: some 0.3 µm where the change is 0.2 µm.
     spread = np.sqrt(2) * np.sqrt(0.98 * 0.02 / 8192) / norm.pdf(norm.ppf(0.98)) * np.hypot(0.02, 0.02) / 3
     assert little.high - little.low < 0.5 * 2 * 1.96 * spread
@@ -93,8 +93,8 @@ def test_units_are_in_memory_some_at_a_time_and_the_same_ones(monkeypatch):
     whole = fit().ask(ta.Difference(zones={"housing": 20.0}, units=5000))
     monkeypatch.setattr("tolalloc.allocation.difference._CHUNKS_AT_ONCE", 2)
     parts = fit().ask(ta.Difference(zones={"housing": 20.0}, units=5000))
-    np.testing.assert_array_equal(whole.values, parts.values)
-    assert whole.quantile_changes == parts.quantile_changes
+    np.testing.assert_array_equal(whole.result.values, parts.result.values)
+    assert whole.result.quantile_changes == parts.result.quantile_changes
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_a_process_prices_the_zone_that_it_holds():
     costs = {"housing": [("turned", 1.0, 0.02, 0.01, 0.1), ("ground", 3.0, 0.02, 0.002, 0.02)]}
     study = fit(costs=costs)
     ground = study.ask(ta.Difference(zones={"housing": 10.0}))  # ± 0.005 mm
-    assert ground.after[0].cost == pytest.approx(3.0 + 0.02 / 0.005)
+    assert ground.result.after[0].cost == pytest.approx(3.0 + 0.02 / 0.005)
     with pytest.raises(InputError, match=r"housing is '1 µm'; allowed is 5 to 100 µm, what its processes hold"):
         study.ask(ta.Difference(zones={"housing": 1.0}))
 

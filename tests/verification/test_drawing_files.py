@@ -51,25 +51,30 @@ def study(**changed) -> ta.Study:
 
 
 @pytest.fixture(scope="module")
-def answer():
+def told():
     return study().allocate()
 
 
 @pytest.fixture(scope="module")
-def folder(answer, tmp_path_factory):
+def answer(told):
+    return told.result
+
+
+@pytest.fixture(scope="module")
+def folder(told, tmp_path_factory):
     found = tmp_path_factory.mktemp("drawn")
-    answer.add_files(found)
+    told.add_files(found)
     return found
 
 
-def test_the_rows_add_up_to_the_cost_of_the_drawing(answer, folder):
+def test_the_rows_add_up_to_the_cost_of_the_drawing(told, answer, folder):
     assert answer.met
     assert any("ground" in own.process for own in answer.drawn_sources)
     rows = list(csv.DictReader((folder / "allocation.csv").read_text(encoding="utf-8").splitlines()))
     stated = [float(row["cost [cost units]"]) for row in rows if row["cost [cost units]"]]
     assert sum(stated) == pytest.approx(answer.cost, rel=1e-6)
-    assert answer.dimensions_table["cost [cost units]"].sum() == pytest.approx(answer.cost)
-    assert answer.drawing_table["cost [cost units]"].sum() == pytest.approx(answer.cost)
+    assert told.tables["dimensions"]["cost [cost units]"].sum() == pytest.approx(answer.cost)
+    assert told.tables["drawing"]["cost [cost units]"].sum() == pytest.approx(answer.cost)
     book = load_workbook(folder / "drawing.xlsx", data_only=True)
     heads = [cell.value for cell in book["tolerances"][1]]
     column = heads.index("cost [cost units]")
@@ -112,8 +117,8 @@ def test_a_setting_of_a_table_that_is_not_allowed_is_one_sentence(folder, tmp_pa
     assert said in str(caught.value)
 
 
-def test_sensitivities_have_their_sign_and_the_other_slope_its_own_name(answer):
-    table = answer.drawing_table.set_index("source")
+def test_sensitivities_have_their_sign_and_the_other_slope_its_own_name(told):
+    table = told.tables["drawing"].set_index("source")
     sens = table["Sens [mm/µm]"]
     assert sens.to_dict() == pytest.approx({"a": 1e-3, "b": -1e-3, "c": 2e-3, "d": 2e-3}, rel=1e-2)
     assert (table["kept value per zone [mm/µm]"].abs() < 0.5 * sens.abs()).all()

@@ -48,8 +48,8 @@ def test_they_stand_beside_the_source_in_every_answer_and_in_the_next_table(tmp_
     ranking = asked.rank().to_frame().set_index("source")
     assert ranking.loc["a", "own id"] == "4711-12"
     allocation = asked.allocate()
-    assert allocation.drawing_table.set_index("source").loc["b", "own id"] == "4711-13"
-    assert allocation.dimensions_table.set_index("dimension").loc["sleeves", "own id"] == "4711-12, 4711-13"
+    assert allocation.tables["drawing"].set_index("source").loc["b", "own id"] == "4711-13"
+    assert allocation.tables["dimensions"].set_index("dimension").loc["sleeves", "own id"] == "4711-12, 4711-13"
     allocation.save(tmp_path / "found")
     again = load_tolerance_table(tmp_path / "found" / "allocation.csv")
     assert [own.own_id for own in again] == ["4711-12", "4711-13", ""]
@@ -61,8 +61,8 @@ def test_they_stand_for_the_source_where_files_and_commands_name_one(tmp_path):
     drawing = ta.drawing(written(tmp_path))
     for asked in ("4711-12", "4711-*"):
         changed = study(drawing).ask(ta.Difference(zones={asked: 10.0}))
-        assert {own.name: round(own.zone * 1e6, 6) for own in changed.after}["a"] == 10.0
-        assert changed.zones.set_index("source").loc["a", "own id"] == "4711-12"
+        assert {own.name: round(own.zone * 1e6, 6) for own in changed.result.after}["a"] == 10.0
+        assert changed.tables["changed zones"].set_index("source").loc["a", "own id"] == "4711-12"
     (tmp_path / "pairs.csv").write_text("sources,correlation\n4711-12 4711-13,0.5\n", encoding="utf-8")
     pair = load_correlations(tmp_path / "pairs.csv", drawing.sources).pairs[0]
     assert (pair.one, pair.other) == ("a", "b")
@@ -72,7 +72,7 @@ def test_they_stand_for_the_source_where_files_and_commands_name_one(tmp_path):
         "sources,process,model,fixed,factor,min,max,note\n4711-1?,turned,reciprocal,0.5,40,5,200,x\n", encoding="utf-8"
     )
     priced = study(ta.drawing(tmp_path / "zones.csv", costs=tmp_path / "made.csv")).allocate()
-    assert set(priced.drawing_table.set_index("source").loc[["a", "b"], "process"]) == {"turned"}
+    assert set(priced.tables["drawing"].set_index("source").loc[["a", "b"], "process"]) == {"turned"}
 
 
 @pytest.mark.parametrize(

@@ -38,14 +38,14 @@ def answers():
 
 def test_label_and_drawing_stand_beside_the_id(answers):
     ranking, allocation = answers
-    for frame in (ranking.to_frame(), allocation.drawing_table):
+    for frame in (ranking.to_frame(), allocation.tables["drawing"]):
         found = frame.set_index("source")
         at = list(frame.columns).index("source")
         assert list(frame.columns[at : at + 3]) == ["source", "drawing", "label"]
         assert found.loc["a", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
         assert found.loc["b", ["drawing", "label"]].tolist() == ["4711-B", ""]
         assert found.loc["c", ["drawing", "label"]].tolist() == ["", ""]
-    dimensions = allocation.dimensions_table.set_index("dimension")
+    dimensions = allocation.tables["dimensions"].set_index("dimension")
     assert dimensions.loc["sleeves", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
 
 
