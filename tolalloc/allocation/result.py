@@ -11,14 +11,12 @@ import numpy as np
 from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
 from tolalloc.allocation.front.pareto_front import Fronts
-from tolalloc.allocation.front.robustness import Robustness
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
-from tolalloc.allocation.space.constraint import OneSidedConstraint
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.problem import Solution
+from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.drawing import Drawing

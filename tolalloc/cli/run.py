@@ -14,7 +14,6 @@ from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
 
 if TYPE_CHECKING:
-    from tolalloc.reports.answer import Answer as Told
     from tolalloc.running.chunks import Mapper
     from tolalloc.study.answer import Answer
     from tolalloc.study.study import Study
@@ -201,7 +200,7 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     return workers_at(scheduler)
 
 
-def _show(answer: Answer[Any] | Told) -> None:
+def _show(answer: Answer[Any]) -> None:
     """Print the first table of an answer, its sentences and its warnings."""
     tables = []
     if answer.tables:

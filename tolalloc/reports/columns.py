@@ -30,7 +30,8 @@ class Column(Generic[Row]):
     key
         Name in a summary, where a program reads it; the header unless given, None where no program needs it.
     terminal
-        Place among the columns that a terminal shows, those of one place in their order; 0 if it shows it not.
+        Place among the columns that a terminal shows, those of one place in their order; 0 if it does not
+        show it [-].
     nothing
         Cell that says nothing: where all cells are so or empty, the column is left out; None to keep it always.
     """

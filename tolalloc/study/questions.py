@@ -17,7 +17,6 @@ from tolalloc.study.answer import Answer
 from tolalloc.study.prepared import Prepared
 
 if TYPE_CHECKING:
-    from tolalloc.reports.answer import Answer as Told
     from tolalloc.reports.document import Document
     from tolalloc.running.progress import RunRecord
     from tolalloc.sensitivity.result import RankingResult
@@ -44,7 +43,7 @@ class Question(NamedFields, ABC):
         cls.called = f"question {getattr(cls, 'kind', cls.__name__)}"
 
     @abstractmethod
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
         """Return the answer.
 
         Parameters
@@ -108,7 +107,7 @@ class Difference(Question):
     zones: Annotated[Mapping[str, float], mapped(_ZONES, Rule("a number", is_number))]
     units: Annotated[int, whole("a whole number from 100 to 10,000,000", 100, 10_000_000)] = 1024
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:  # noqa: ARG002
         """Return both drawings on the same units."""
         from tolalloc.allocation.difference import difference
 
@@ -160,7 +159,7 @@ class Allocation(Question):
     unit_price: Annotated[UnitPrice | None, or_none(a(UnitPrice, "UnitPrice(...) or None"))] = None
     quality_loss: Annotated[QualityLoss | None, or_none(a(QualityLoss, "QualityLoss(...) or None"))] = None
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
         """Return the cheapest drawing."""
         from tolalloc.allocation.drawing_question import DrawingQuestion, allocate_drawing
 
@@ -201,7 +200,7 @@ class Calculation(Question):
 
     build: Callable[[bool], Document]
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any] | Told:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:  # noqa: ARG002
         """Return what the function made."""
         study = prepared.study
         with record.stage(study.name):

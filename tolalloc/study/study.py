@@ -22,7 +22,6 @@ from tolalloc.study.questions import Allocation, Calculation, Question, Ranking,
 
 if TYPE_CHECKING:
     from tolalloc.allocation.result import AllocationResult
-    from tolalloc.reports.answer import Answer as Told
     from tolalloc.sensitivity.result import RankingResult
 
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
@@ -46,7 +45,7 @@ class Run:
         The one report.
     """
 
-    answers: dict[str, Answer[Any] | Told]
+    answers: dict[str, Answer[Any]]
     folder: Path | None
     document: Document
 
@@ -54,7 +53,7 @@ class Run:
         """Return what was answered and where it stands."""
         return f"<run of {', '.join(self.answers)}: {self.folder or 'nothing written'}>"
 
-    def __getitem__(self, kind: str) -> Answer[Any] | Told:
+    def __getitem__(self, kind: str) -> Answer[Any]:
         return self.answers[kind]
 
     def _repr_html_(self) -> str:
@@ -153,7 +152,7 @@ class Study(Problem):
         effort: Literal["quick", "full"] | Effort | None = None,
         progress: Progress | None = None,
         checkpoint: Path | None = None,
-    ) -> Answer[Any] | Told:
+    ) -> Answer[Any]:
         """Return the answer to one question, of this study or any other.
 
         Parameters
@@ -261,7 +260,7 @@ def kept_beside(folder: Path) -> ResultCache:
     return ResultCache(folder=folder.absolute().parent / ".tolalloc-units")
 
 
-def _document(prepared: Prepared, answers: dict[str, Answer[Any] | Told]) -> Document:
+def _document(prepared: Prepared, answers: dict[str, Answer[Any]]) -> Document:
     """Return the one report: the answer itself where there is one, all of them under their study otherwise."""
     study, first = prepared.study, next(iter(answers.values()))
     known: dict[str, Any] = {

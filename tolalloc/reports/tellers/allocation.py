@@ -23,9 +23,9 @@ from tolalloc.reports.tellers.allocation_drawing import (
     write_drawing,
     zones_figure,
 )
+from tolalloc.reports.tellers.ranking_tables import sobol_table
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import short
-from tolalloc.sensitivity.driver_tables import sobol_table
 
 _say = Sentences("allocation")
 

@@ -7,7 +7,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.front.pareto_front import Fronts
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import SettingTrade
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolalloc.allocation.front.robustness import COST_CHANGE, SAME
+from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
 from tolalloc.allocation.result import AllocationResult, limit_price, unit_quantile
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation

@@ -7,11 +7,10 @@ import pandas as pd
 
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.front.pareto_front import Front, Fronts
-from tolalloc.allocation.front.robustness import Robustness
-from tolalloc.allocation.front.trade import SettingTrade
+from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
 from tolalloc.allocation.search.candidates import GRADES
-from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import Check
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import MICROMETRE, unit_of

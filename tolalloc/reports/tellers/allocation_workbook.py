@@ -23,7 +23,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.space.constraint import OneSidedConstraint
+from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
 from tolalloc.reports.feature_frame import FeatureFrame, callout
