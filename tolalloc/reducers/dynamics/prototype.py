@@ -96,6 +96,13 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
     ------
     InputError
         Another column.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = part_errors(load_reducer("rv40e_xi2015"), {"carrier.assembly.x": 4e-6, "pin.diameter": 1e-6})
+    >>> found.carrier.tolist(), float(found.pin_radius[0])
+    ([4e-06, 0.0], 1e-06)
     """
     cranks, discs, pins = reducer.crank_count, reducer.disc_count, reducer.cycloid_stage.pin_count
     found = PartErrors(
@@ -140,6 +147,16 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
     ------
     InputError
         A rotation modification.
+
+    Examples
+    --------
+    xi2015 states a shift of 8 µm with a sign of its own: the circle at grinding is Rp − 8 µm.
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> reducer = load_reducer("rv40e_xi2015")
+    >>> mesh = mesh_of(reducer, part_errors(reducer, {}))
+    >>> round((mesh.circle - reducer.cycloid_stage.pin_circle_radius) / 1e-6, 3)  # [µm]
+    -8.0
     """
     stiffness, stage = reducer.stiffness, reducer.cycloid_stage
     if reducer.modification.rotation != 0.0:
@@ -307,7 +324,14 @@ def with_rigid_bearings(reducer: Reducer) -> Reducer:
 
 
 def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
-    """Return the centres of carrier, cranks and discs at the carrier angle 0 [m]."""
+    """Return the centres of carrier, cranks and discs at the carrier angle 0 [m].
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> reference_places(load_reducer("rv40e_xi2015")).round(6).tolist()[3:]  # discs, e = 1.3 mm off, opposite
+    [[0.0013, 0.0], [-0.0013, 0.0]]
+    """
     at = Positions(reducer, np.zeros(1))
     turns = [at.crank_position(crank)[0] for crank in range(reducer.crank_count)]
     turns += [at.disc_direction(disc)[0] for disc in range(reducer.disc_count)]
@@ -496,6 +520,12 @@ def simulate_prototype(
         The engine is not installed, or a design, damping or error that the prototype does not know.
     SolveError
         A time step without a solution.
+
+    Notes
+    -----
+    Rigid bodies in the plane with large rotations; pins push along the normal of the exact profile, by the reducer's
+    contact law. Generalised-α method of Chung and Hulbert (1993). The first stage is exact, so that the mean output
+    speed is the input's over the ratio: 6.4815 rpm at 525 rpm in an RV-40E.
     """
     engine()
     if damping.interfaces:

@@ -256,6 +256,25 @@ def simulate(
     ------
     InputError
         Damping of an interface that is not there or has play.
+
+    Notes
+    -----
+    Theory pages (61) to (63). Gaps are linear in the displacements, as in the static model; waves are drawn well with
+    20 steps or more.
+
+    Examples
+    --------
+    Under a constant load the drive needs T/i of the torque on the carrier, whatever the masses.
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> from tolalloc.reducers.dynamics.motion import SpeedProfile, inertia_of, motion_of, newmark
+    >>> reducer = load_reducer("rv40e_xi2015")
+    >>> rest = motion_of(reducer, SpeedProfile.constant(0.0), SpeedProfile.constant(-572.0), duration=1e-3, steps=2)
+    >>> model = EquivalentModel(reducer)
+    >>> exact = np.zeros((1, len(model.columns)))
+    >>> found = simulate(model, exact, rest, inertia_of(reducer), Damping(), newmark())
+    >>> round(float(found.input_torque[0, -1]), 3)  # 572/81 [N·m]
+    7.062
     """
     steps = Steps(model=model, motion=motion, inertia=inertia, damping=damping, integrator=integrator)
     columns, coordinates, samples = model.error_columns, steps.coordinates, errors.shape[0]

@@ -93,6 +93,21 @@ def modes(
         Play, tilted discs or the logarithmic contact law: their stiffness changes with the least vibration.
     SolveError
         An angle without a static equilibrium.
+
+    Notes
+    -----
+    Theory page (64).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> from tolalloc.reducers.dynamics.motion import inertia_of
+    >>> from tolalloc.reducers.reducer.unit_file import load_unit
+    >>> reducer = load_reducer("rv40e_xi2015")
+    >>> model = EquivalentModel(reducer)
+    >>> errors = load_unit("exact").errors(model.columns, reducer.modification.deviations)[0]
+    >>> round(float(modes(model, errors, -572.0, inertia_of(reducer), np.zeros(1)).frequency[0, 0]))  # [Hz]
+    4461
     """
     _check_linear(model, errors)
     at = Positions(model.reducer, carrier_angle, model.orders)
@@ -135,6 +150,13 @@ def critical_speeds(
     ------
     InputError
         An order below 1.
+
+    Examples
+    --------
+    >>> one = np.array([[100.0]])
+    >>> found = Modes(carrier_angle=np.zeros(1), frequency=one, shape=one[np.newaxis], carrier_share=one)
+    >>> round(critical_speeds(found, (40,), (0.0, 100.0))[0].slowest, 3)  # 2π·100 Hz/40 [rad/s]
+    15.708
     """
     if min(orders, default=1) < 1:
         raise InputError.at("speeds", "orders", orders, "1 or more waves per output turn")
