@@ -201,8 +201,8 @@ def residual_gap(
     -----
     li2018's formulas are lost, and its "difference of two curves", taken literally, is least without any shift; this
     is a well-posed reading [A]: least mean gap (`tolalloc.reducers.cycloid.clearance.formula_gap`) with a radial
-    clearance of j or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`. Gaps are the linear formula's,
-    good for amounts up to 50 µm.
+    clearance of j or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`. Gaps are the linear
+    formula's, good for amounts up to 50 µm.
 
     Examples
     --------

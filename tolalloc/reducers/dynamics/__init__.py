@@ -1,1 +1,1 @@
-"""The equivalent model in time: masses and damping beside its springs, driven through a speed and a torque profile."""
+"""The reducer in time: the equivalent model with masses and damping beside its springs, and the virtual prototype."""
