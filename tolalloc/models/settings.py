@@ -51,7 +51,7 @@ class Setting(NamedFields):
         return self.lower - _ROUNDING <= value <= self.upper + _ROUNDING
 
     @property
-    def strays(self) -> bool:
+    def out_of_bounds(self) -> bool:
         """Whether the setting as it is today lies outside what may be chosen."""
         return not self.allows(self.value)
 
@@ -60,7 +60,7 @@ class Setting(NamedFields):
         """How it is today, and what it may become."""
         name, _, unit = self.name.rstrip("]").partition(" [")
         present, allowed = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
-        if self.strays:
+        if self.out_of_bounds:
             return f"{present} today, not among the {allowed} that it may become; only the table as it is may keep it"
         return f"{present}; {f'may become {allowed}' if self.lower < self.upper else 'locked'}"
 

@@ -171,16 +171,15 @@ def _cheapest(
     """Return the least cost at given settings, and what the model last missed there [unit of the output]."""
     space, chosen, (first, *others) = response.space, allocation.chosen, allocation.asked_stacks
     model, missed, cost, error = chosen.constraints[0], 0.0, np.nan, np.inf
-    processes = space.process_positions(chosen.design)
+    processes, held = space.process_positions(chosen.design), replace(space.shared, lower=settings, upper=settings)
     for number in range(_CORRECTIONS):
         corrected = (replace(first, budget=first.budget - missed), *others)
         if number % _CHOSEN_AGAIN == 0 and space.has_choices:
-            held = replace(space.shared, lower=settings, upper=settings)
             processes = process_choice.allocate(replace(space.problem(corrected), shared=held)).processes
-        program, bounds = programs.of(processes), {"shared_lower": settings, "shared_upper": settings}
-        solution = program.solve(corrected, **bounds)
+        program = programs.of(processes)
+        solution = program.solve(corrected, shared=held)
         # Where the model lets nothing keep the limits, it may still be the model that is wrong.
-        found = solution or program.least_infeasible(corrected, **bounds)
+        found = solution or program.least_infeasible(corrected, shared=held)
         design = np.concatenate([found.zones, found.shared])
         answered = response(design[np.newaxis])
         if not answered.good[0]:

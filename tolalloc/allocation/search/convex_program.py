@@ -112,8 +112,7 @@ class ConvexProgram:
         stacks: Sequence[Stack],
         lower: Float[np.ndarray, " feature"] | None = None,
         upper: Float[np.ndarray, " feature"] | None = None,
-        shared_lower: Float[np.ndarray, " shared"] | None = None,
-        shared_upper: Float[np.ndarray, " shared"] | None = None,
+        shared: Shared | None = None,
     ) -> Solution | None:
         """Return the cheapest design within the bounds, or None where no design keeps all stacks.
 
@@ -123,15 +122,15 @@ class ConvexProgram:
             What must be kept.
         lower, upper
             Bounds of the zones, inside those of the processes unless they are given [unit of the zone].
-        shared_lower, shared_upper
-            Bounds of the shared variables.
+        shared
+            The shared variables with other bounds.
 
         Raises
         ------
         SolveError
             The solver ended neither with a design nor with the proof that there is none.
         """
-        problem = self._restricted(stacks, lower, upper, shared_lower, shared_upper)
+        problem = self._restricted(stacks, lower, upper, shared)
         if not least_infeasible(problem).feasible:
             return None
         units, scales, made = self._units, problem.scales, [feature.processes[0] for feature in problem.features]
@@ -160,11 +159,10 @@ class ConvexProgram:
         stacks: Sequence[Stack],
         lower: Float[np.ndarray, " feature"] | None = None,
         upper: Float[np.ndarray, " feature"] | None = None,
-        shared_lower: Float[np.ndarray, " shared"] | None = None,
-        shared_upper: Float[np.ndarray, " shared"] | None = None,
+        shared: Shared | None = None,
     ) -> LeastInfeasible:
         """Return the design with the smallest largest violation; the arguments are those of `solve`."""
-        found = least_infeasible(self._restricted(stacks, lower, upper, shared_lower, shared_upper))
+        found = least_infeasible(self._restricted(stacks, lower, upper, shared))
         return replace(found, processes=self.processes)
 
     def _restricted(
@@ -172,8 +170,7 @@ class ConvexProgram:
         stacks: Sequence[Stack],
         lower: Float[np.ndarray, " feature"] | None,
         upper: Float[np.ndarray, " feature"] | None,
-        shared_lower: Float[np.ndarray, " shared"] | None,
-        shared_upper: Float[np.ndarray, " shared"] | None,
+        shared: Shared | None,
     ) -> AllocationProblem:
         """Return the allocation whose only processes are the chosen ones, within the bounds."""
         low = self.lower if lower is None else np.maximum(lower, self.lower)
@@ -182,12 +179,7 @@ class ConvexProgram:
             replace(feature, processes=(replace(made, minimum=float(least), maximum=float(most)),))
             for feature, made, least, most in zip(self.features, self._made, low, high, strict=True)
         )
-        shared = replace(
-            self.shared,
-            lower=self.shared.lower if shared_lower is None else shared_lower,
-            upper=self.shared.upper if shared_upper is None else shared_upper,
-        )
-        return AllocationProblem(features=features, stacks=tuple(stacks), shared=shared)
+        return AllocationProblem(features=features, stacks=tuple(stacks), shared=shared or self.shared)
 
     def _run(self) -> None:
         """Solve the compiled program, less precisely where it must be; how precisely shows in the gap."""

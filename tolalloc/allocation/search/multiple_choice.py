@@ -209,7 +209,8 @@ class ChoiceRows:
         """Limits moved outwards."""
         return np.asarray(self.limits + RELAXED * np.maximum(np.abs(self.limits), 1.0))
 
-    def _add(self, row: Float[np.ndarray, " choice"], limit: float) -> None:
+    def add(self, row: Float[np.ndarray, " choice"], limit: float) -> None:
+        """Add a row with its limit."""
         self._rows.append(row)
         self._limits.append(limit)
 
@@ -219,13 +220,13 @@ class ChoiceRows:
         worst_case, squares, budget = program.worst_case[stack], program.squares[stack], program.budget[stack]
         worst_case_groups = np.unique(program.group[worst_case != 0])
         if not squares.any():
-            self._add(worst_case, float(budget))
+            self.add(worst_case, float(budget))
         elif worst_case_groups.size == 0:
-            self._add(squares, float(budget**2))
+            self.add(squares, float(budget**2))
         elif worst_case_groups.size == 1:
             own = program.group == worst_case_groups[0]
             largest = np.max((budget - worst_case[own]) ** 2) or 1.0  # the row is of order one, like all others
-            self._add((squares - np.where(own, (budget - worst_case) ** 2, 0.0)) / largest, 0.0)
+            self.add((squares - np.where(own, (budget - worst_case) ** 2, 0.0)) / largest, 0.0)
         else:
             return False
         return True
@@ -238,7 +239,7 @@ class ChoiceRows:
             vector = np.add.reduceat(roots * values, program.starts)
             length = float(np.linalg.norm(vector))
             if length and worst_case @ values + length > budget + allowed:
-                self._add(worst_case + (vector / length)[program.group] * roots, float(budget))
+                self.add(worst_case + (vector / length)[program.group] * roots, float(budget))
         return len(self._rows) > before
 
     def add_covers(self, taken: Int[np.ndarray, " group"]) -> None:
@@ -249,18 +250,14 @@ class ChoiceRows:
             own = taken[program.group]
             cover = ((worst_case >= worst_case[own]) & (squares >= squares[own])).astype(float)
             free = np.minimum.reduceat(cover, program.starts) > 0  # whatever such a group takes, the stack is broken
-            self._add(np.where(free[program.group], 0.0, cover), float(np.count_nonzero(~free)) - 1.0)
+            self.add(np.where(free[program.group], 0.0, cover), float(np.count_nonzero(~free)) - 1.0)
 
     def exclude(self, taken: Int[np.ndarray, " group"]) -> None:
         """Add all rows that a choice breaks."""
         self.add_covers(taken)
         self.add_tangents((taken[self.program.group] == np.arange(self.cost.size)).astype(float), ROUNDING)
 
-    def add_chord(self, stack: int, start: float, end: float) -> None:
-        """Add the chord of a stack's root sum of squares between two of its values [-]."""
-        self._add(*self._chord(stack, start, end))
-
-    def _chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
+    def chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
         """Return the row of a stack with the chord of its root between two values."""
         slope = 1.0 / (start + end)
         row = self.program.worst_case[stack] + slope * self.program.squares[stack]
@@ -269,7 +266,7 @@ class ChoiceRows:
     def add_sections(self, stack: int, ends: Float[np.ndarray, " end"]) -> None:
         """Add a group whose choice says between which ends a stack's root sum of squares lies, and the chords there."""
         program, sections = self.program, ends.size - 1
-        chords = [self._chord(stack, *pair) for pair in pairwise(ends.tolist())]
+        chords = [self.chord(stack, *pair) for pair in pairwise(ends.tolist())]
         none, nothing = np.zeros(sections), np.zeros((program.budget.size, sections))
         larger = replace(
             program,
@@ -280,13 +277,13 @@ class ChoiceRows:
         )
         self._set_up(larger)
         self._rows = [np.append(row, none) for row in self._rows]
-        self._add(np.append(program.squares[stack], -(ends[1:] ** 2)), 0.0)
-        self._add(np.append(-program.squares[stack], ends[:-1] ** 2), 0.0)
+        self.add(np.append(program.squares[stack], -(ends[1:] ** 2)), 0.0)
+        self.add(np.append(-program.squares[stack], ends[:-1] ** 2), 0.0)
         for at, (row, limit) in enumerate(chords):
             # Beside its section a chord may lie above the root by as much as it does at the ends of the range.
             slope = 1.0 / (ends[at] + ends[at + 1])
             above = float(np.max((ends[[0, -1]] - ends[at]) * (slope * (ends[[0, -1]] + ends[at]) - 1.0)))
-            self._add(np.append(row, np.where(np.arange(sections) == at, above, 0.0)), limit + above)
+            self.add(np.append(row, np.where(np.arange(sections) == at, above, 0.0)), limit + above)
 
 
 _SLACK = 1e-6
@@ -412,7 +409,7 @@ class _ChoiceSearch:
             first = self._range(stack, kept)
             if first is None:
                 continue
-            self.rows.add_chord(stack, *first)
+            self.rows.add(*self.rows.chord(stack, *first))
             second = self._range(stack, kept) or first
             self.rows.add_sections(stack, np.linspace(*second, _SECTIONS + 1))
             kept = np.append(kept, np.ones(_SECTIONS, dtype=bool))

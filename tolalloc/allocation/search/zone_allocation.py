@@ -83,21 +83,15 @@ class Programs:
         """
         program, groups, shared = self.of(processes), len(self.space.groups), self.space.shared
         low, high = (np.clip(around[:groups] * by, program.lower, program.upper) for by in (1 / reach, reach))
-        bounds = (low, high, *_reached(around[groups:], reach, shared.lower, shared.upper))
-        found = program.solve(stacks, *bounds) or program.least_infeasible(stacks, *bounds)
+        centre = np.clip(around[groups:], shared.lower, shared.upper)
+        size = np.maximum(np.abs(centre), 1.0)  # near zero the reach is that of 1 µm
+        near = replace(
+            shared,
+            lower=np.maximum(shared.lower, centre - size * (1 - 1 / reach)),
+            upper=np.minimum(shared.upper, centre + size * (reach - 1)),
+        )
+        found = program.solve(stacks, low, high, near) or program.least_infeasible(stacks, low, high, near)
         return np.concatenate([found.zones, found.shared])
-
-
-def _reached(
-    around: Float[np.ndarray, " shared"],
-    reach: float,
-    lower: Float[np.ndarray, " shared"],
-    upper: Float[np.ndarray, " shared"],
-) -> tuple[Float[np.ndarray, " shared"], Float[np.ndarray, " shared"]]:
-    """Return the bounds within reach of clearances; near zero the reach is that of 1 µm [µm]."""
-    centre = np.clip(around, lower, upper)
-    size = np.maximum(np.abs(centre), 1.0)
-    return np.maximum(lower, centre - size * (1 - 1 / reach)), np.minimum(upper, centre + size * (reach - 1))
 
 
 _LEAST_RISE = 1e-6
@@ -128,7 +122,7 @@ def _factor(tried: VerifiedDesign) -> float:
     """Return the common factor of all scales that takes a design to its limits [-]."""
     factors = []
     for constraint in tried.constraints:
-        rise = constraint.load_of_zones(tried.design)
+        rise = float(constraint.stack.load(tried.scales, np.zeros(tried.settings.size)))
         budget = -float(constraint.predicted(tried.design)) - constraint.standard_error
         factors.append(1 + budget / max(rise, _LEAST_RISE * constraint.scale))
     return float(np.clip(min(factors), 0.4, 2.5))

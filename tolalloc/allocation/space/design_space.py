@@ -98,7 +98,7 @@ class DesignSpace:
     @property
     def holds_present_settings(self) -> bool:
         """Whether every setting as it is today lies between what it may be."""
-        return not any(setting.strays for setting in self.settings)
+        return not any(setting.out_of_bounds for setting in self.settings)
 
     @property
     def setting_steps(self) -> Float[np.ndarray, " setting"]:

@@ -176,14 +176,13 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
     locked = [source.name for source in sources if source.locked]
     if locked:
         raise InputError.at(place, "locked members", locked, "none")
-    if all(_has_grades(source) for source in sources) and len({size_step(source.nominal) for source in sources}) == 1:
+    graded = all(
+        source.feature is Feature.SIZE and source.nominal > 0 and source.name.rsplit(".", 1)[-1] not in RADII
+        for source in sources
+    )
+    if graded and len({size_step(source.nominal) for source in sources}) == 1:
         ladder = Ladder.grades(max(source.nominal for source in sources))
     else:
         ladder = Ladder.preferred()
     minimum, maximum = max(source.minimum for source in sources), min(source.maximum for source in sources)
     return ladder.within(minimum, maximum, place)
-
-
-def _has_grades(source: Source) -> bool:
-    """Return whether a source is a size that ISO 286 has grades for."""
-    return source.feature is Feature.SIZE and source.nominal > 0 and source.name.rsplit(".", 1)[-1] not in RADII

@@ -258,11 +258,6 @@ class OneSidedConstraint:
         """The same over the scale [-]."""
         return self.excess / self.scale
 
-    def load_of_zones(self, design: Float[np.ndarray, " variable"]) -> float:
-        """Return what the zones alone take of the model's budget [unit of the output]."""
-        groups = self.stack.worst_case.size
-        return float(self.stack.load(design[:groups], np.zeros(design.size - groups)))
-
     def predicted(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the excess that the model predicts, negative inside the limit [unit of the output]."""
         groups = self.stack.worst_case.size

@@ -310,7 +310,7 @@ class Session:
         """Return what a check says of the settings and the first random units, such as how many are preloaded."""
         model, known = self.model(design), self.prepared.model.settings
         chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
-        beyond = [f"{own.sentence}." for own in chosen if own.strays]
+        beyond = [f"{own.sentence}." for own in chosen if own.out_of_bounds]
         beyond += [sentence for own in self.sources(design) if (sentence := outside_range(own))]
         counted = model.examined(self.deviations(design, slice(0, FIRST)))
         return [*beyond, *portrait_of(model).examination(counted).sentences]
