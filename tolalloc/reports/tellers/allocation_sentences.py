@@ -281,7 +281,7 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
     if lost and result.free.chosen.met:
         what = result.model.uncertain[0].name.split(" (")[0]
         found.append(_say("uncertain", lost=lost, count=len(uncertain), what=what))
-    found += [f"{own.sentence}." for own in result.space.settings if own.strays]
+    found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
     found += portrait_of(result.model).cautions(chosen.settings)
     if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
         found.append(_say("surrogate"))
