@@ -23,12 +23,7 @@ from tolalloc.allocation.front.what_if import (
 )
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextCandidate
-from tolalloc.allocation.search.discrete import (
-    GradedAllocation,
-    allocate_grades,
-    group_options,
-    with_shared_zones,
-)
+from tolalloc.allocation.search.discrete import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import (
     ZoneAllocation,
     allocate,
@@ -306,6 +301,12 @@ def allocate_drawing(
         What cannot be asked.
     SolveError
         Too many units failed.
+
+    Notes
+    -----
+    The order in which a design lives: searches find and verify designs (`tolalloc.allocation.search`); the cheapest one
+    that an acceptance test passes is the drawing (`tolalloc.allocation.verify.acceptance.accept_cheapest`, which is
+    asked by `DrawingQuestion.accepted`); then what else can be had is asked around it (`tolalloc.allocation.front`).
     """
     question.require_answerable()
     kept = Checkpoint(path=checkpoint, every=4, question=digest) if checkpoint else None

@@ -91,12 +91,17 @@ class UnitPrice(NamedFields):
     scrap: Annotated[float, _COST] = 0.0
 
     def good_share(self, target: float) -> float:
-        """Return the share of good units after rework, for a yield before it [-].
+        """Return the share of good units after rework, y + (1 − y)·r of the yield y before it [-].
 
         Raises
         ------
         InputError
             A yield outside 0 to 1, or one that leaves no good unit.
+
+        Examples
+        --------
+        >>> UnitPrice(rework_share=0.5).good_share(0.9)
+        0.95
         """
         good = target + (1 - target) * self.rework_share
         if not (0 <= target <= 1 and good > 0):

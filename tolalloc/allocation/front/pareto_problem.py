@@ -208,7 +208,11 @@ class DesignProblem:
 def normalised(
     losses: Float[np.ndarray, "design objective"], front: Float[np.ndarray, "point objective"]
 ) -> Float[np.ndarray, "design objective"]:
-    """Return losses where 0 is the best and 1 the worst value on a front [-]."""
+    """Return losses where 0 is the best and 1 the worst value on a front, (loss − ideal)/(nadir − ideal) [-].
+
+    >>> normalised(np.array([[2.0, 3.0]]), np.array([[1.0, 5.0], [3.0, 1.0]]))
+    array([[0.5, 0.5]])
+    """
     ideal, nadir = front.min(axis=0), front.max(axis=0)
     return np.asarray((losses - ideal) / np.where(nadir > ideal, nadir - ideal, 1.0))
 

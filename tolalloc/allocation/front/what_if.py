@@ -25,8 +25,9 @@ class QuantileResponse:
 
     Notes
     -----
-    Mean + spread·σ of a few hundred shared units varies smoothly from design to design; the empirical quantile of
-    so few would not. The spread is calibrated on large samples, and every design that counts is verified on one.
+    mean + κ·σ of a few hundred units that all designs share varies smoothly from design to design; the empirical
+    quantile of so few would not. The spread κ is that of a verified design, (quantile − mean)/σ on its large sample,
+    and every design that counts is verified on one of its own.
     """
 
     space: DesignSpace  # The design variables
@@ -77,8 +78,9 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
     Notes
     -----
     The smallest limit that the verified units show kept at the other yield, with the same confidence, takes the place
-    of what was compared with the limit; at the yield asked for they are the same. What the zones spread is in
-    proportion to it, so the weights of the model are, too. Other requirements stay.
+    of what was compared with the limit; at the yield asked for they are the same. What the zones spread, s, is in
+    proportion to it, so the weights of the model are, too: all are multiplied by (s + shown − compared)/s. Other
+    requirements stay. It holds near the verified yield, where the shape of the output's tail does.
     """
     chosen, (first, *others) = allocation.chosen, allocation.asked_stacks
     shown = chosen.shown_at(target)
@@ -121,7 +123,10 @@ class SettingTrade:
         return np.array([own[place] for own, place in zip(self.values, at, strict=True)])
 
     def price(self, setting: int) -> Float[np.ndarray, "..."]:
-        """Return the cost of one more unit of a setting, below zero where it saves [cost units per unit]."""
+        """Return the cost of one more unit of a setting, below zero where it saves [cost units per unit].
+
+        Second-order differences over unevenly spaced values, one-sided at the ends; not numbers with one value alone.
+        """
         along = self.values[setting]
         if along.size < 2:
             return np.full(self.cost.shape, np.nan)

@@ -249,7 +249,7 @@ class LagrangeDual:
         return np.where(self._squared, squared, planar), by_plane
 
     def bound(self, priced: PricedProcesses, allowed: Bool[np.ndarray, " process"]) -> float:
-        """Return the lower bound on the cost of the allowed processes [cost units]."""
+        """Return the lower bound on the cost of the allowed processes, the sum of the least ones [cost units]."""
         least = np.minimum.reduceat(np.where(allowed, priced.least, np.inf), self.starts)
         return float(least.sum()) + priced.constant
 

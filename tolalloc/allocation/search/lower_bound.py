@@ -65,6 +65,11 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
     """Return the least cost of what keeps the weaker requirements, whatever chooses it [cost units].
 
     At most that of the design itself, which may keep them by more than its own cost tells.
+
+    Notes
+    -----
+    Theory page, equation (76): budgets load(design) − (q̲ − limit) + z·s. Half of the error of 5 % is that of the least
+    quantiles q̲, the other half, shared among all limits, that of what sixteen batches say of the derivatives (s).
     """
     stacks = tuple(stack for _, stack in _weaker(design))
     free = design.cost - design.space.locked_cost

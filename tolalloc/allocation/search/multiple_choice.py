@@ -91,7 +91,7 @@ class MultipleChoice:
         )
 
     def violation(self, taken: Int[np.ndarray, " group"]) -> Float[np.ndarray, " stack"]:
-        """Return by how much every stack exceeds its budget, over its scale [-]."""
+        """Return by how much every stack exceeds its budget, Σ worst_case + √Σ squares − budget, over its scale [-]."""
         spread = np.sqrt(self.squares[:, taken].sum(axis=1))
         return np.asarray(self.worst_case[:, taken].sum(axis=1) + spread - self.budget)
 
@@ -258,7 +258,10 @@ class ChoiceRows:
         self.add_tangents((taken[self.program.group] == np.arange(self.cost.size)).astype(float), ROUNDING)
 
     def chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
-        """Return the row of a stack with the chord of its root between two values."""
+        """Return the row and the limit of a stack with the chord of its root between two values [-].
+
+        √Q ≥ s + (Q − s²)/(s + e) for s² ≤ Q ≤ e², so Σ worst_case·z + Q/(s + e) ≤ budget − s + s²/(s + e).
+        """
         slope = 1.0 / (start + end)
         row = self.program.worst_case[stack] + slope * self.program.squares[stack]
         return row, float(self.program.budget[stack] - start + slope * start**2)

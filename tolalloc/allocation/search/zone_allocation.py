@@ -103,8 +103,9 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
 
     Notes
     -----
-    The scale follows the design's own gradient until a met design has next to nothing left to gain: what an
-    engineer does with a few Monte Carlo runs.
+    The next scale is 1 + left/rise times this one, with what is left of a limit, a standard error kept, and what all
+    zones together take of it, the tightest limit counting and at most a factor of 2.5, until a met design has next to
+    nothing left to gain.
     """
     space, scale = verifier.space, 1.0
     tried: list[VerifiedDesign] = []
@@ -231,7 +232,13 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
 
     Notes
     -----
-    Where the units of a step are further from the prediction than chance explains, the next step reaches less.
+    Where the units of a step are further from the prediction than chance explains, by more than two standard errors of
+    both, the next step reaches less: the square root of the factor, 1.25 at least.
+
+    References
+    ----------
+    A. R. Conn, N. I. M. Gould, Ph. L. Toint, Trust-Region Methods, SIAM (2000); K. Svanberg, The method of moving
+    asymptotes, Int. J. Numer. Meth. Eng. 24 (1987) 359–373, for convex models that are made anew at every design.
     """
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)

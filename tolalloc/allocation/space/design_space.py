@@ -66,7 +66,7 @@ class DesignSpace:
         )
 
     def by_scale(self, by_zone: Float[np.ndarray, "*units source"]) -> Float[np.ndarray, "*units group"]:
-        """Return derivatives by the scales from those by the zones [output/m → output]."""
+        """Return derivatives by the scales from those by the zones, ∂/∂scale = Σ zoneᵢ·∂/∂zoneᵢ [output/m → output]."""
         members = self.group_of_source[:, np.newaxis] == np.arange(len(self.groups))
         return np.asarray((by_zone * self.errors.zones) @ members)
 

@@ -56,6 +56,12 @@ class LimitedSample:
 
         Clopper–Pearson's bound (1934), the quantile of a beta distribution with parameters k + 1 and n − k for k of n
         units that leave the law; at one half the share of these units itself.
+
+        Examples
+        --------
+        >>> sample = LimitedSample.all_of(np.zeros(1000), Limits(upper=1.0))
+        >>> round(sample.most_leaving(0.95), 6)  # 1 − 0.05^(1/1000)
+        0.002991
         """
         from scipy.stats import beta
 
@@ -159,7 +165,10 @@ class DesignSample:
         return np.array(slopes)
 
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
-        """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m]."""
+        """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m].
+
+        Theory page, equation (23): a deviation is its zone times a standard value, so ∂y/∂zone = Σ ∂y/∂xᵢ·standardᵢ.
+        """
         return self._by_zone(self.exact[output])
 
     def _by_zone(self, found: SettingDerivatives) -> Float[np.ndarray, "good source"]:

@@ -247,6 +247,10 @@ class AcceptanceTest:
         ----------
         errors
             The same in standard errors of what both say: the next one has all units, this one may have been given up.
+
+        Notes
+        -----
+        errors·√(1 + n/N), with the n plain units of the tested design and the N of the next one: variances go as 1/n.
         """
         solved = tested.independent.units.drawn if tested.independent else Drawn(units=self.units, whatever=self.units)
         final = self.units if solved.whatever == solved.units else np.ceil(_WHATEVER * self.units)
