@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from tolalloc.allocation.space.requirement import RootSumSquare as RootSumSquare
     from tolalloc.allocation.space.requirement import WorstCase as WorstCase
     from tolalloc.cli.main import run_script as run_script
+    from tolalloc.cli.start import new as new
+    from tolalloc.cli.start import schema as schema
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
     from tolalloc.drawings.seeds import SamplingDesign as SamplingDesign
@@ -56,6 +58,9 @@ if TYPE_CHECKING:
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
     from tolalloc.study import numeric as numeric
+    from tolalloc.study.commands import check as check
+    from tolalloc.study.commands import series as series
+    from tolalloc.study.commands import whatif as whatif
     from tolalloc.study.problem import Effort as Effort
     from tolalloc.study.problem import Limit as Limit
     from tolalloc.study.questions import Allocation as Allocation
@@ -111,12 +116,17 @@ _WHERE = {
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
     "WorstCase": "allocation.space.requirement",
+    "check": "study.commands",
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "models.function_model",
     "model": ("models.function_model", "model"),
+    "new": "cli.start",
     "numeric": ("study.numeric", ""),
     "reducer": "reducers.choice",
     "run_script": "cli.main",
+    "schema": "cli.start",
+    "series": "study.commands",
+    "whatif": "study.commands",
 }
 """Public name → where it stands, with its name there if that is another one, empty for a whole module."""
 

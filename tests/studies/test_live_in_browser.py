@@ -12,7 +12,7 @@ import pytest
 import tolalloc as ta
 from tests.studies.command import ROOT
 from tests.studies.live_page import BROWSER, CONTRASTS, CUT, DRIVER, MOVE, STUDY, OpenStudy, browser, until, width
-from tolalloc.cli.study_script import load_study
+from tolalloc.study.script import load_study
 
 pytestmark = [
     pytest.mark.slow,

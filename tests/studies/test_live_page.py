@@ -21,10 +21,10 @@ from tests.studies.live_page import STUDY
 from tolalloc.cli.live.desk import Desk
 from tolalloc.cli.live.server import LARGEST, MOST_CONNECTIONS, Address, LiveServer
 from tolalloc.cli.live.session import LiveDesign, Session
-from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers import TORQUE
 from tolalloc.study.prepared import Prepared
+from tolalloc.study.script import load_study
 
 
 @pytest.fixture

@@ -120,3 +120,72 @@ def test_files_are_written_from_a_script_as_from_the_command(tmp_path):
     for ending in (".csv", ".reducer.toml"):
         made, typed = (next(tmp_path.glob(f"{stem}{ending}")).read_bytes() for stem in ("[dn]*", "typed"))
         assert made == typed
+
+
+OWN = """import tolalloc as ta
+
+row = {"plus": 0.02, "minus": -0.02, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
+study = ta.Study(
+    ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",)),
+    ta.Drawing.of_rows([{"id": "housing", "nominal": 30.1, **row}, {"id": "shaft", "nominal": 30.0, **row}]),
+    limits={"gap [mm]": ta.Limit(lower=0.07, upper=0.13)},
+    questions=[ta.Allocation(front=False, what_if=False)],
+    name="own",
+    effort="quick",
+)
+"""
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN, encoding="utf-8")
+    return path
+
+
+def typed(*words: object) -> Any:
+    """Return what a command prints for a program."""
+    done = tolalloc(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_check(script):
+    answer = ta.check(script)
+    assert _plain(answer.summary) == _plain(typed("check", script))
+    assert "\n".join(answer.sentences) == tolalloc("check", script).stdout.rstrip("\n")
+    assert answer.summary["questions"] == ["allocation"]
+
+
+def test_whatif(script):
+    answer = ta.whatif(script, {"shaft": 20.0}, units=200)
+    assert _plain(answer.summary) == _plain(typed("whatif", script, "shaft=0.02mm", "--units", 200))
+
+
+@pytest.mark.slow
+def test_series_and_compare(script, tmp_path):
+    answer = ta.series([script], tmp_path / "runs")
+    assert answer.summary["studies"][0]["answer"] == "met"
+    assert _plain(answer.summary) == _plain(typed("series", script, "--out", tmp_path / "runs"))
+    runs = [tmp_path / "runs" / "own"] * 2
+    compared = ta.compare(*runs)
+    assert compared.result.same_question
+    assert _plain(compared.summary) == _plain(typed("compare", *runs))
+
+
+def test_new_and_schema(tmp_path):
+    made, like = ta.new(tmp_path / "mine", like="rv40e", cranks=3), ("--like", "rv40e", "--cranks", 3)
+    (tmp_path / "typed").mkdir()
+    assert tolalloc("new", tmp_path / "typed" / "mine", *like).returncode == 0
+    for name in ("reducer.toml", "zones.csv", "study.py", "README.md"):
+        assert (made / name).read_bytes() == (tmp_path / "typed" / "mine" / name).read_bytes()
+    assert ta.schema("reducer") == json.loads(tolalloc("schema", "reducer").stdout)
+
+
+def test_a_study_itself_is_asked_as_its_script_is(script):
+    from tolalloc.study.script import load_script
+
+    study = load_script(script).study
+    assert ta.whatif(study, {"shaft": 20.0}, units=200).summary == ta.whatif(script, {"shaft": 20.0}, units=200).summary
+    with pytest.raises(InputError, match=r"study: study is 3; allowed is ta\.Study\(\.\.\.\) or the path of a script"):
+        ta.check(3)

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from tolalloc.cli.assemble import assemble
-from tolalloc.cli.check import check
 from tolalloc.cli.console import note
 from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.doctor import doctor
@@ -22,8 +21,7 @@ from tolalloc.cli.new import new, schema
 from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
-from tolalloc.cli.series import series
-from tolalloc.cli.whatif import whatif
+from tolalloc.cli.studies import check, series, whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 
 app = typer.Typer(

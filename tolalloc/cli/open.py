@@ -10,8 +10,8 @@ import typer
 
 from tolalloc.cli.console import announce_kernel, note
 from tolalloc.cli.run import Script
-from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError
+from tolalloc.study.script import load_study
 
 if TYPE_CHECKING:
     from tolalloc.cli.live.desk import Desk

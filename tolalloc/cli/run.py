@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, shown_progress, tell
-from tolalloc.cli.study_script import load_study
 from tolalloc.exceptions import InputError, StoppedError
+from tolalloc.study.script import load_study
 
 if TYPE_CHECKING:
     from tolalloc.running.chunks import Mapper

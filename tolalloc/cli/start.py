@@ -403,3 +403,30 @@ class NewFolder:
         asked = "".join(f"{_ASKED[kind]}\n" for kind in self.samples if kind in _ASKED)
         commands = f"\nOn the samples, some of them for minutes:\n\n```sh\n{asked}```\n" if asked else ""
         return _READ_ME.format(name=self.place.name, samples=rows, commands=commands)
+
+
+def new(
+    folder: str | Path, *, like: str = "rv20e", cranks: int | None = None, discs: int | None = None, samples: str = ""
+) -> Path:
+    """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own.
+
+    Parameters
+    ----------
+    folder
+        The new folder, whose name becomes that of the study.
+    like
+        Preset that the reducer is like.
+    cranks, discs
+        Their numbers; those of the preset unless given [-].
+    samples
+        Kinds of samples, separated by commas, or ``all``.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        Something is there already, or a name or number that is not allowed.
+    """
+    kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
+    place = Path(folder)
+    NewFolder(place=place, like=Likeness(preset=like, cranks=cranks, discs=discs), samples=kinds).write()
+    return place

@@ -1,0 +1,240 @@
+"""The commands that are asked of studies and their folders, as functions of ``ta``: check, what if, series.
+
+A study is given as such or as the path of its script.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, TolallocError
+from tolalloc.reports.answer import Answer as Told
+from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.check import Checked, CheckedTime
+from tolalloc.running.chunks import Mapper
+from tolalloc.running.progress import Progress, Silent
+from tolalloc.study.answer import Answer
+from tolalloc.study.prepared import Prepared
+from tolalloc.study.problem import Effort
+from tolalloc.study.questions import Difference
+from tolalloc.study.script import StudyScript, load_script
+from tolalloc.study.study import Study, run
+
+InForce = Callable[[], AbstractContextManager[None]]
+"""Lets imports find the modules of one study, and none of another one."""
+_CHECKED = 1000
+"""Random units that a check solves [-]."""
+
+
+def _with_modules(study: Study | StudyScript | str | Path) -> tuple[Study, InForce]:
+    """Return a study, read if its script is given, and what lets imports find its modules."""
+    if isinstance(study, Study):
+        return study, nullcontext
+    if isinstance(study, StudyScript):
+        return study.study, study.in_force
+    if not isinstance(study, str | Path):
+        raise InputError.at("study", "study", study, "ta.Study(...) or the path of a script")
+    script = load_script(Path(study))
+    return script.study, script.in_force
+
+
+def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -> Answer[Checked]:
+    """Check a study's names, units and bounds; no question is asked.
+
+    Parameters
+    ----------
+    study
+        The study, or the script that defines it; a script is a program, and is run to read it.
+    timed
+        Whether a few units are solved to say about how long each question takes here.
+    script
+        Where the study was read, if it was; the given path itself is.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is wrong with the study.
+    """
+    asked, in_force = _with_modules(study)
+    script = script if isinstance(study, Study) else str(study)
+    header, kinds = Header(name=asked.name, model=""), tuple(question.kind for question in asked.questions)
+    with in_force():
+        if not any(question.reads for question in asked.questions):
+            return Answer(kind="check", header=header, result=Checked(script=script, questions=kinds))
+        prepared = Prepared(study=asked)
+        model, errors, space = prepared.model, prepared.errors, prepared.space
+        # Whatever is wrong is found before units are solved.
+        header, requirements = replace(header, model=model.name, currency=prepared.currency), prepared.requirements
+        result = Checked(
+            script=script,
+            questions=kinds,
+            model=model,
+            errors=errors,
+            space=space,
+            requirements=requirements,
+            notes=asked.drawing.notes if asked.drawing else (),
+            examined=model.examined(_random_units(prepared)),
+            times=_times(prepared) if timed else (),
+        )
+    return Answer(kind="check", header=header, result=result)
+
+
+def _random_units(prepared: Prepared) -> Float[np.ndarray, "unit column"]:
+    """Return the deviations of random units at the zones of the drawing."""
+    errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
+    chunks = seeds.uniform_chunks(_CHECKED, len(errors.columns))
+    return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
+
+
+def _times(prepared: Prepared) -> tuple[CheckedTime, ...]:
+    """Return about how long the questions take at the quick effort and at the study's own."""
+    from tolalloc.study.duration import durations
+
+    study = prepared.study
+    efforts = {"quick": study.with_effort("quick"), **({} if study.quick else {"full": study})}
+    return tuple(
+        CheckedTime(effort=effort, kind=own.kind, units=own.units, seconds=own.seconds, sentence=own.sentence)
+        for effort, asked in efforts.items()
+        for own in durations(replace(prepared, study=asked))
+    )
+
+
+def whatif(
+    study: Study | str | Path,
+    zones: Mapping[str, float],
+    *,
+    units: int = 1024,
+    progress: Progress | None = None,
+) -> Answer[Any] | Told:
+    """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units.
+
+    Parameters
+    ----------
+    study
+        The study, or the script that defines it.
+    zones
+        Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
+    units
+        Random units of either drawing [-].
+    progress
+        Told how far the work has come; silent unless given.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        What is wrong with the study or the zones.
+    """
+    asked, in_force = _with_modules(study)
+    with in_force():
+        return asked.ask(Difference(zones=zones, units=units), progress=progress)
+
+
+def series(
+    studies: Iterable[Study | StudyScript | str | Path],
+    folder: str | Path = "runs",
+    effort: Literal["quick", "full"] | Effort | None = None,
+    progress: Progress | None = None,
+    *,
+    fresh: bool = False,
+    solved_by: Mapper = map,
+    told: Callable[[Member], None] | None = None,
+) -> Answer[tuple[Member, ...]]:
+    """Run many studies, a product series or a grid of limits, and tell all answers in one table.
+
+    Parameters
+    ----------
+    studies
+        Studies, or the scripts that define them, each of a name of its own.
+    folder
+        Folder of all run folders; finished ones in it are not run again.
+    effort
+        ``quick``, ``full`` or numbers; each study's own if none is given.
+    progress
+        Told how far the work has come; silent unless given.
+    fresh
+        Whether everything is solved again.
+    solved_by
+        What solves the units; this process unless given.
+    told
+        Told of every study when it is done.
+
+    Raises
+    ------
+    InputError
+        Two studies of one name, or a script that cannot be read.
+    """
+    read = [_with_modules(study) for study in studies]
+    asked = [(study.with_effort(effort), in_force) for study, in_force in read]
+    members = []
+    for member in run_series(asked, Path(folder), progress or Silent(), fresh=fresh, solved_by=solved_by):
+        members.append(member)
+        if told:
+            told(member)
+    header = Header(name="series", model="", currency=common_currency(own.found for own in members if own.found))
+    return Answer(kind="series", header=header, result=tuple(members))
+
+
+def run_series(
+    studies: Iterable[tuple[Study, InForce]],
+    folder: Path,
+    progress: Progress,
+    *,
+    fresh: bool = False,
+    solved_by: Mapper = map,
+) -> Iterator[Member]:
+    """Yield what becomes of every study, each in a folder of its own name; one that is finished there is read.
+
+    A study is run while its own modules are in force. Where its folder holds an answer to an earlier state of the
+    study, or it is to begin afresh, the new answer has the next numbered folder. A study that cannot be run does not
+    stop the others. All share the solved units beside their folders.
+
+    Raises
+    ------
+    InputError
+        Two studies of one name.
+    """
+    known = tuple(studies)
+    names = [study.name for study, _ in known]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"series: {names.count(name)} studies are named {name!r}; each needs a name of its own.")
+    for study, in_force in known:
+        *earlier, own = _folders(folder / study.name)
+        try:
+            with in_force():
+                current = () if fresh else (found for own in reversed(earlier) if (found := _finished(study, own)))
+                finished = next(iter(current), None)
+                if finished is None:
+                    run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
+            found = finished or read_run(own)
+            yield Member(name=study.name, folder=found.folder, found=found)
+        except TolallocError as error:
+            yield Member(name=study.name, folder=own, fault=str(error))
+
+
+def _folders(first: Path) -> list[Path]:
+    """Return the folders that a study has, and last the next one that is new or empty."""
+    found = [first]
+    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
+        found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
+    return found
+
+
+def _finished(study: Study, folder: Path) -> FinishedRun | None:
+    """Return what the folder says if it answers just this study at this effort."""
+    with suppress(InputError):
+        found = read_run(folder)
+        manifest, asked = found.manifest, [question.kind for question in study.questions]
+        same = manifest.get("study hash") == Prepared(study=study).digest and manifest.get("questions") == asked
+        if same and manifest.get("quick") == study.quick:
+            return found
+    return None
